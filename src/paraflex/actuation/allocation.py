@@ -1,0 +1,116 @@
+"""Inverse dynamics of the rigid model: efforts in the null space of the constraints, torques of minimum norm.
+
+With Z the basis of admissible motions in task coordinates (Phi_q Z = 0), the motors' torques tau must satisfy
+B tau = Q, where Q = Z^T (M a + h) is the required effort and B = Z^T S_motor the actuation matrix. Of all torques of
+the active motors that do, the one of least Euclidean norm is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import ActuationError, Moment, SingularActuationError
+from paraflex.kernel.bodies import body_equations
+from paraflex.kinematics import RigidMotion
+from paraflex.mechanism import ActuationMode
+
+# Ratio of smallest to largest singular value below which a set of motors cannot drive the mechanism.
+SINGULAR_RATIO = 1e-6
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a rigid motion asks of the motors.
+
+    Attributes
+    ----------
+    motion : RigidMotion
+    required : (k, tasks) array
+        Q, generalised effort per task coordinate [N; N m for an angle].
+    matrix : (k, tasks, motors) array
+        B, effort in the task per unit torque of each motor; its transpose gives motor speeds per task velocity.
+    """
+
+    motion: RigidMotion
+    required: NDArray[np.float64]
+    matrix: NDArray[np.float64]
+
+    def active(self, mode: ActuationMode) -> NDArray[np.bool_]:
+        """Which motors a mode drives (motors,)."""
+        return np.array([motor.name in mode.motors for motor in self.motion.mechanism.motors], dtype=bool)
+
+
+def required_effort(motion: RigidMotion) -> Effort:
+    """Effort and actuation matrix of a rigid motion."""
+    system = motion.system
+    forces = np.zeros_like(motion.q)
+    for k in range(motion.t.size):
+        for i in range(len(system.bodies)):
+            body_equations(system.packed, i, motion.q[k], motion.v[k], motion.a[k], forces[k])
+    selection = np.zeros((system.n, len(system.mechanism.motors)))
+    for column, motor in enumerate(system.mechanism.motors):
+        joint = system.mechanism.joint(motor.joint)
+        for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
+            if not ref.on_ground:
+                selection[system.body(ref.body).angle, column] += sign
+    transposed = np.swapaxes(motion.basis, 1, 2)
+    return Effort(motion, np.einsum("kij,kj->ki", transposed, forces), transposed @ selection)
+
+
+def actuation_condition(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:
+    """Condition number (k,) of the actuation matrix of a mode's motors; infinite where it loses rank."""
+    values = _singular_values(effort, mode)
+    with np.errstate(divide="ignore"):
+        return np.where(values[:, -1] > 0.0, values[:, 0] / values[:, -1], np.inf)
+
+
+def allocate(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:
+    """Torques (k, motors) of minimum norm over a mode's motors, zero for the passive ones [N m].
+
+    Raises
+    ------
+    ActuationError
+        The mode has too few motors, or its motors cannot drive the mechanism anywhere on the path.
+    SingularActuationError
+        The path meets a Type II singularity of the mode: it names time and position.
+    """
+    check_mode(effort, mode)
+    active = effort.active(mode)
+    torques = np.zeros((effort.required.shape[0], active.size))
+    inverse = np.linalg.pinv(effort.matrix[:, :, active])
+    torques[:, active] = np.einsum("kij,kj->ki", inverse, effort.required)
+    return torques
+
+
+def check_mode(effort: Effort, mode: ActuationMode) -> None:
+    """Whether a mode's motors can drive the mechanism all along the motion; see `allocate` for what is raised."""
+    tasks, count = effort.required.shape[1], int(effort.active(mode).sum())
+    if count < tasks:
+        raise ActuationError(
+            f'mode "{mode.name}" cannot drive the mechanism: {count} active motor(s) for {tasks} degrees of freedom',
+        )
+    values = _singular_values(effort, mode)
+    singular = values[:, -1] <= SINGULAR_RATIO * values[:, 0]
+    if np.all(singular):
+        raise ActuationError(f'mode "{mode.name}" cannot drive the mechanism: its motors never reach every direction')
+    # A square matrix that passes through a singularity between two instants shows it by the sign of its determinant.
+    if count == tasks:
+        sign = np.sign(np.linalg.det(effort.matrix[:, :, effort.active(mode)]))
+        singular[1:] |= sign[1:] != sign[:-1]
+    if np.any(singular):
+        k = int(np.argmax(singular))
+        position = effort.motion.desired.position[k]
+        raise SingularActuationError(
+            f'mode "{mode.name}" meets a Type II singularity',
+            Moment(float(effort.motion.t[k]), k, (float(position[0]), float(position[1]))),
+        )
+
+
+def _singular_values(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:
+    active = effort.matrix[:, :, effort.active(mode)]
+    values = np.linalg.svd(active, compute_uv=False)
+    missing = effort.required.shape[1] - values.shape[1]
+    return np.pad(values, ((0, 0), (0, max(0, missing))))

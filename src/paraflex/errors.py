@@ -1,0 +1,131 @@
+"""Typed errors: what went wrong, where, and what to do about it.
+
+Two families. An `InputError` is the user's to mend: it names the field, the value and the remedy, and the
+command line turns it into one line and exit code 2. A `NumericalError` names time, step and cause, and
+carries what was computed until then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = [
+    "ActuationError",
+    "AssemblyError",
+    "InputError",
+    "IntegrationError",
+    "NumericalError",
+    "OutputError",
+    "ParaflexError",
+    "SingularActuationError",
+    "UnreachablePathError",
+]
+
+
+class ParaflexError(Exception):
+    """Root of every error that paraflex raises on purpose."""
+
+
+class InputError(ParaflexError, ValueError):
+    """A model, path or option that cannot be used as given.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, in a few words.
+    field : str
+        The field, option or argument at fault, as the user wrote it ("body.link1.length").
+    value : object, optional
+        The offending value; left out of the message where there is none.
+    remedy : str
+        What to write instead.
+    source : str
+        The file the field stands in; empty for Python arguments and command-line options.
+    """
+
+    def __init__(self, problem: str, *, field: str, value: object = None, remedy: str = "", source: str = "") -> None:
+        self.problem, self.field, self.value, self.remedy, self.source = problem, field, value, remedy, source
+        super().__init__(self._text())
+
+    def _text(self) -> str:
+        where = f"{self.source}: {self.field}" if self.source else self.field
+        value = "" if self.value is None else f" (got {_short(self.value)})"
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{where}: {self.problem}{value}{remedy}"
+
+    def in_file(self, source: str) -> InputError:
+        """The same error, naming the file it came from."""
+        return type(self)(self.problem, field=self.field, value=self.value, remedy=self.remedy, source=source)
+
+
+class OutputError(InputError):
+    """A place where results cannot be written."""
+
+
+def _short(value: object, limit: int = 80) -> str:
+    text = repr(value).replace("\n", " ")
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When and where a computation stopped.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    step : int
+        Accepted steps (or path samples) until then.
+    position : tuple of float, optional
+        Of the end-effector in the ground frame [m], where it is known.
+    """
+
+    time: float
+    step: int
+    position: tuple[float, ...] | None = None
+
+    def __str__(self) -> str:
+        text = f"t = {self.time:.6g} s (step {self.step})"
+        if self.position is not None:
+            text += ", end-effector at (" + ", ".join(f"{x:.4g}" for x in self.position) + ") m"
+        return text
+
+
+class NumericalError(ParaflexError, ArithmeticError):
+    """A computation that could not go on.
+
+    Attributes
+    ----------
+    cause : str
+        Why, in words.
+    moment : Moment or None
+        When and where.
+    partial : object or None
+        What was computed until then, of the type the function returns.
+    """
+
+    def __init__(self, cause: str, moment: Moment | None = None, partial: Any = None) -> None:
+        self.cause, self.moment, self.partial = cause, moment, partial
+        super().__init__(cause if moment is None else f"{cause} at {moment}")
+
+
+class AssemblyError(NumericalError):
+    """The mechanism's loops cannot be closed at a pose."""
+
+
+class UnreachablePathError(AssemblyError):
+    """The end-effector cannot follow the path: out of reach, or past a Type I singularity."""
+
+
+class ActuationError(NumericalError):
+    """A set of motors that cannot drive the mechanism."""
+
+
+class SingularActuationError(ActuationError):
+    """The path meets a Type II singularity of the chosen motors."""
+
+
+class IntegrationError(NumericalError):
+    """Forward simulation stopped before its end: singular constraints, no convergence, or too many steps."""

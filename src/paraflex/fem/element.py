@@ -1,0 +1,80 @@
+"""The planar beam element: linear axial, quintic Hermite transverse displacement (Eqs. 3-6).
+
+Two nodes with four coordinates each: axial displacement, transverse displacement, slope, curvature. The
+lumped masses and moments of inertia at its ends are point contributions and enter in `fem.integrals`; without
+them this is the common element (Remark 1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+COORDINATES_PER_NODE = 4
+AXIAL, TRANSVERSE, SLOPE, CURVATURE = range(COORDINATES_PER_NODE)
+
+# Quintic Hermite polynomials in z = x/l, ascending powers z^0..z^5; rows: displacement, slope / l,
+# curvature / l^2 of the first node, then of the second. Eq. 6, whose first row ends in -6 z^5 (printed -16).
+_HERMITE = np.array(
+    [
+        [1.0, 0.0, 0.0, -10.0, 15.0, -6.0],
+        [0.0, 1.0, 0.0, -6.0, 8.0, -3.0],
+        [0.0, 0.0, 0.5, -1.5, 1.5, -0.5],
+        [0.0, 0.0, 0.0, 10.0, -15.0, 6.0],
+        [0.0, 0.0, 0.0, -4.0, 7.0, -3.0],
+        [0.0, 0.0, 0.0, 0.5, -1.0, 0.5],
+    ]
+)
+# The power of l that scales each row: a nodal slope or curvature is per metre, z is not.
+_LENGTH_POWER = np.array([0, 1, 2, 0, 1, 2])
+_TRANSVERSE_COLUMNS = [TRANSVERSE, SLOPE, CURVATURE, 4 + TRANSVERSE, 4 + SLOPE, 4 + CURVATURE]
+_AXIAL_COLUMNS = [AXIAL, 4 + AXIAL]
+
+
+def axial_shape(x: NDArray[np.float64], length: float, derivative: int = 0) -> NDArray[np.float64]:
+    """Axial displacement per nodal coordinate (first row of Eq. 5) or its x-derivative.
+
+    Parameters
+    ----------
+    x : (n,) array
+        Positions from the first node [m].
+    length : float
+        Of the element [m].
+    derivative : int
+        Order of the derivative with respect to x.
+
+    Returns
+    -------
+    (n, 8) array
+    """
+    z = np.asarray(x, dtype=float) / length
+    rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE))
+    if derivative == 0:
+        rows[:, _AXIAL_COLUMNS] = np.column_stack([1.0 - z, z])
+    elif derivative == 1:
+        rows[:, _AXIAL_COLUMNS] = [-1.0 / length, 1.0 / length]
+    return rows
+
+
+def transverse_shape(x: NDArray[np.float64], length: float, derivative: int = 0) -> NDArray[np.float64]:
+    """Transverse displacement per nodal coordinate (second row of Eq. 5) or its x-derivative.
+
+    Parameters
+    ----------
+    x : (n,) array
+        Positions from the first node [m].
+    length : float
+        Of the element [m].
+    derivative : int
+        Order of the derivative with respect to x: 1 is the slope, 2 the curvature.
+
+    Returns
+    -------
+    (n, 8) array
+    """
+    z = np.asarray(x, dtype=float) / length
+    coefficients = np.polynomial.polynomial.polyder(_HERMITE, derivative, axis=1)
+    rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE))
+    values = np.polynomial.polynomial.polyval(z, coefficients.T).T
+    rows[:, _TRANSVERSE_COLUMNS] = values * float(length) ** (_LENGTH_POWER - derivative)
+    return rows

@@ -1,0 +1,236 @@
+"""Inertia shape integrals and stiffness of a body: all the constants its equations of motion need (Eqs. 13-28)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.fem.element import axial_shape, transverse_shape
+from paraflex.fem.mesh import BeamMesh
+from paraflex.fem.reference import ReferenceCondition, reference_basis
+
+# N^T N is of degree 10 in x, exact with six Gauss points.
+_GAUSS_POINTS = 6
+
+# E^T of dR/dphi = R E: the paper's K~ below Eq. 25.
+_ET = np.array([[0.0, 1.0], [-1.0, 0.0]])
+
+
+@dataclass(frozen=True)
+class SpanProperties:
+    """Section and material of a span of a beam.
+
+    Attributes
+    ----------
+    mass_per_length : float
+        rho A [kg/m].
+    axial_stiffness : float
+        E A [N].
+    bending_stiffness : float
+        E I [N m^2].
+    """
+
+    mass_per_length: float
+    axial_stiffness: float
+    bending_stiffness: float
+
+
+@dataclass(frozen=True)
+class Lump:
+    """A lumped mass [kg] and moment of inertia [kg m^2] at a node of a beam."""
+
+    node: int
+    mass: float
+    inertia: float
+
+
+@dataclass(frozen=True)
+class ShapeIntegrals:
+    """Constants of a body in its body frame; nf flexible coordinates u, none for a rigid body.
+
+    Attributes
+    ----------
+    m : float
+        Mass [kg].
+    S1 : (2,) array
+        int s0 dm, first moment of the undeformed body [kg m].
+    S2 : (2, nf) array
+        int N dm.
+    I0 : float
+        int s0.s0 dm about the body frame's origin [kg m^2].
+    I1 : (nf,) array
+        int s0^T N dm.
+    I2 : (nf, nf) array
+        int N^T N dm.
+    G1 : (nf,) array
+        int s0^T E^T N dm.
+    G2 : (nf, nf) array
+        int N^T E^T N dm, skew.
+    J : float
+        Sum of the lumped moments of inertia [kg m^2].
+    Jf : (nf,) array
+        sum J N2'.
+    Jff : (nf, nf) array
+        sum J N2'^T N2'.
+    K : (nf, nf) array
+        Elastic stiffness.
+    D : (n_nodal, nf) array
+        Nodal coordinates per flexible coordinate (Eq. 7); no rows for a rigid body.
+    """
+
+    m: float
+    S1: NDArray[np.float64]
+    S2: NDArray[np.float64]
+    I0: float
+    I1: NDArray[np.float64]
+    I2: NDArray[np.float64]
+    G1: NDArray[np.float64]
+    G2: NDArray[np.float64]
+    J: float
+    Jf: NDArray[np.float64]
+    Jff: NDArray[np.float64]
+    K: NDArray[np.float64]
+    D: NDArray[np.float64]
+
+    @property
+    def nf(self) -> int:
+        """Number of flexible coordinates."""
+        return self.K.shape[0]
+
+    @property
+    def Mff(self) -> NDArray[np.float64]:
+        """Mass matrix of the flexible coordinates, I2 + Jff, constant."""
+        return self.I2 + self.Jff
+
+    def in_basis(self, basis: NDArray[np.float64]) -> ShapeIntegrals:
+        """The same body in other flexible coordinates, u_old = basis @ u_new."""
+        return ShapeIntegrals(
+            m=self.m,
+            S1=self.S1,
+            S2=self.S2 @ basis,
+            I0=self.I0,
+            I1=self.I1 @ basis,
+            I2=basis.T @ self.I2 @ basis,
+            G1=self.G1 @ basis,
+            G2=basis.T @ self.G2 @ basis,
+            J=self.J,
+            Jf=self.Jf @ basis,
+            Jff=basis.T @ self.Jff @ basis,
+            K=basis.T @ self.K @ basis,
+            D=self.D @ basis,
+        )
+
+    def without_flexibility(self) -> ShapeIntegrals:
+        """The same body, rigid: all flexible coordinates held at zero (Remark 3)."""
+        return self.in_basis(np.zeros((self.nf, 0)))
+
+
+def rigid_integrals(mass: float, centre: Sequence[float], inertia: float) -> ShapeIntegrals:
+    """Integrals of a rigid body.
+
+    Parameters
+    ----------
+    mass : float
+        [kg]
+    centre : (x, y)
+        Centre of mass in the body frame [m].
+    inertia : float
+        About the centre of mass [kg m^2].
+    """
+    c = np.array(centre, dtype=float)
+    none, nothing = np.zeros(0), np.zeros((0, 0))
+    return ShapeIntegrals(
+        m=mass,
+        S1=mass * c,
+        S2=np.zeros((2, 0)),
+        I0=inertia + mass * float(c @ c),
+        I1=none,
+        I2=nothing,
+        G1=none,
+        G2=nothing,
+        J=0.0,
+        Jf=none,
+        Jff=nothing,
+        K=nothing,
+        D=nothing,
+    )
+
+
+def beam_integrals(
+    mesh: BeamMesh,
+    spans: Sequence[SpanProperties],
+    lumps: Sequence[Lump] = (),
+    condition: ReferenceCondition = ReferenceCondition.CANTILEVER,
+) -> ShapeIntegrals:
+    """Integrals of a straight beam with lumps, by quadrature that is exact for the element.
+
+    Parameters
+    ----------
+    mesh : BeamMesh
+    spans : sequence of SpanProperties
+        One a span of the mesh.
+    lumps : sequence of Lump
+        A lumped mass enters exactly as a point of the continuum does.
+    condition : ReferenceCondition
+        How the floating frame is fixed to the beam.
+
+    Returns
+    -------
+    ShapeIntegrals
+        In the independent coordinates of the reference condition.
+    """
+    n = mesh.n_nodal
+    points, stiffness = _quadrature(mesh, spans)
+    points += [(mesh.nodes[lump.node], *mesh.shape_at(mesh.nodes[lump.node]), lump.mass) for lump in lumps]
+
+    m, I0, S1 = 0.0, 0.0, np.zeros(2)
+    S2, I1, I2 = np.zeros((2, n)), np.zeros(n), np.zeros((n, n))
+    G1, G2 = np.zeros(n), np.zeros((n, n))
+    for x, N, _, dm in points:
+        s0 = np.array([x, 0.0])
+        m += dm
+        S1 += dm * s0
+        S2 += dm * N
+        I0 += dm * x * x
+        I1 += dm * (s0 @ N)
+        I2 += dm * (N.T @ N)
+        G1 += dm * (s0 @ _ET @ N)
+        G2 += dm * (N.T @ _ET @ N)
+
+    J, Jf, Jff = 0.0, np.zeros(n), np.zeros((n, n))
+    for lump in lumps:
+        slope = np.zeros(n)
+        slope[mesh.slope_column(lump.node)] = 1.0
+        J += lump.inertia
+        Jf += lump.inertia * slope
+        Jff += lump.inertia * np.outer(slope, slope)
+
+    nodal = ShapeIntegrals(
+        m=m, S1=S1, S2=S2, I0=I0, I1=I1, I2=I2, G1=G1, G2=G2, J=J, Jf=Jf, Jff=Jff, K=stiffness, D=np.eye(n)
+    )
+    return nodal.in_basis(reference_basis(mesh, condition, nodal.Mff, stiffness))
+
+
+def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
+    """Mass points (x, N, N2', dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
+    z, w = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+    points = []
+    stiffness = np.zeros((mesh.n_nodal, mesh.n_nodal))
+    for e in range(mesh.n_elements):
+        span = spans[mesh.spans[e]]
+        length = mesh.nodes[e + 1] - mesh.nodes[e]
+        x, weight = 0.5 * length * (z + 1.0), 0.5 * length * w
+        axial = mesh.scatter(e, axial_shape(x, length))
+        transverse = mesh.scatter(e, transverse_shape(x, length))
+        slope = mesh.scatter(e, transverse_shape(x, length, derivative=1))
+        strain = mesh.scatter(e, axial_shape(x, length, derivative=1))
+        curvature = mesh.scatter(e, transverse_shape(x, length, derivative=2))
+        stiffness += span.axial_stiffness * (strain.T * weight) @ strain
+        stiffness += span.bending_stiffness * (curvature.T * weight) @ curvature
+        for k in range(x.size):
+            N = np.vstack([axial[k], transverse[k]])
+            points.append((mesh.nodes[e] + x[k], N, slope[k], weight[k] * span.mass_per_length))
+    return points, stiffness

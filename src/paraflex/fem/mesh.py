@@ -1,0 +1,136 @@
+"""The mesh of a straight beam: its named points become nodes, each span between them is cut into elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.fem.element import COORDINATES_PER_NODE, SLOPE, axial_shape, transverse_shape
+
+# Two points closer than this fraction of the beam are one node: an element that short is a typing slip.
+COINCIDENT_POINTS = 1e-9
+
+
+@dataclass(frozen=True)
+class BeamMesh:
+    """Nodes of a beam along the x axis of its body frame, the first at the origin.
+
+    Attributes
+    ----------
+    nodes : (n + 1,) array
+        Positions [m], strictly increasing from 0 to the length.
+    spans : (n,) array of int
+        The span each element belongs to; spans lie between neighbouring named points and the ends.
+    points : mapping
+        Node index of each named point.
+    """
+
+    nodes: NDArray[np.float64]
+    spans: NDArray[np.int64]
+    points: Mapping[str, int]
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements."""
+        return self.nodes.size - 1
+
+    @property
+    def n_nodal(self) -> int:
+        """Number of nodal coordinates before any reference condition, 4 a node."""
+        return COORDINATES_PER_NODE * self.nodes.size
+
+    @property
+    def length(self) -> float:
+        """Of the beam [m]."""
+        return float(self.nodes[-1])
+
+    def column(self, node: int, coordinate: int) -> int:
+        """Index of a nodal coordinate; negative nodes count from the end."""
+        return COORDINATES_PER_NODE * (node % self.nodes.size) + coordinate
+
+    def scatter(self, element: int, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rows per element coordinate (n, 8) as rows per nodal coordinate (n, n_nodal): the Boolean B of Eq. 8."""
+        wide = np.zeros((rows.shape[0], self.n_nodal))
+        start = COORDINATES_PER_NODE * element
+        wide[:, start : start + 2 * COORDINATES_PER_NODE] = rows
+        return wide
+
+    def shape_at(self, x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Shape matrix N (2, n_nodal) and slope row N2' (n_nodal,) of the point at x [m]."""
+        element = int(np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.n_elements - 1))
+        length = self.nodes[element + 1] - self.nodes[element]
+        local = np.array([x - self.nodes[element]])
+        axial = self.scatter(element, axial_shape(local, length))
+        transverse = self.scatter(element, transverse_shape(local, length))
+        slope = self.scatter(element, transverse_shape(local, length, derivative=1))
+        return np.vstack([axial, transverse]), slope[0]
+
+    def slope_column(self, node: int) -> int:
+        """Index of a node's slope."""
+        return self.column(node, SLOPE)
+
+
+def mesh_beam(length: float, points: Mapping[str, float], elements: int | Sequence[int] = 1) -> BeamMesh:
+    """Mesh a beam so that each named point is a node.
+
+    Parameters
+    ----------
+    length : float
+        [m]
+    points : mapping
+        Position of each named point along the beam [m]; the two ends are nodes whether named or not.
+    elements : int or sequence of int
+        Elements per span, one number for all or one a span, from the first end on.
+
+    Returns
+    -------
+    BeamMesh
+
+    Raises
+    ------
+    InputError
+        A length that is not positive, a point off the beam, a wrong number of element counts.
+    """
+    if not (np.isfinite(length) and length > 0.0):
+        raise InputError("a beam needs a positive length", field="length", value=length, remedy="give it in metres")
+    gap = COINCIDENT_POINTS * length
+    for name, x in points.items():
+        if not -gap <= x <= length + gap:
+            raise InputError(
+                "the point lies beyond the beam's end",
+                field=f"points.{name}",
+                value=x,
+                remedy=f"choose it between 0 and the length {length:g} m",
+            )
+    knots = [0.0]
+    for x in sorted([*points.values(), length]):
+        if x - knots[-1] > gap:
+            knots.append(min(float(x), length))
+    knots[-1] = float(length)
+    counts = _per_span(elements, len(knots) - 1)
+    pieces = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(knots, knots[1:], counts, strict=False)]
+    nodes = np.concatenate([[0.0], *pieces])
+    return BeamMesh(
+        nodes=nodes,
+        spans=np.repeat(np.arange(len(counts)), counts),
+        points={name: int(np.argmin(np.abs(nodes - x))) for name, x in points.items()},
+    )
+
+
+def _per_span(elements: int | Sequence[int], n_spans: int) -> list[int]:
+    counts = [elements] * n_spans if isinstance(elements, int) else list(elements)
+    if len(counts) != n_spans:
+        raise InputError(
+            f"the beam has {n_spans} span(s) between its points and ends",
+            field="elements",
+            value=counts,
+            remedy="give one number for all spans or one number a span",
+        )
+    for count in counts:
+        if count < 1:
+            raise InputError("a span needs at least one element", field="elements", value=count, remedy="use 1 or more")
+    return counts

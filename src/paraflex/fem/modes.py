@@ -1,0 +1,42 @@
+"""Eigenmodes of a body in its reference frame: the flexible coordinates the kernels work in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from paraflex.fem.integrals import ShapeIntegrals
+
+
+@dataclass(frozen=True)
+class ModalBasis:
+    """Mass-normalised eigenmodes of (K, Mff).
+
+    Attributes
+    ----------
+    omega : (nf,) array
+        Angular frequencies, ascending [rad/s].
+    vectors : (nf, nf) array
+        Columns V with V^T Mff V = 1 and V^T K V = diag(omega^2).
+    """
+
+    omega: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+
+
+def modal_basis(body: ShapeIntegrals) -> ModalBasis:
+    """Diagonalise a body's flexible coordinates; all modes kept is the identical model."""
+    if body.nf == 0:
+        return ModalBasis(omega=np.zeros(0), vectors=np.zeros((0, 0)))
+    squares, vectors = scipy.linalg.eigh(body.K, body.Mff)
+    # A mode's sign is arbitrary; the largest entry made positive keeps results the same on every machine.
+    largest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(vectors.shape[1])]
+    return ModalBasis(omega=np.sqrt(np.maximum(squares, 0.0)), vectors=vectors * np.sign(largest))
+
+
+def natural_frequencies(body: ShapeIntegrals) -> NDArray[np.float64]:
+    """Angular frequencies of a body with its frame held [rad/s], ascending."""
+    return modal_basis(body).omega

@@ -1,0 +1,65 @@
+"""Reference conditions: how the floating frame is fixed to the deforming beam.
+
+Each is a basis of the same space, the nodal coordinates without the three rigid-body motions and without the
+curvature of the last node (zero in the paper's Eq. 9). A beam of n elements has 4n flexible coordinates under
+any of them.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from paraflex.fem.element import AXIAL, CURVATURE, SLOPE, TRANSVERSE
+from paraflex.fem.mesh import BeamMesh
+
+N_RIGID = 3
+
+
+class ReferenceCondition(Enum):
+    """Where the body frame sits on the deformed beam.
+
+    CANTILEVER (the paper's Eq. 9)
+        at the first node, x along the tangent there.
+    PINNED
+        at the first node, x along the chord to the last node.
+    FREE
+        such that the elastic motion carries no momentum: coordinates are the elastic modes of the free beam
+        with its lumps (linearised Tisserand frame).
+    """
+
+    CANTILEVER = "cantilever"
+    PINNED = "pinned"
+    FREE = "free"
+
+
+def reference_basis(
+    mesh: BeamMesh, condition: ReferenceCondition, mass: NDArray[np.float64], stiffness: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Transformation D from independent flexible coordinates to nodal coordinates (Eq. 7).
+
+    Parameters
+    ----------
+    mesh : BeamMesh
+    condition : ReferenceCondition
+    mass, stiffness : (n_nodal, n_nodal) arrays
+        Of the beam with its lumps before any condition; only FREE needs them.
+
+    Returns
+    -------
+    (n_nodal, 4 n) array
+    """
+    kept = np.ones(mesh.n_nodal, dtype=bool)
+    kept[mesh.column(-1, CURVATURE)] = False
+    if condition is ReferenceCondition.CANTILEVER:
+        kept[[mesh.column(0, AXIAL), mesh.column(0, TRANSVERSE), mesh.column(0, SLOPE)]] = False
+    elif condition is ReferenceCondition.PINNED:
+        kept[[mesh.column(0, AXIAL), mesh.column(0, TRANSVERSE), mesh.column(-1, TRANSVERSE)]] = False
+    basis = np.eye(mesh.n_nodal)[:, kept]
+    if condition is ReferenceCondition.FREE:
+        _, modes = scipy.linalg.eigh(basis.T @ stiffness @ basis, basis.T @ mass @ basis)
+        basis = basis @ modes[:, N_RIGID:]
+    return basis

@@ -1,0 +1,273 @@
+"""Runs of an ESDIRK scheme: the kernel's time loop in slices, between which Python may look, report and stop."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import State, System
+from paraflex.errors import InputError, IntegrationError, Moment
+from paraflex.integrators.tableaux import TR_BDF2
+from paraflex.kernel.march import (
+    BALANCE,
+    CAUSE,
+    DPHI_MAX,
+    ERROR_TEST,
+    FACTORS,
+    FINISHED,
+    ITERATIONS,
+    NO_CONVERGENCE,
+    NOT_FINITE,
+    PAUSED,
+    PHI_MAX,
+    REJECTED,
+    SAMPLE,
+    SINGULAR,
+    STEP,
+    STEPS,
+    TIME,
+    Controls,
+    March,
+    Samples,
+    Tableau,
+    make_march,
+    march,
+    start,
+)
+from paraflex.kernel.packed import Signals
+
+# Attempted steps between two looks: some milliseconds for a dozen bodies.
+_SLICE = 200
+# Where the first step starts from, as a fraction of the run; error control takes over at once.
+_FIRST_STEP = 1e-6
+_CAUSES = {
+    NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
+    SINGULAR: "the constraints lose rank (singular position)",
+    NOT_FINITE: "the solution is no longer finite",
+    ERROR_TEST: "the error test asks for steps below the smallest one",
+}
+
+
+@dataclass(frozen=True)
+class IntegrationOptions:
+    """How to integrate.
+
+    Attributes
+    ----------
+    tolerance : float
+        Local errors over the whole run may add up to this much, in metres (root mean square over the mass).
+    alpha, beta : float
+        Baumgarte coefficients [1/s] (Eq. 57); the paper's range is 0 to 50.
+    max_step : float
+        Largest step [s].
+    max_steps : int
+        Attempted steps before the run is given up.
+    tableau : Tableau
+        The scheme.
+    """
+
+    tolerance: float = 1e-5
+    alpha: float = 20.0
+    beta: float = 20.0
+    max_step: float = math.inf
+    max_steps: int = 10_000_000
+    tableau: Tableau = TR_BDF2
+
+    def __post_init__(self) -> None:
+        for name in ("tolerance", "max_step", "max_steps"):
+            value = getattr(self, name)
+            if not value > 0:
+                raise InputError("must be positive", field=name, value=value, remedy=_REMEDIES[name])
+        if not math.isfinite(self.tolerance):
+            raise InputError("must be finite", field="tolerance", value=self.tolerance, remedy=_REMEDIES["tolerance"])
+        for name in ("alpha", "beta"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InputError("must not be negative", field=name, value=value, remedy="choose it from 0 to 50 1/s")
+
+
+_REMEDIES = {
+    "tolerance": "give a length in metres, say 1e-5",
+    "max_step": "give a time in seconds",
+    "max_steps": "give a number of steps",
+}
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a run computed, at the times asked for and reached.
+
+    Attributes
+    ----------
+    t : (k,) array
+        [s]
+    q, v, a : (k, n) arrays
+        Coordinates and their derivatives; flexible ones modal.
+    multipliers : (k, m) array
+        Constraint forces [N, N m], one a constraint row of the system.
+    kinetic_energy, strain_energy, work : (k,) arrays
+        [J]; work is that of the motors and of prescribed motion.
+    status : str
+        "complete", "interrupted" or "failed".
+    message : str
+        Why it is not complete.
+    steps, rejected, newton_iterations, factorisations : int
+    wall_time : float
+        [s]
+    constraint_position_max, constraint_velocity_max : float
+        Largest |Phi| [m, rad] and |Phi'| at accepted steps.
+    energy_balance_max : float
+        Largest |kinetic + strain energy - start - work| at accepted steps [J].
+    """
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    multipliers: NDArray[np.float64]
+    kinetic_energy: NDArray[np.float64]
+    strain_energy: NDArray[np.float64]
+    work: NDArray[np.float64]
+    status: str
+    message: str
+    steps: int
+    rejected: int
+    newton_iterations: int
+    factorisations: int
+    wall_time: float
+    constraint_position_max: float
+    constraint_velocity_max: float
+    energy_balance_max: float
+
+
+def integrate(
+    system: System,
+    signals: Signals,
+    initial: State,
+    times: NDArray[np.float64],
+    *,
+    knots: NDArray[np.float64] | None = None,
+    options: IntegrationOptions | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> Solution:
+    """Integrate the index-1 equations of a system from an initial state.
+
+    Parameters
+    ----------
+    system : System
+    signals : Signals
+        Motor torques and prescribed angles.
+    initial : State
+        Consistent: see `dynamics.consistent_state`.
+    times : (k,) array
+        Where results are wanted [s], ascending, the first not before the start; the last ends the run.
+    knots : array, optional
+        Times at which the signals are not smooth; steps end there.
+    options : IntegrationOptions, optional
+    on_progress : callable, optional
+        Told the time reached [s] every few milliseconds. A KeyboardInterrupt, in it or elsewhere, ends the run with
+        what is there, marked "interrupted".
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    IntegrationError
+        The run cannot go on; it carries the partial solution.
+    InputError
+        Times that do not ascend from the start.
+    """
+    options = options or IntegrationOptions()
+    times = np.ascontiguousarray(times, dtype=float)
+    if times.size == 0 or np.any(np.diff(times) <= 0.0) or times[0] < initial.time or times[-1] <= initial.time:
+        raise InputError("times must ascend from the start", field="times", remedy="give at least one later time")
+    began = time.perf_counter()
+    span = times[-1] - initial.time
+    inner = np.array([] if knots is None else knots, dtype=float)
+    stops = np.unique(np.append(inner[(inner > initial.time) & (inner < times[-1])], times[-1]))
+    state = make_march(system.n, system.m, options.tableau.c.size, len(system.mechanism.motors))
+    state.q[:], state.v[:] = initial.q, initial.v
+    state.clock[TIME], state.clock[STEP] = initial.time, min(_FIRST_STEP * span, options.max_step)
+    samples = _samples(times, system)
+    controls = Controls(
+        rate=options.tolerance / span,
+        time_scale=_time_scale(system),
+        alpha=options.alpha,
+        beta=options.beta,
+        max_step=options.max_step,
+        dependent_rows=dependent_rows(system, initial.q),
+    )
+    workspace = system.workspace()
+    arguments = (system.packed, signals, options.tableau, controls)
+    status, message = "complete", ""
+    code = start(*arguments, state, workspace, samples)
+    try:
+        while code == PAUSED:
+            attempts = int(state.count[STEPS] + state.count[REJECTED])
+            if attempts >= options.max_steps:
+                break
+            code = march(*arguments, stops, min(_SLICE, options.max_steps - attempts), state, workspace, samples)
+            if on_progress is not None:
+                on_progress(float(state.clock[TIME]))
+    except KeyboardInterrupt:
+        status, message = "interrupted", f"interrupted at t = {state.clock[TIME]:.6g} s"
+    solution = _solution(samples, state, time.perf_counter() - began, status, message)
+    if code == FINISHED or status == "interrupted":
+        return solution
+    cause = f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code]
+    moment = Moment(float(state.clock[TIME]), int(state.count[STEPS]))
+    raise IntegrationError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
+
+
+def dependent_rows(system: System, q: NDArray[np.float64]) -> int:
+    """Number of constraint rows that follow from the others at q: redundant constraints."""
+    from paraflex.kernel.linear import factor_system
+
+    return int(factor_system(system.packed, 0.0, q, system.workspace()))
+
+
+def _time_scale(system: System) -> float:
+    return 0.0
+
+
+def _samples(times: NDArray[np.float64], system: System) -> Samples:
+    k = times.size
+    return Samples(
+        times=times,
+        q=np.full((k, system.n), np.nan),
+        v=np.full((k, system.n), np.nan),
+        a=np.full((k, system.n), np.nan),
+        lam=np.full((k, system.m), np.nan),
+        energy=np.full((k, 3), np.nan),
+    )
+
+
+def _solution(samples: Samples, state: March, wall_time: float, status: str, message: str) -> Solution:
+    reached = slice(0, int(state.count[SAMPLE]))
+    return Solution(
+        t=samples.times[reached],
+        q=samples.q[reached],
+        v=samples.v[reached],
+        a=samples.a[reached],
+        multipliers=samples.lam[reached],
+        kinetic_energy=samples.energy[reached, 0],
+        strain_energy=samples.energy[reached, 1],
+        work=samples.energy[reached, 2],
+        status=status,
+        message=message,
+        steps=int(state.count[STEPS]),
+        rejected=int(state.count[REJECTED]),
+        newton_iterations=int(state.count[ITERATIONS]),
+        factorisations=int(state.count[FACTORS]),
+        wall_time=wall_time,
+        constraint_position_max=float(state.clock[PHI_MAX]),
+        constraint_velocity_max=float(state.clock[DPHI_MAX]),
+        energy_balance_max=float(state.clock[BALANCE]),
+    )

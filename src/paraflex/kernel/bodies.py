@@ -1,0 +1,104 @@
+"""Terms of one body: M q'' + h + K u, kinetic and strain energy (formulation of Eqs. 13-36 in closed form).
+
+Flexible coordinates are mass-normalised modes, so M_ff = 1 and K = diag(omega^2).
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from paraflex.kernel.compiling import kernel
+from paraflex.kernel.packed import GJ, I1, OMEGA2, S2X, S2Y
+
+
+@kernel
+def body_equations(p, i, q, v, a, f):
+    """M q'' + h + K u of body i into f; the translational part in the ground frame."""
+    body = p.bodies[i]
+    o, n, k = body.offset, body.nf, body.flex
+    e = o + 3
+    c, s = cos(q[o + 2]), sin(q[o + 2])
+    w, dw = v[o + 2], a[o + 2]
+    ax, ay = c * a[o] + s * a[o + 1], c * a[o + 1] - s * a[o]
+    # First moments s, S2 u' and S2 u''.
+    sx, sy, vx, vy, fx, fy = body.S1x, body.S1y, 0.0, 0.0, 0.0, 0.0
+    i1u, i1v = 0.0, 0.0
+    for j in range(n):
+        u, du, ddu = q[e + j], v[e + j], a[e + j]
+        S2x, S2y, i1 = p.modal[S2X, k + j], p.modal[S2Y, k + j], p.modal[I1, k + j]
+        sx += S2x * u
+        sy += S2y * u
+        vx += S2x * du
+        vy += S2y * du
+        fx += S2x * ddu
+        fy += S2y * ddu
+        i1u += i1 * u
+        i1v += i1 * du
+    uI2u, uI2v, mpf_a = 0.0, 0.0, 0.0
+    for j in range(n):
+        g_u, g_v, i_u = 0.0, 0.0, 0.0
+        row = body.square + j * n
+        for l in range(n):
+            g_u += p.G2[row + l] * q[e + l]
+            g_v += p.G2[row + l] * v[e + l]
+            i_u += p.I2[row + l] * q[e + l]
+        uI2u += q[e + j] * i_u
+        uI2v += v[e + j] * i_u
+        mpf = p.modal[GJ, k + j] - g_u
+        mpf_a += mpf * a[e + j]
+        f[e + j] = (
+            p.modal[S2X, k + j] * ax
+            + p.modal[S2Y, k + j] * ay
+            + mpf * dw
+            + a[e + j]
+            - w * w * (p.modal[I1, k + j] + i_u)
+            - 2.0 * w * g_v
+            + p.modal[OMEGA2, k + j] * q[e + j]
+        )
+    bx = body.m * ax - sy * dw + fx - w * w * sx - 2.0 * w * vy
+    by = body.m * ay + sx * dw + fy - w * w * sy + 2.0 * w * vx
+    f[o] = c * bx - s * by
+    f[o + 1] = s * bx + c * by
+    f[o + 2] = sx * ay - sy * ax + (body.I0 + 2.0 * i1u + uI2u) * dw + mpf_a + 2.0 * w * (i1v + uI2v)
+
+
+@kernel
+def body_energy(p, i, q, v):
+    """Kinetic and strain energy of body i."""
+    body = p.bodies[i]
+    o, n, k = body.offset, body.nf, body.flex
+    e = o + 3
+    c, s = cos(q[o + 2]), sin(q[o + 2])
+    w = v[o + 2]
+    rx, ry = c * v[o] + s * v[o + 1], c * v[o + 1] - s * v[o]
+    sx, sy, vx, vy = body.S1x, body.S1y, 0.0, 0.0
+    inertia, coupling, flexible, strain = body.I0, 0.0, 0.0, 0.0
+    for j in range(n):
+        u, du = q[e + j], v[e + j]
+        sx += p.modal[S2X, k + j] * u
+        sy += p.modal[S2Y, k + j] * u
+        vx += p.modal[S2X, k + j] * du
+        vy += p.modal[S2Y, k + j] * du
+        g_u, i_u = 0.0, 0.0
+        row = body.square + j * n
+        for l in range(n):
+            g_u += p.G2[row + l] * q[e + l]
+            i_u += p.I2[row + l] * q[e + l]
+        inertia += (2.0 * p.modal[I1, k + j] + i_u) * u
+        coupling += (p.modal[GJ, k + j] - g_u) * du
+        flexible += du * du
+        strain += p.modal[OMEGA2, k + j] * u * u
+    kinetic = 0.5 * (body.m * (rx * rx + ry * ry) + inertia * w * w + flexible)
+    kinetic += rx * (vx - sy * w) + ry * (vy + sx * w) + w * coupling
+    return kinetic, 0.5 * strain
+
+
+@kernel
+def system_energy(p, q, v):
+    """Kinetic and strain energy of the system."""
+    kinetic, strain = 0.0, 0.0
+    for i in range(p.bodies.size):
+        t, u = body_energy(p, i, q, v)
+        kinetic += t
+        strain += u
+    return kinetic, strain

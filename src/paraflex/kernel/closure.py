@@ -1,0 +1,124 @@
+"""Closure of a mechanism whose end-effector's motion is given: positions, velocities and accelerations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paraflex.kernel.compiling import kernel
+from paraflex.kernel.joints import (
+    apply_force,
+    apply_torque,
+    body_joints,
+    constraint_values,
+    fill_jacobian,
+    marker_angle,
+    marker_motion,
+    start_rows,
+)
+
+MAX_ITERATIONS = 20
+# Newton has converged when no coordinate moves by more than this [m, rad].
+SMALLEST_MOVE = 1e-13
+# A body that turns or shifts this much against its prediction has jumped to another assembly [rad, m].
+LARGEST_JUMP = 0.3
+CLOSED, NO_CONVERGENCE, JUMPED = range(3)
+
+
+@kernel
+def task_values(p, marker, coordinates, q, v, a):
+    """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker: (3, tasks)."""
+    out = np.empty((3, coordinates.size))
+    px, py, vx, vy, ax, ay, _, _ = marker_motion(p, marker, q, v, a)
+    for i in range(coordinates.size):
+        if coordinates[i] == 0:
+            out[0, i], out[1, i], out[2, i] = px, vx, ax
+        elif coordinates[i] == 1:
+            out[0, i], out[1, i], out[2, i] = py, vy, ay
+        else:
+            out[0, i] = marker_angle(p, marker, q)
+            out[1, i] = marker_angle(p, marker, v)
+            out[2, i] = marker_angle(p, marker, a)
+    return out
+
+
+@kernel
+def closure_jacobian(p, marker, coordinates, q, jacobian):
+    """[Phi_q; task_q] at q."""
+    m = p.rows.size
+    fill_jacobian(p, q, jacobian[:m])
+    jacobian[m:] = 0.0
+    _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
+    for i in range(coordinates.size):
+        if coordinates[i] == 2:
+            apply_torque(p, marker, 1.0, jacobian[m + i])
+        else:
+            unit = 1.0 if coordinates[i] == 0 else 0.0
+            apply_force(p, marker, q, unit, 1.0 - unit, rx, ry, jacobian[m + i])
+
+
+@kernel
+def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, basis):
+    """Close the loops along a path, each instant starting from the one before.
+
+    Parameters
+    ----------
+    target : (3, times, tasks) array
+        Task coordinates, their rates and accelerations.
+    q, v, a : (times, n) arrays
+        Written; q[0] holds the pose to start from.
+    basis : (times, n, tasks) array
+        Written: coordinates' change per change of the task coordinates, the null space of Phi_q in task terms.
+
+    Returns
+    -------
+    status, index, residual
+        Where it stopped and the residual left there, for a status other than CLOSED.
+    """
+    n, m, tasks = q.shape[1], p.rows.size, coordinates.size
+    marker = p.markers[marker_index]
+    jacobian = np.zeros((n, n))
+    residual, zero = np.zeros(n), np.zeros(n)
+    phi, dphi = np.zeros(m), np.zeros(m)
+    lam, unused = np.zeros(m), np.zeros(n)
+    right = np.zeros((n, 1 + tasks))
+    for k in range(times.size):
+        t = times[k]
+        if k > 0:
+            dt = t - times[k - 1]
+            q[k] = q[k - 1] + dt * (v[k - 1] + 0.5 * dt * a[k - 1])
+        guess = q[k].copy()
+        closed = False
+        size = np.inf
+        for _ in range(MAX_ITERATIONS):
+            constraint_values(p, signals, t, q[k], zero, phi, dphi)
+            residual[:m] = phi
+            residual[m:] = task_values(p, marker, coordinates, q[k], zero, zero)[0] - target[0, k]
+            size = np.max(np.abs(residual))
+            closure_jacobian(p, marker, coordinates, q[k], jacobian)
+            move = np.linalg.solve(jacobian, residual)
+            q[k] -= move
+            if np.max(np.abs(move)) < SMALLEST_MOVE * (1.0 + np.max(np.abs(q[k]))):
+                closed = True
+                break
+        if not closed:
+            return NO_CONVERGENCE, k, size
+        if k > 0 and np.max(np.abs(q[k] - guess)) > LARGEST_JUMP:
+            return JUMPED, k, size
+        closure_jacobian(p, marker, coordinates, q[k], jacobian)
+        constraint_values(p, signals, t, q[k], zero, phi, dphi)
+        right[:m, 0] = -dphi
+        right[m:, 0] = target[1, k]
+        right[:, 1:] = 0.0
+        for i in range(tasks):
+            right[m + i, 1 + i] = 1.0
+        solved = np.linalg.solve(jacobian, right)
+        v[k] = solved[:, 0]
+        basis[k] = solved[:, 1:]
+        # The part of Phi'' and of the task's acceleration that does not depend on the accelerations.
+        start_rows(p, signals, t, 0.0, 0.0, phi)
+        for i in range(p.bodies.size):
+            body_joints(p, i, q[k], v[k], zero, lam, 0.0, 0.0, unused, phi)
+        residual[:m] = -phi
+        residual[m:] = target[2, k] - task_values(p, marker, coordinates, q[k], v[k], zero)[2]
+        a[k] = np.linalg.solve(jacobian, residual)
+    return CLOSED, times.size, 0.0

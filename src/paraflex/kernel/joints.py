@@ -1,0 +1,172 @@
+"""Terms of joints and motors: constraints with two derivatives, constraint forces, motor torques.
+
+A marker stands at p = r + R s with s = x0 + N u, and
+p'' = r'' + R (phi'' E s - phi'^2 s + 2 phi' E N u' + N u''): the velocity-dependent part of the constraint on
+accelerations is not a formula of its own. A marker's angle is phi + N2' u.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from paraflex.kernel.compiling import kernel
+from paraflex.kernel.packed import ANGLE, NX, NY, SLOPE
+from paraflex.kernel.signals import evaluate_signal
+
+
+@kernel
+def marker_shape(p, marker, vector):
+    """Body-frame displacement N z of a marker for the flexible part of a system vector z (q, v or a)."""
+    body = p.bodies[marker.body]
+    e, k = body.offset + 3, marker.shape
+    x, y = 0.0, 0.0
+    for j in range(body.nf):
+        x += p.shape[NX, k + j] * vector[e + j]
+        y += p.shape[NY, k + j] * vector[e + j]
+    return x, y
+
+
+@kernel
+def marker_angle(p, marker, vector):
+    """The angle phi + N2' u of a marker, or its rate or acceleration, by the system vector given."""
+    body = p.bodies[marker.body]
+    e, k = body.offset + 3, marker.shape
+    angle = vector[body.offset + 2]
+    for j in range(body.nf):
+        angle += p.shape[SLOPE, k + j] * vector[e + j]
+    return angle
+
+
+@kernel
+def marker_motion(p, marker, q, v, a):
+    """Position, velocity and acceleration of a marker in the ground frame, and its s there: (p, p', p'', R s)."""
+    o = p.bodies[marker.body].offset
+    c, s = cos(q[o + 2]), sin(q[o + 2])
+    w, dw = v[o + 2], a[o + 2]
+    sx, sy = marker_shape(p, marker, q)
+    ux, uy = marker_shape(p, marker, v)
+    bx, by = marker_shape(p, marker, a)
+    sx += marker.x
+    sy += marker.y
+    # Body-frame velocity and acceleration relative to the origin.
+    vx, vy = ux - w * sy, uy + w * sx
+    ax = bx - dw * sy - w * w * sx - 2.0 * w * uy
+    ay = by + dw * sx - w * w * sy + 2.0 * w * ux
+    rx, ry = c * sx - s * sy, s * sx + c * sy
+    return (
+        q[o] + rx,
+        q[o + 1] + ry,
+        v[o] + c * vx - s * vy,
+        v[o + 1] + s * vx + c * vy,
+        a[o] + c * ax - s * ay,
+        a[o + 1] + s * ax + c * ay,
+        rx,
+        ry,
+    )
+
+
+@kernel
+def apply_force(p, marker, q, fx, fy, rx, ry, f):
+    """Add to f the generalised force of a ground-frame force at a marker: J^T F, J = [1, R E s, R N]."""
+    body = p.bodies[marker.body]
+    o, e, k = body.offset, body.offset + 3, marker.shape
+    c, s = cos(q[o + 2]), sin(q[o + 2])
+    f[o] += fx
+    f[o + 1] += fy
+    f[o + 2] += rx * fy - ry * fx
+    bx, by = c * fx + s * fy, c * fy - s * fx
+    for j in range(body.nf):
+        f[e + j] += p.shape[NX, k + j] * bx + p.shape[NY, k + j] * by
+
+
+@kernel
+def apply_torque(p, marker, torque, f):
+    """Add to f the generalised force of a torque at a marker: it works on phi and on the slope there."""
+    body = p.bodies[marker.body]
+    e, k = body.offset + 3, marker.shape
+    f[body.offset + 2] += torque
+    for j in range(body.nf):
+        f[e + j] += p.shape[SLOPE, k + j] * torque
+
+
+@kernel
+def start_rows(p, signals, t, weight_v, weight_q, rows):
+    """Constraint rows before any body: what ground points and prescribed values contribute."""
+    for r in range(p.rows.size):
+        row = p.rows[r]
+        rows[r] = weight_q * row.ground
+        if row.signal >= 0:
+            value, rate, acceleration = evaluate_signal(signals, row.signal, t)
+            rows[r] -= acceleration + weight_v * rate + weight_q * value
+
+
+@kernel
+def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
+    """Add body i's part of Phi'' + weight_v Phi' + weight_q Phi to rows, and Phi_q^T lambda to f."""
+    body = p.bodies[i]
+    for k in range(body.port, body.port_end):
+        port = p.ports[k]
+        marker = p.markers[port.marker]
+        r, sign = port.row, port.sign
+        if port.kind == ANGLE:
+            rows[r] += sign * (
+                marker_angle(p, marker, a)
+                + weight_v * marker_angle(p, marker, v)
+                + weight_q * marker_angle(p, marker, q)
+            )
+            apply_torque(p, marker, sign * lam[r], f)
+        else:
+            px, py, vx, vy, ax, ay, rx, ry = marker_motion(p, marker, q, v, a)
+            rows[r] += sign * (ax + weight_v * vx + weight_q * px)
+            rows[r + 1] += sign * (ay + weight_v * vy + weight_q * py)
+            apply_force(p, marker, q, sign * lam[r], sign * lam[r + 1], rx, ry, f)
+
+
+@kernel
+def body_efforts(p, i, torques, f):
+    """Subtract the generalised force of the motors on body i from f."""
+    body = p.bodies[i]
+    for k in range(body.effort, body.effort_end):
+        effort = p.efforts[k]
+        apply_torque(p, p.markers[effort.marker], -effort.sign * torques[effort.signal], f)
+
+
+@kernel
+def constraint_values(p, signals, t, q, v, phi, dphi):
+    """Phi and Phi' at (t, q, v), into phi and dphi."""
+    for r in range(p.rows.size):
+        row = p.rows[r]
+        phi[r], dphi[r] = row.ground, 0.0
+        if row.signal >= 0:
+            value, rate, _ = evaluate_signal(signals, row.signal, t)
+            phi[r] -= value
+            dphi[r] -= rate
+    for k in range(p.ports.size):
+        port = p.ports[k]
+        marker = p.markers[port.marker]
+        r, sign = port.row, port.sign
+        if port.kind == ANGLE:
+            phi[r] += sign * marker_angle(p, marker, q)
+            dphi[r] += sign * marker_angle(p, marker, v)
+        else:
+            # The acceleration slot is not used here: v stands in for an array of the right length.
+            px, py, vx, vy, _, _, _, _ = marker_motion(p, marker, q, v, v)
+            phi[r] += sign * px
+            phi[r + 1] += sign * py
+            dphi[r] += sign * vx
+            dphi[r + 1] += sign * vy
+
+
+@kernel
+def fill_jacobian(p, q, jacobian):
+    """Phi_q into a dense (rows, n) array; for closure and checks, not for the time loop."""
+    jacobian[:] = 0.0
+    for k in range(p.ports.size):
+        port = p.ports[k]
+        marker = p.markers[port.marker]
+        if port.kind == ANGLE:
+            apply_torque(p, marker, port.sign, jacobian[port.row])
+        else:
+            _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
+            apply_force(p, marker, q, port.sign, 0.0, rx, ry, jacobian[port.row])
+            apply_force(p, marker, q, 0.0, port.sign, rx, ry, jacobian[port.row + 1])

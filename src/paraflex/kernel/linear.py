@@ -1,0 +1,290 @@
+"""The linear system of one iteration: bodies eliminated first, then the multipliers.
+
+A body's iteration matrix is an arrow: diag(1 + b omega^2) bordered by three rigid rows, so factoring it costs
+O(nf). In the body's own frame only s, M_phiphi and M_phif depend on its deformation. The Schur complement of the
+multipliers, S = sum J M^-1 J^T, is symmetric positive definite where Phi_q has full rank; it is stored and factored
+within its envelope, rows ordered once when the system is built.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+
+from paraflex.kernel.compiling import kernel
+from paraflex.kernel.joints import marker_shape
+from paraflex.kernel.packed import ANGLE, DINV, GJ, I1, MPF, NX, NY, OMEGA2, S2X, S2Y, SLOPE, YP, YX, YY
+
+# A pivot smaller than this fraction of its diagonal entry marks a constraint row that depends on those before it.
+DEPENDENT_ROW = 1e-12
+
+
+@kernel
+def factor_body(p, i, b, q, ws):
+    """Factor M + b K of body i at q: the arrow with its 3 x 3 rigid block."""
+    body = p.bodies[i]
+    o, n, k = body.offset, body.nf, body.flex
+    e = o + 3
+    fr = ws.frame[i]
+    sx, sy, inertia = body.S1x, body.S1y, body.I0
+    a00, a10, a11, a20, a21, a22 = body.m, 0.0, body.m, 0.0, 0.0, 0.0
+    for j in range(n):
+        u = q[e + j]
+        g_u, i_u = 0.0, 0.0
+        row = body.square + j * n
+        for l in range(n):
+            g_u += p.G2[row + l] * q[e + l]
+            i_u += p.I2[row + l] * q[e + l]
+        S2x, S2y = p.modal[S2X, k + j], p.modal[S2Y, k + j]
+        sx += S2x * u
+        sy += S2y * u
+        inertia += (2.0 * p.modal[I1, k + j] + i_u) * u
+        mpf = p.modal[GJ, k + j] - g_u
+        d = 1.0 / (1.0 + b * p.modal[OMEGA2, k + j])
+        ws.flex[MPF, k + j] = mpf
+        ws.flex[DINV, k + j] = d
+        ws.flex[YX, k + j] = S2x * d
+        ws.flex[YY, k + j] = S2y * d
+        ws.flex[YP, k + j] = mpf * d
+        a00 -= S2x * S2x * d
+        a10 -= S2y * S2x * d
+        a11 -= S2y * S2y * d
+        a20 -= mpf * S2x * d
+        a21 -= mpf * S2y * d
+        a22 -= mpf * mpf * d
+    a20 -= sy
+    a21 += sx
+    a22 += inertia
+    l00 = sqrt(a00)
+    l10 = a10 / l00
+    l11 = sqrt(a11 - l10 * l10)
+    l20 = a20 / l00
+    l21 = (a21 - l20 * l10) / l11
+    l22 = sqrt(a22 - l20 * l20 - l21 * l21)
+    fr[0], fr[1] = cos(q[o + 2]), sin(q[o + 2])
+    fr[2], fr[3], fr[4] = sx, sy, inertia
+    fr[5], fr[6], fr[7], fr[8], fr[9], fr[10] = 1.0 / l00, l10, 1.0 / l11, l20, l21, 1.0 / l22
+
+
+@kernel
+def solve_body(p, i, ws, y, x, at):
+    """x = (M + b K)^-1 y of body i in its body frame; y and x hold 3 + nf entries from `at` on, and may be one."""
+    body = p.bodies[i]
+    n, k = body.nf, body.flex
+    fr = ws.frame[i]
+    e = at + 3
+    r0, r1, r2 = y[at], y[at + 1], y[at + 2]
+    for j in range(n):
+        r0 -= ws.flex[YX, k + j] * y[e + j]
+        r1 -= ws.flex[YY, k + j] * y[e + j]
+        r2 -= ws.flex[YP, k + j] * y[e + j]
+    r0 = r0 * fr[5]
+    r1 = (r1 - fr[6] * r0) * fr[7]
+    r2 = (r2 - fr[8] * r0 - fr[9] * r1) * fr[10] * fr[10]
+    r1 = (r1 - fr[9] * r2) * fr[7]
+    r0 = (r0 - fr[6] * r1 - fr[8] * r2) * fr[5]
+    for j in range(n):
+        x[e + j] = (
+            ws.flex[DINV, k + j] * y[e + j]
+            - ws.flex[YX, k + j] * r0
+            - ws.flex[YY, k + j] * r1
+            - ws.flex[YP, k + j] * r2
+        )
+    x[at], x[at + 1], x[at + 2] = r0, r1, r2
+
+
+@kernel
+def body_jacobian(p, i, q, ws):
+    """Jacobian rows of body i's ports, ground-frame rows over body-frame columns: R [1, E s, N]."""
+    body = p.bodies[i]
+    n = body.nf
+    c, s = ws.frame[i, 0], ws.frame[i, 1]
+    for k in range(body.port, body.port_end):
+        port = p.ports[k]
+        marker = p.markers[port.marker]
+        h, x = marker.shape, port.jac
+        if port.kind == ANGLE:
+            ws.jac[x], ws.jac[x + 1], ws.jac[x + 2] = 0.0, 0.0, 1.0
+            for j in range(n):
+                ws.jac[x + 3 + j] = p.shape[SLOPE, h + j]
+            continue
+        y = x + 3 + n
+        ux, uy = marker_shape(p, marker, q)
+        sx, sy = marker.x + ux, marker.y + uy
+        ws.jac[x], ws.jac[x + 1], ws.jac[x + 2] = c, -s, -(c * sy + s * sx)
+        ws.jac[y], ws.jac[y + 1], ws.jac[y + 2] = s, c, c * sx - s * sy
+        for j in range(n):
+            ws.jac[x + 3 + j] = c * p.shape[NX, h + j] - s * p.shape[NY, h + j]
+            ws.jac[y + 3 + j] = s * p.shape[NX, h + j] + c * p.shape[NY, h + j]
+
+
+@kernel
+def add_schur(p, i, ws):
+    """Add J M^-1 J^T of body i to the Schur complement."""
+    body = p.bodies[i]
+    width = 3 + body.nf
+    for k in range(body.port, body.port_end):
+        port = p.ports[k]
+        for r in range(port.rows):
+            solve_body(p, i, ws, ws.jac, ws.inv, port.jac + r * width)
+            # Rows of ports before this one, and of this one up to r: each pair once.
+            for l in range(body.port, k + 1):
+                other = p.ports[l]
+                sign = port.sign * other.sign
+                for s in range(other.rows if l < k else r + 1):
+                    dot = 0.0
+                    for j in range(width):
+                        dot += ws.inv[port.jac + r * width + j] * ws.jac[other.jac + s * width + j]
+                    high, low = max(port.row + r, other.row + s), min(port.row + r, other.row + s)
+                    ws.schur[p.rows[high].start + low - p.rows[high].first] += sign * dot
+
+
+@kernel
+def factor_schur(p, ws):
+    """Cholesky factor of the Schur complement in place, row by row within the envelope.
+
+    Returns the number of dependent rows found; each gets multiplier zero, which leaves the accelerations those of
+    the pseudo-inverse (Eq. 59) as long as the constraints are consistent.
+    """
+    dependent = 0
+    for i in range(p.rows.size):
+        first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
+        for j in range(first, i):
+            first_j, start_j = p.rows[j].first, p.rows[j].start - p.rows[j].first
+            total = ws.schur[start + j]
+            for k in range(max(first, first_j), j):
+                total -= ws.schur[start + k] * ws.schur[start_j + k]
+            # Diagonals hold reciprocals; that of a dependent row is zero and keeps its column at zero.
+            ws.schur[start + j] = total * ws.schur[start_j + j]
+        diagonal = ws.schur[start + i]
+        pivot = diagonal
+        for k in range(first, i):
+            pivot -= ws.schur[start + k] * ws.schur[start + k]
+        if pivot > DEPENDENT_ROW * diagonal:
+            ws.schur[start + i] = 1.0 / sqrt(pivot)
+        else:
+            ws.schur[start + i] = 0.0
+            dependent += 1
+    return dependent
+
+
+@kernel
+def solve_schur(p, ws, x):
+    """Solve with the factored Schur complement, in place."""
+    for i in range(p.rows.size):
+        first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
+        total = x[i]
+        for k in range(first, i):
+            total -= ws.schur[start + k] * x[k]
+        x[i] = total * ws.schur[start + i]
+    for i in range(p.rows.size - 1, -1, -1):
+        first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
+        x[i] *= ws.schur[start + i]
+        for k in range(first, i):
+            x[k] -= ws.schur[start + k] * x[i]
+
+
+@kernel
+def factor_system(p, b, q, ws):
+    """Factor the iteration matrix [M + b K, Phi_q^T; Phi_q, 0] at q; returns the number of dependent rows."""
+    ws.schur[:] = 0.0
+    for i in range(p.bodies.size):
+        factor_body(p, i, b, q, ws)
+        body_jacobian(p, i, q, ws)
+        add_schur(p, i, ws)
+    return factor_schur(p, ws)
+
+
+@kernel
+def to_body_frame(p, i, ws, x):
+    """Turn the translational part of body i in x from the ground frame to the factor's body frame."""
+    o = p.bodies[i].offset
+    c, s = ws.frame[i, 0], ws.frame[i, 1]
+    x[o], x[o + 1] = c * x[o] + s * x[o + 1], c * x[o + 1] - s * x[o]
+
+
+@kernel
+def to_ground_frame(p, i, ws, x):
+    """Turn the translational part of body i in x back to the ground frame."""
+    o = p.bodies[i].offset
+    c, s = ws.frame[i, 0], ws.frame[i, 1]
+    x[o], x[o + 1] = c * x[o] - s * x[o + 1], s * x[o] + c * x[o + 1]
+
+
+@kernel
+def jacobian_times(p, i, ws, x, scale, rows):
+    """Add scale * J x of body i to rows; x in the body frame."""
+    body = p.bodies[i]
+    o, width = body.offset, 3 + body.nf
+    for k in range(body.port, body.port_end):
+        port = p.ports[k]
+        for r in range(port.rows):
+            dot = 0.0
+            for j in range(width):
+                dot += ws.jac[port.jac + r * width + j] * x[o + j]
+            rows[port.row + r] += scale * port.sign * dot
+
+
+@kernel
+def solve_system(p, ws, x, mu):
+    """Solve [M + b K, Phi_q^T; Phi_q, 0] [x; mu] = [x; mu] in place; x in the ground frame."""
+    for i in range(p.bodies.size):
+        to_body_frame(p, i, ws, x)
+        solve_body(p, i, ws, x, x, p.bodies[i].offset)
+    for r in range(mu.size):
+        mu[r] = -mu[r]
+    for i in range(p.bodies.size):
+        jacobian_times(p, i, ws, x, 1.0, mu)
+    solve_schur(p, ws, mu)
+    for i in range(p.bodies.size):
+        body = p.bodies[i]
+        o, width = body.offset, 3 + body.nf
+        for k in range(body.port, body.port_end):
+            port = p.ports[k]
+            for r in range(port.rows):
+                factor = port.sign * mu[port.row + r]
+                for j in range(width):
+                    x[o + j] -= factor * ws.inv[port.jac + r * width + j]
+        to_ground_frame(p, i, ws, x)
+
+
+@kernel
+def mass_times(p, i, ws, x):
+    """M x of body i in place, with the mass matrix of the factor; x in the body frame."""
+    body = p.bodies[i]
+    o, n, k = body.offset, body.nf, body.flex
+    e = o + 3
+    sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
+    x0, x1, x2 = x[o], x[o + 1], x[o + 2]
+    y0 = body.m * x0 - sy * x2
+    y1 = body.m * x1 + sx * x2
+    y2 = sx * x1 - sy * x0 + inertia * x2
+    for j in range(n):
+        z = x[e + j]
+        S2x, S2y, mpf = p.modal[S2X, k + j], p.modal[S2Y, k + j], ws.flex[MPF, k + j]
+        y0 += S2x * z
+        y1 += S2y * z
+        y2 += mpf * z
+        x[e + j] = z + S2x * x0 + S2y * x1 + mpf * x2
+    x[o], x[o + 1], x[o + 2] = y0, y1, y2
+
+
+@kernel
+def mass_norm(p, ws, x):
+    """sqrt(x^T M x / m_total) of a ground-frame vector: metres for a displacement, whatever the coordinates."""
+    total = 0.0
+    for i in range(p.bodies.size):
+        body = p.bodies[i]
+        o, k = body.offset, body.flex
+        c, s = ws.frame[i, 0], ws.frame[i, 1]
+        sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
+        x0, x1, x2 = c * x[o] + s * x[o + 1], c * x[o + 1] - s * x[o], x[o + 2]
+        fx, fy, fp, ff = 0.0, 0.0, 0.0, 0.0
+        for j in range(body.nf):
+            z = x[o + 3 + j]
+            fx += p.modal[S2X, k + j] * z
+            fy += p.modal[S2Y, k + j] * z
+            fp += ws.flex[MPF, k + j] * z
+            ff += z * z
+        total += body.m * (x0 * x0 + x1 * x1) + inertia * x2 * x2 + ff
+        total += 2.0 * (x0 * (fx - sy * x2) + x1 * (fy + sx * x2) + x2 * fp)
+    return sqrt(max(total, 0.0) / p.total_mass)

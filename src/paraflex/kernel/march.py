@@ -1,0 +1,432 @@
+"""The time loop of an ESDIRK scheme: steps, error control, dense output. A tableau is data.
+
+A diagonally implicit scheme with explicit first stage and stiffly accurate last one: stage i stands at
+q_i = q_n + h sum_j A_ij v_j and v_i = v_n + h sum_j A_ij a_j, its own v_i and a_i among them, and the last stage is
+the new step's first. The error estimate is filtered through the iteration matrix (Hosea and Shampine 1996): without
+that an undamped axial mode would dictate the step.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.kernel.bodies import system_energy
+from paraflex.kernel.compiling import kernel
+from paraflex.kernel.joints import constraint_values, marker_angle
+from paraflex.kernel.linear import factor_system, jacobian_times, mass_norm, mass_times, solve_system, to_body_frame
+from paraflex.kernel.packed import OMEGA2
+from paraflex.kernel.signals import evaluate_signal
+from paraflex.kernel.stage import CONVERGED, FIRST_RATE, equations, solve_stage
+
+# Why `march` returned.
+PAUSED, FINISHED, NO_CONVERGENCE, SINGULAR, NOT_FINITE, ERROR_TEST = range(6)
+# March.clock
+TIME, STEP, LAST_STEP, WORK, FACTOR_G, RATE, ENERGY_0, BALANCE, PHI_MAX, DPHI_MAX = range(10)
+# March.count
+STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, CAUSE = range(8)
+
+SAFETY, MIN_FACTOR, MAX_FACTOR = 0.9, 0.2, 4.0
+# A new step this close to the old one is not worth a new factorisation.
+KEEP_ABOVE, KEEP_BELOW = 0.92, 1.2
+# Contraction beyond which the factor is renewed at the next step.
+STALE_RATE = 0.05
+# Newton errors are held to this fraction of the error allowed in a step.
+NEWTON_FRACTION = 0.03
+# The smallest step, as a fraction of the time span.
+MIN_STEP = 1e-12
+
+
+class Tableau(NamedTuple):
+    """An ESDIRK scheme: A, c, the difference b - b^ of the embedded formula, and where dense output may join."""
+
+    A: NDArray[np.float64]
+    c: NDArray[np.float64]
+    error: NDArray[np.float64]
+    dense: NDArray[np.int64]  # stages accurate enough to interpolate between, first and last among them
+    order: int
+
+
+class Controls(NamedTuple):
+    """What the user chooses of a run.
+
+    `rate` is the error allowed per second [m/s]: local errors of a run of duration T add up to the tolerance
+    when each step's stays below tolerance h / T.
+    """
+
+    rate: float
+    time_scale: float
+    alpha: float
+    beta: float
+    max_step: float
+    dependent_rows: int
+
+
+class March(NamedTuple):
+    """The state of a run between calls, and its scratch."""
+
+    clock: NDArray[np.float64]
+    count: NDArray[np.int64]
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    stage_t: NDArray[np.float64]  # (2, stages): of the last accepted step and of this one
+    stage_q: NDArray[np.float64]  # (stages, n)
+    stage_v: NDArray[np.float64]
+    stage_a: NDArray[np.float64]  # (2, stages, n)
+    stage_lam: NDArray[np.float64]  # (stages, m)
+    power: NDArray[np.float64]  # (stages,)
+    qs: NDArray[np.float64]
+    vs: NDArray[np.float64]
+    eq: NDArray[np.float64]
+    ev: NDArray[np.float64]
+    torques: NDArray[np.float64]
+    guess_t: NDArray[np.float64]  # (3,) times of the stages a guess is extrapolated from
+    guess_s: NDArray[np.int64]  # (3, 2) and where they stand in stage_a
+
+
+class Samples(NamedTuple):
+    """Dense output: times asked for and what stood there."""
+
+    times: NDArray[np.float64]
+    q: NDArray[np.float64]  # (times, n)
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    lam: NDArray[np.float64]  # (times, m)
+    energy: NDArray[np.float64]  # (times, 3): kinetic, strain, work done by motors and prescribed motion
+
+
+def make_march(n: int, m: int, stages: int, motors: int) -> March:
+    """Allocate the state of a run with n coordinates and m constraint rows."""
+    return March(
+        clock=np.zeros(10),
+        count=np.zeros(8, dtype=np.int64),
+        q=np.zeros(n),
+        v=np.zeros(n),
+        stage_t=np.zeros((2, stages)),
+        stage_q=np.zeros((stages, n)),
+        stage_v=np.zeros((stages, n)),
+        stage_a=np.zeros((2, stages, n)),
+        stage_lam=np.zeros((stages, m)),
+        power=np.zeros(stages),
+        qs=np.zeros(n),
+        vs=np.zeros(n),
+        eq=np.zeros(n),
+        ev=np.zeros(n),
+        torques=np.zeros(motors),
+        guess_t=np.zeros(3),
+        guess_s=np.zeros((3, 2), dtype=np.int64),
+    )
+
+
+@kernel
+def input_power(p, signals, t, q, v, lam, torques):
+    """Power of the motors and of prescribed motion."""
+    total = 0.0
+    for k in range(p.efforts.size):
+        effort = p.efforts[k]
+        total += effort.sign * torques[effort.signal] * marker_angle(p, p.markers[effort.marker], v)
+    for r in range(p.rows.size):
+        if p.rows[r].signal >= 0:
+            _, rate, _ = evaluate_signal(signals, p.rows[r].signal, t)
+            total -= lam[r] * rate
+    return total
+
+
+@kernel
+def interpolate(q0, v0, a0, q1, v1, a1, h, x):
+    """Cubic Hermite q and v at fraction x of an interval h, and the derivative of v as a."""
+    y = 1.0 - x
+    h00, h10, h01, h11 = (1.0 + 2.0 * x) * y * y, x * y * y, x * x * (3.0 - 2.0 * x), -x * x * y
+    d00, d10, d11 = -6.0 * x * y, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
+    q = h00 * q0 + h01 * q1 + h * (h10 * v0 + h11 * v1)
+    v = h00 * v0 + h01 * v1 + h * (h10 * a0 + h11 * a1)
+    a = d00 * (v0 - v1) / h + d10 * a0 + d11 * a1
+    return q, v, a
+
+
+@kernel
+def write_samples(p, tableau, t, h, m, out):
+    """Fill every sample time within the accepted step from t to t + h."""
+    piece = 0
+    i = m.count[SAMPLE]
+    while i < out.times.size and out.times[i] <= t + h * (1.0 + 1e-12):
+        time = out.times[i]
+        while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
+            piece += 1
+        s0, s1 = tableau.dense[piece], tableau.dense[piece + 1]
+        width = (tableau.c[s1] - tableau.c[s0]) * h
+        x = min(max((time - t - tableau.c[s0] * h) / width, 0.0), 1.0)
+        for j in range(m.q.size):
+            out.q[i, j], out.v[i, j], out.a[i, j] = interpolate(
+                m.stage_q[s0, j], m.stage_v[s0, j], m.stage_a[1, s0, j],
+                m.stage_q[s1, j], m.stage_v[s1, j], m.stage_a[1, s1, j], width, x,
+            )  # fmt: skip
+        for r in range(m.stage_lam.shape[1]):
+            out.lam[i, r] = (1.0 - x) * m.stage_lam[s0, r] + x * m.stage_lam[s1, r]
+        out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i])
+        # Work by the trapezoidal rule within the step: the sum over whole steps is the scheme's own quadrature.
+        done = (time - t) / h
+        out.energy[i, 2] = m.clock[WORK] + h * done * (
+            (1.0 - 0.5 * done) * m.power[0] + 0.5 * done * m.power[m.power.size - 1]
+        )
+        i += 1
+    m.count[SAMPLE] = i
+
+
+@kernel
+def predict(tableau, i, t, h, m):
+    """Starting guess for stage i: the accelerations of the last three stages, extrapolated."""
+    stages = tableau.c.size
+    a, times, rows = m.stage_a[1, i], m.guess_t, m.guess_s
+    found = 0
+    for j in range(i - 1, -1, -1):
+        if found < 3:
+            times[found], rows[found, 0], rows[found, 1] = m.stage_t[1, j], 1, j
+            found += 1
+    if m.count[STEPS] > 0:
+        for j in range(stages - 2, -1, -1):
+            if found < 3:
+                times[found], rows[found, 0], rows[found, 1] = m.stage_t[0, j], 0, j
+                found += 1
+    x = t + tableau.c[i] * h
+    a[:] = 0.0
+    for k in range(found):
+        weight = 1.0
+        for l in range(found):
+            if l != k:
+                weight *= (x - times[l]) / (times[k] - times[l])
+        source = m.stage_a[rows[k, 0], rows[k, 1]]
+        for j in range(a.size):
+            a[j] += weight * source[j]
+
+
+@kernel
+def start(p, signals, tableau, controls, m, ws, out):
+    """Accelerations and multipliers at the first instant, solved exactly; the first sample if it is due."""
+    t = m.clock[TIME]
+    a, lam = m.stage_a[1, 0], m.stage_lam[0]
+    a[:] = 0.0
+    lam[:] = 0.0
+    if factor_system(p, 0.0, m.q, ws) != controls.dependent_rows:
+        m.count[CAUSE] = SINGULAR
+        return SINGULAR
+    # Linear in a and lambda with this very matrix: the second pass only removes rounding.
+    for _ in range(2):
+        equations(p, signals, t, controls.alpha, controls.beta, m.q, m.v, a, lam, m.torques, ws)
+        for j in range(a.size):
+            ws.x[j] = -ws.f[j]
+        for r in range(lam.size):
+            ws.mu[r] = -ws.rows[r]
+        solve_system(p, ws, ws.x, ws.mu)
+        for j in range(a.size):
+            a[j] += ws.x[j]
+        for r in range(lam.size):
+            lam[r] += ws.mu[r]
+    m.stage_t[1, 0] = t
+    m.stage_q[0, :] = m.q
+    m.stage_v[0, :] = m.v
+    m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques)
+    kinetic, strain = system_energy(p, m.q, m.v)
+    m.clock[ENERGY_0] = kinetic + strain
+    note_constraints(p, signals, t, m, ws)
+    m.clock[FACTOR_G] = -1.0
+    if out.times.size > 0 and out.times[0] <= t:
+        out.q[0, :] = m.q
+        out.v[0, :] = m.v
+        out.a[0, :] = a
+        out.lam[0, :] = lam
+        out.energy[0, 0], out.energy[0, 1], out.energy[0, 2] = kinetic, strain, 0.0
+        m.count[SAMPLE] = 1
+    return PAUSED
+
+
+@kernel
+def note_constraints(p, signals, t, m, ws):
+    """Keep the largest constraint violation seen at accepted steps."""
+    constraint_values(p, signals, t, m.q, m.v, ws.rows, ws.mu)
+    for r in range(ws.rows.size):
+        m.clock[PHI_MAX] = max(m.clock[PHI_MAX], abs(ws.rows[r]))
+        m.clock[DPHI_MAX] = max(m.clock[DPHI_MAX], abs(ws.mu[r]))
+
+
+@kernel
+def filtered_error(p, tableau, h, controls, m, ws):
+    """Error of the step in the mass norm, filtered through the iteration matrix: (position, velocity).
+
+    With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
+    (M + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale.
+    """
+    stages = tableau.c.size
+    g = tableau.A[stages - 1, stages - 1] * h
+    scale = 1.0 + 2.0 * controls.alpha * g + controls.beta * controls.beta * g * g
+    for j in range(m.q.size):
+        m.eq[j] = 0.0
+        m.ev[j] = 0.0
+    for s in range(stages):
+        weight = h * tableau.error[s]
+        for j in range(m.q.size):
+            m.eq[j] += weight * m.stage_v[s, j]
+            m.ev[j] += weight * m.stage_a[1, s, j]
+    for j in range(m.q.size):
+        ws.x[j] = m.ev[j]
+        ws.f[j] = m.eq[j]
+    ws.mu[:] = 0.0
+    for i in range(p.bodies.size):
+        body = p.bodies[i]
+        to_body_frame(p, i, ws, ws.x)
+        to_body_frame(p, i, ws, ws.f)
+        jacobian_times(p, i, ws, ws.x, 1.0 / scale, ws.mu)
+        jacobian_times(p, i, ws, ws.f, -controls.beta * controls.beta * g / scale, ws.mu)
+        mass_times(p, i, ws, ws.x)
+        o, e = body.offset, body.offset + 3
+        c, s = ws.frame[i, 0], ws.frame[i, 1]
+        for j in range(body.nf):
+            ws.x[e + j] -= g * p.modal[OMEGA2, body.flex + j] * m.eq[e + j]
+        ws.x[o], ws.x[o + 1] = c * ws.x[o] - s * ws.x[o + 1], s * ws.x[o] + c * ws.x[o + 1]
+    solve_system(p, ws, ws.x, ws.mu)
+    for j in range(m.q.size):
+        m.eq[j] += g * ws.x[j]
+    return mass_norm(p, ws, m.eq), mass_norm(p, ws, ws.x)
+
+
+@kernel
+def attempt(p, signals, tableau, controls, t, h, m, ws):
+    """One step from t: all stages and the error estimate, relative to what is allowed.
+
+    Returns
+    -------
+    cause, error
+        cause is PAUSED where the stages were solved.
+    """
+    stages = tableau.c.size
+    g = tableau.A[stages - 1, stages - 1] * h
+    b = g * g
+    fresh = False
+    if m.clock[FACTOR_G] != g:
+        if factor_system(p, b, m.q, ws) != controls.dependent_rows:
+            m.clock[FACTOR_G] = -1.0
+            return SINGULAR, 0.0
+        m.count[FACTORS] += 1
+        m.clock[FACTOR_G], m.clock[RATE] = g, FIRST_RATE
+        fresh = True
+    tolerance = NEWTON_FRACTION * controls.rate * h
+    i = 1
+    while i < stages:
+        for j in range(m.q.size):
+            m.vs[j] = m.v[j]
+            m.qs[j] = m.q[j]
+        for s in range(i):
+            weight = h * tableau.A[i, s]
+            for j in range(m.q.size):
+                m.vs[j] += weight * m.stage_a[1, s, j]
+                m.qs[j] += weight * m.stage_v[s, j]
+        for j in range(m.q.size):
+            m.qs[j] += g * m.vs[j]
+        m.stage_t[1, i] = t + tableau.c[i] * h
+        predict(tableau, i, t, h, m)
+        m.stage_lam[i, :] = m.stage_lam[i - 1]
+        status, iterations, rate = solve_stage(
+            p, signals, m.stage_t[1, i], g, b, controls.alpha, controls.beta, m.qs, m.vs,
+            m.stage_a[1, i], m.stage_lam[i], m.torques, tolerance, controls.time_scale, m.clock[RATE], ws,
+        )  # fmt: skip
+        m.count[ITERATIONS] += iterations
+        m.clock[RATE] = rate
+        if status != CONVERGED:
+            if fresh:
+                m.clock[FACTOR_G] = -1.0
+                return NO_CONVERGENCE, 0.0
+            # An old factor may be to blame: once more with a new one before the step is cut.
+            if factor_system(p, b, m.q, ws) != controls.dependent_rows:
+                m.clock[FACTOR_G] = -1.0
+                return SINGULAR, 0.0
+            m.count[FACTORS] += 1
+            m.clock[RATE] = FIRST_RATE
+            fresh = True
+            continue
+        m.stage_q[i, :] = ws.q
+        m.stage_v[i, :] = ws.v
+        m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques)
+        i += 1
+    error_q, error_v = filtered_error(p, tableau, h, controls, m, ws)
+    error = max(error_q, controls.time_scale * error_v) / (controls.rate * h)
+    if not isfinite(error):
+        return NOT_FINITE, 0.0
+    return PAUSED, error
+
+
+@kernel
+def accept(p, signals, tableau, t, h, m, ws, out):
+    """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
+    last = tableau.c.size - 1
+    write_samples(p, tableau, t, h, m, out)
+    m.q[:] = m.stage_q[last]
+    m.v[:] = m.stage_v[last]
+    for s in range(last + 1):
+        m.clock[WORK] += h * tableau.A[last, s] * m.power[s]
+    m.stage_t[0, :] = m.stage_t[1]
+    m.stage_a[0, :, :] = m.stage_a[1]
+    m.stage_t[1, 0] = t + h
+    m.stage_q[0, :] = m.q
+    m.stage_v[0, :] = m.v
+    m.stage_a[1, 0, :] = m.stage_a[0, last]
+    m.stage_lam[0, :] = m.stage_lam[last]
+    m.power[0] = m.power[last]
+    m.count[STEPS] += 1
+    m.count[FAILURES] = 0
+    m.clock[LAST_STEP] = h
+    kinetic, strain = system_energy(p, m.q, m.v)
+    balance = abs(kinetic + strain - m.clock[ENERGY_0] - m.clock[WORK])
+    m.clock[BALANCE] = max(m.clock[BALANCE], balance)
+    note_constraints(p, signals, t + h, m, ws)
+
+
+@kernel
+def march(p, signals, tableau, controls, stops, max_steps, m, ws, out):
+    """Advance by up to max_steps attempted steps, ending steps exactly at each of the times in `stops`.
+
+    Returns
+    -------
+    int
+        PAUSED, FINISHED, or why it cannot go on.
+    """
+    exponent = 1.0 / tableau.order
+    span = stops[stops.size - 1]
+    for _ in range(max_steps):
+        t = m.clock[TIME]
+        while m.count[STOP] < stops.size and stops[m.count[STOP]] <= t:
+            m.count[STOP] += 1
+        if m.count[STOP] == stops.size:
+            return FINISHED
+        left = stops[m.count[STOP]] - t
+        h = min(m.clock[STEP], controls.max_step)
+        landing = False
+        if left <= h * (1.0 + 1e-9):
+            h, landing = left, True
+        elif left < 2.0 * h:
+            h = 0.5 * left
+        cause, error = attempt(p, signals, tableau, controls, t, h, m, ws)
+        if cause == PAUSED and error <= 1.0:
+            accept(p, signals, tableau, t, h, m, ws, out)
+            m.clock[TIME] = stops[m.count[STOP]] if landing else t + h
+            factor = min(MAX_FACTOR, SAFETY * (1.0 / max(error, 1e-12)) ** exponent)
+            # Keep the step, and with it the factor, unless the change is worth it; a step cut short to land on a stop
+            # says nothing about longer ones.
+            if factor < KEEP_ABOVE or (factor > KEEP_BELOW and h >= m.clock[STEP]):
+                m.clock[STEP] = factor * h
+            if m.clock[RATE] > STALE_RATE:
+                m.clock[FACTOR_G] = -1.0
+            continue
+        m.count[REJECTED] += 1
+        m.count[FAILURES] += 1
+        if cause == PAUSED:
+            cause = ERROR_TEST
+            m.clock[STEP] = h * max(MIN_FACTOR, SAFETY * (1.0 / error) ** exponent)
+        else:
+            m.clock[STEP] = h * MIN_FACTOR
+        if m.clock[STEP] < MIN_STEP * span:
+            m.count[CAUSE] = cause
+            return cause
+    return PAUSED

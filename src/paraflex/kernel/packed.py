@@ -1,0 +1,132 @@
+"""Layout of what the kernels read (`PackedSystem`, `Signals`) and write (`Workspace`).
+
+One record a body, port, marker, effort and constraint row; flat arrays for what has a length of its own. A *marker*
+is a material point of a body with its shape rows; a *port* is one side of a joint on a moving body; an *effort* is
+one side of a motor.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Rows of PackedSystem.modal.
+S2X, S2Y, I1, GJ, OMEGA2 = range(5)
+# Rows of PackedSystem.shape.
+NX, NY, SLOPE = range(3)
+# Kinds of port.
+POINT, ANGLE = range(2)
+# Rows of Workspace.flex: M_phif, 1/(1 + b omega^2), and B D^-1 of the three rigid rows.
+MPF, DINV, YX, YY, YP = range(5)
+
+BODY = np.dtype(
+    [
+        ("offset", np.int64),  # first coordinate of the body in q
+        ("nf", np.int64),
+        ("flex", np.int64),  # first column of the body in `modal` and `Workspace.flex`
+        ("square", np.int64),  # first entry of its nf x nf matrices
+        ("port", np.int64),  # its ports: port .. port_end
+        ("port_end", np.int64),
+        ("effort", np.int64),  # its efforts: effort .. effort_end
+        ("effort_end", np.int64),
+        ("m", np.float64),
+        ("S1x", np.float64),
+        ("S1y", np.float64),
+        ("I0", np.float64),  # with the lumped moments of inertia, I0 + J
+    ],
+    align=True,
+)
+MARKER = np.dtype(
+    [
+        ("body", np.int64),
+        ("shape", np.int64),  # first column of its rows in `shape`
+        ("x", np.float64),
+        ("y", np.float64),
+    ],
+    align=True,
+)
+PORT = np.dtype(
+    [
+        ("marker", np.int64),
+        ("kind", np.int64),
+        ("row", np.int64),  # first constraint row
+        ("rows", np.int64),  # 2 for a point, 1 for an angle
+        ("jac", np.int64),  # first entry of its rows in Workspace.jac
+        ("sign", np.float64),  # +1 on side b of the joint, -1 on side a
+    ],
+    align=True,
+)
+EFFORT = np.dtype([("marker", np.int64), ("signal", np.int64), ("sign", np.float64)], align=True)
+ROW = np.dtype(
+    [
+        ("signal", np.int64),  # prescribed value in time, -1 for none
+        ("ground", np.float64),  # what points on the ground contribute to Phi
+        ("first", np.int64),  # first column of the row in the envelope of the Schur complement
+        ("start", np.int64),  # and where that column is stored
+    ],
+    align=True,
+)
+
+
+class PackedSystem(NamedTuple):
+    """Constants of a system."""
+
+    bodies: NDArray[np.void]
+    markers: NDArray[np.void]
+    ports: NDArray[np.void]
+    efforts: NDArray[np.void]
+    rows: NDArray[np.void]
+    modal: NDArray[np.float64]  # (5, total nf): S2x, S2y, I1, G1 + Jf, omega^2
+    I2: NDArray[np.float64]  # nf x nf of every body, row by row
+    G2: NDArray[np.float64]
+    shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every marker
+    total_mass: float
+
+
+class Signals(NamedTuple):
+    """Functions of time as piecewise quintics: motor torques first, then prescribed values."""
+
+    start: NDArray[np.int64]  # first break of each signal; one more at the end
+    breaks: NDArray[np.float64]
+    coefficients: NDArray[np.float64]  # (breaks, 6), ascending powers of t - break; the last piece of a signal unused
+
+
+class Workspace(NamedTuple):
+    """Everything the kernels write, made once a run."""
+
+    f: NDArray[np.float64]  # (n,) residual of the equations of motion
+    x: NDArray[np.float64]  # (n,) solution of a linear system
+    rows: NDArray[np.float64]  # (m,) constraint residual
+    mu: NDArray[np.float64]  # (m,) solution for the multipliers
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    frame: NDArray[np.float64]  # (bodies, 12): cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
+    flex: NDArray[np.float64]  # (5, total nf)
+    jac: NDArray[np.float64]  # Jacobian rows of every port in its body frame's columns
+    inv: NDArray[np.float64]  # the same rows times the inverse of the body's iteration matrix
+    schur: NDArray[np.float64]  # envelope of the Schur complement, then its Cholesky factor
+    nf: NDArray[np.float64]  # (2, max nf) scratch
+
+
+def make_workspace(p: PackedSystem) -> Workspace:
+    """Allocate the workspace of a system."""
+    n = int(sum(3 + body["nf"] for body in p.bodies))
+    m = p.rows.size
+    widths = [(3 + p.bodies[p.markers[port["marker"]]["body"]]["nf"]) * port["rows"] for port in p.ports]
+    envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(p.rows)))
+    return Workspace(
+        f=np.zeros(n),
+        x=np.zeros(n),
+        rows=np.zeros(m),
+        mu=np.zeros(m),
+        q=np.zeros(n),
+        v=np.zeros(n),
+        frame=np.zeros((p.bodies.size, 12)),
+        flex=np.zeros((5, p.modal.shape[1])),
+        jac=np.zeros(int(sum(widths))),
+        inv=np.zeros(int(sum(widths))),
+        schur=np.zeros(envelope),
+        nf=np.zeros((2, max(1, int(p.bodies["nf"].max(initial=0))))),
+    )

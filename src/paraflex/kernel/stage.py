@@ -1,0 +1,90 @@
+"""The implicit stage solver: index-1 equations with Baumgarte terms, solved for accelerations and multipliers.
+
+With q = q* + b a and v = v* + g a the unknowns of a stage are a and lambda,
+
+    M a + h + K q + Phi_q^T lambda - F = 0
+    Phi'' + 2 alpha Phi' + beta^2 Phi = 0
+
+(Eqs. 56-57). DIRK schemes have g = d h and b = g^2; other schemes have other numbers, one solver serves all. The
+iteration matrix is [M + b K, Phi_q^T; Phi_q, 0]: gyroscopic terms are dropped, and the constraint row is divided by
+1 + 2 alpha g + beta^2 b, which makes it symmetric.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from paraflex.kernel.bodies import body_equations
+from paraflex.kernel.compiling import kernel
+from paraflex.kernel.joints import body_efforts, body_joints, start_rows
+from paraflex.kernel.linear import mass_norm, solve_system
+from paraflex.kernel.signals import evaluate_signal
+
+MAX_ITERATIONS = 8
+CONVERGED, DIVERGED = 0, 1
+# Contraction assumed before any is measured, and the slowest one that is worth going on with.
+FIRST_RATE, WORST_RATE = 0.1, 0.5
+
+
+@kernel
+def equations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
+    """Residuals of the equations of motion (ws.f) and of the constraints (ws.rows) at one instant."""
+    weight_v, weight_q = 2.0 * alpha, beta * beta
+    for k in range(torques.size):
+        torques[k] = evaluate_signal(signals, k, t)[0]
+    start_rows(p, signals, t, weight_v, weight_q, ws.rows)
+    for i in range(p.bodies.size):
+        body_equations(p, i, q, v, a, ws.f)
+        body_joints(p, i, q, v, a, lam, weight_v, weight_q, ws.f, ws.rows)
+        body_efforts(p, i, torques, ws.f)
+
+
+@kernel
+def solve_stage(p, signals, t, g, b, alpha, beta, qs, vs, a, lam, torques, tolerance, time_scale, rate, ws):
+    """Newton iteration for one stage; a and lam are starting guesses and then the solution.
+
+    Parameters
+    ----------
+    qs, vs : (n,) arrays
+        The explicit parts q*, v*.
+    tolerance : float
+        Largest error left in q, in the mass norm; in v it is tolerance / time_scale.
+    rate : float
+        Contraction measured in earlier stages with this factor.
+
+    Returns
+    -------
+    status, iterations, rate
+        ws.q and ws.v hold the stage's q and v.
+    """
+    scale = 1.0 / (1.0 + 2.0 * alpha * g + beta * beta * b)
+    previous = 0.0
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        for j in range(a.size):
+            ws.q[j] = qs[j] + b * a[j]
+            ws.v[j] = vs[j] + g * a[j]
+        equations(p, signals, t, alpha, beta, ws.q, ws.v, a, lam, torques, ws)
+        for j in range(a.size):
+            ws.x[j] = -ws.f[j]
+        for r in range(lam.size):
+            ws.mu[r] = -ws.rows[r] * scale
+        solve_system(p, ws, ws.x, ws.mu)
+        for j in range(a.size):
+            a[j] += ws.x[j]
+        for r in range(lam.size):
+            lam[r] += ws.mu[r]
+        change = mass_norm(p, ws, ws.x) * max(b, g * time_scale)
+        if not isfinite(change):
+            return DIVERGED, iteration, rate
+        if iteration > 1:
+            # Two corrections at rounding level say nothing about the contraction.
+            rate = max(0.3 * rate, change / previous)
+            if rate > WORST_RATE and change > tolerance:
+                return DIVERGED, iteration, rate
+        if change * rate <= tolerance * (1.0 - min(rate, WORST_RATE)):
+            for j in range(a.size):
+                ws.q[j] = qs[j] + b * a[j]
+                ws.v[j] = vs[j] + g * a[j]
+            return CONVERGED, iteration, rate
+        previous = change
+    return DIVERGED, MAX_ITERATIONS, rate

@@ -1,0 +1,17 @@
+"""Paths of the end-effector, and the joint motion that follows them."""
+
+from paraflex.kinematics.closure import RigidMotion, follow_path
+from paraflex.kinematics.laws import TrapezoidalLaw
+from paraflex.kinematics.paths import Circle, Line, Path, PathMotion, PointPath, Polygon
+
+__all__ = [
+    "Circle",
+    "Line",
+    "Path",
+    "PathMotion",
+    "PointPath",
+    "Polygon",
+    "RigidMotion",
+    "TrapezoidalLaw",
+    "follow_path",
+]

@@ -1,0 +1,216 @@
+"""The joint motion that makes the end-effector follow a path: Newton on the constraints, from a named assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import (
+    System,
+    build_system,
+    constant_signals,
+    pack_signals,
+    project_position,
+    reference_pose,
+)
+from paraflex.errors import InputError, Moment, UnreachablePathError
+from paraflex.kernel.closure import CLOSED, JUMPED, close_path, task_values
+from paraflex.kernel.packed import MARKER, PackedSystem, Signals
+from paraflex.kinematics.paths import Path, PathMotion
+from paraflex.mechanism import Assembly, Mechanism
+from paraflex.mechanism.mechanism import TASK_COORDINATES
+
+# Closure walks along the path in steps no longer than this [s], whatever times are asked for.
+_LONGEST_STEP = 1e-3
+# Steps from the assembly's pose to the start of the path; more where these fail.
+_APPROACHES = (25, 250, 2500)
+
+
+@dataclass(frozen=True)
+class RigidMotion:
+    """The motion of the rigid mechanism along a path.
+
+    Attributes
+    ----------
+    system : System
+        Rigid (RDM): three coordinates a body.
+    path : Path
+    t : (k,) array
+        [s]
+    q, v, a : (k, n) arrays
+        Coordinates, velocities and accelerations.
+    basis : (k, n, tasks) array
+        Velocities of all coordinates per unit of each task velocity: spans the null space of Phi_q.
+    """
+
+    system: System
+    path: Path
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    basis: NDArray[np.float64]
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The rigid mechanism."""
+        return self.system.mechanism
+
+    @property
+    def desired(self) -> PathMotion:
+        """Of the end-effector at the times t."""
+        return self.path.evaluate(self.t)
+
+
+def follow_path(
+    mechanism: Mechanism,
+    path: Path,
+    times: Sequence[float] | NDArray[np.float64],
+    *,
+    assembly: str | Assembly | None = None,
+    orientation: float = 0.0,
+) -> RigidMotion:
+    """Positions, velocities and accelerations of all bodies along a path of the end-effector.
+
+    Works for any mechanism with as many task coordinates as degrees of freedom. Bodies are taken as rigid.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    path : Path
+    times : (k,) array
+        Ascending [s].
+    assembly : str or Assembly, optional
+        Which way the mechanism is put together; the first of the mechanism by default.
+    orientation : float
+        Angle of the end-effector where it is a task coordinate [rad].
+
+    Returns
+    -------
+    RigidMotion
+
+    Raises
+    ------
+    InputError
+        No end-effector, or a number of task coordinates other than the degrees of freedom.
+    AssemblyError
+        The assembly does not close.
+    UnreachablePathError
+        The path leaves the workspace or passes a Type I singularity: it names time and position.
+    """
+    system = build_system(mechanism.rigid())
+    if mechanism.end_effector is None:
+        raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
+    closure = _Closure(system, orientation, float(np.max(times, initial=0.0)))
+    closure.check_degrees_of_freedom()
+    chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
+    times = np.ascontiguousarray(times, dtype=float)
+    pose = closure.approach(path, closure.assemble(chosen), times[0])
+    grid = np.unique(np.concatenate([times, np.arange(times[0], times[-1], _LONGEST_STEP)]))
+    # Union of two grids: points a rounding error apart would divide by nothing when torques are interpolated.
+    keep = np.isin(grid, times)
+    return closure.walk(path, pose, grid, keep)
+
+
+class _Closure:
+    """The rigid system with its task marker, for the functions above."""
+
+    def __init__(self, system: System, orientation: float, end: float) -> None:
+        effector = system.mechanism.end_effector
+        assert effector is not None
+        self.system = system
+        self.orientation = orientation
+        self.signals: Signals = pack_signals(
+            system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), end + 1.0), end + 1.0
+        )[0]
+        self.coordinates = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
+        self.packed, self.marker = _with_marker(system, effector.point)
+
+    def check_degrees_of_freedom(self) -> None:
+        free, tasks = self.system.n - self.system.m, self.coordinates.size
+        if free != tasks:
+            raise InputError(
+                f"the mechanism has {free} degrees of freedom, its task {tasks} coordinate(s)",
+                field="end_effector.coordinates",
+                value=[TASK_COORDINATES[i] for i in self.coordinates],
+                remedy="name as many task coordinates as there are degrees of freedom",
+            )
+
+    def assemble(self, assembly: Assembly) -> NDArray[np.float64]:
+        return project_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
+
+    def task(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        zero = np.zeros_like(q)
+        return task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero)[0]
+
+    def target(self, motion: PathMotion) -> NDArray[np.float64]:
+        """(3, times, tasks): the task coordinates chosen from x, y, angle."""
+        constant = np.full(len(motion.position), self.orientation)
+        still = np.zeros_like(constant)
+        full = np.stack(
+            [
+                np.column_stack([motion.position, constant]),
+                np.column_stack([motion.velocity, still]),
+                np.column_stack([motion.acceleration, still]),
+            ]
+        )
+        return np.ascontiguousarray(full[:, :, self.coordinates])
+
+    def run(self, times: NDArray[np.float64], target: NDArray[np.float64], pose: NDArray[np.float64]):
+        """Closure along targets; status, index, residual, and what was computed."""
+        k, n = times.size, self.system.n
+        q, v, a = np.zeros((3, k, n))
+        basis = np.zeros((k, n, self.coordinates.size))
+        q[0] = pose
+        try:
+            status, index, residual = close_path(
+                self.packed, self.signals, self.marker, self.coordinates, times, target, q, v, a, basis
+            )
+        except np.linalg.LinAlgError:
+            # Exactly singular: rows not yet written are zero, the first of them is where it stopped.
+            index = int(np.flatnonzero(~np.any(v != 0.0, axis=1) & ~np.any(basis != 0.0, axis=(1, 2)))[0])
+            status, residual = JUMPED, 0.0
+        return status, int(index), residual, (q, v, a, basis)
+
+    def approach(self, path: Path, pose: NDArray[np.float64], start: float) -> NDArray[np.float64]:
+        """Move the end-effector from where the assembly has it to the start of the path, staying in that assembly."""
+        goal = self.target(path.evaluate(np.array([start])))[0, 0]
+        here = self.task(pose)
+        for steps in _APPROACHES:
+            fractions = np.linspace(0.0, 1.0, steps + 1)
+            target = np.zeros((3, steps + 1, goal.size))
+            target[0] = here + fractions[:, None] * (goal - here)
+            status, _, residual, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
+            if status == CLOSED:
+                return q[-1]
+        raise UnreachablePathError(
+            f"the path's start is out of reach from the assembly's pose (a gap of {residual:.3g} remains)",
+            Moment(start, 0, tuple(goal)),
+        )
+
+    def walk(self, path: Path, pose: NDArray[np.float64], grid: NDArray[np.float64], keep: NDArray[np.bool_]):
+        target = self.target(path.evaluate(grid))
+        status, index, residual, (q, v, a, basis) = self.run(grid, target, pose)
+        done = keep[:index]
+        motion = RigidMotion(
+            self.system, path, grid[:index][done], q[:index][done], v[:index][done], a[:index][done], basis[:index][done]
+        )
+        if status == CLOSED:
+            return motion
+        what = "the path passes a Type I singularity" if status == JUMPED else "the path is out of reach"
+        gap = "" if status == JUMPED else f" (a gap of {residual:.3g} remains)"
+        raise UnreachablePathError(f"{what}{gap}", Moment(grid[index], index, tuple(target[0, index])), partial=motion)
+
+
+def _with_marker(system: System, ref) -> tuple[PackedSystem, int]:
+    """The packed system with one more marker, for a point that is not at a joint; rigid, so no shape rows."""
+    marker = system.marker(ref)
+    record = np.zeros(1, dtype=MARKER)
+    record["body"], record["x"], record["y"] = marker.body, *marker.x0
+    markers = np.concatenate([system.packed.markers, record])
+    return system.packed._replace(markers=markers), markers.size - 1
+
+

@@ -1,0 +1,263 @@
+"""Paths of the end-effector in the plane, with their time laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+import scipy.interpolate
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.kinematics.laws import TrapezoidalLaw
+
+
+class PathMotion(NamedTuple):
+    """Position [m], velocity [m/s] and acceleration [m/s^2] in the ground frame, each (k, 2)."""
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+
+
+@runtime_checkable
+class Path(Protocol):
+    """A motion of a point in the plane: from rest to rest, then dwell."""
+
+    @property
+    def duration(self) -> float:
+        """Of the motion before the dwell [s]."""
+        ...
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times between which the motion is smooth [s]."""
+        ...
+
+    def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
+        """The motion at times t [s]; values, velocities and accelerations are exact derivatives of one another."""
+        ...
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """Straight segments from corner to corner, each from rest to rest under the modified trapezoidal law.
+
+    Attributes
+    ----------
+    corners : sequence of (x, y)
+        [m]
+    max_acceleration : float
+        [m/s^2]
+    closed : bool
+        Whether the last corner leads back to the first.
+    """
+
+    corners: tuple[tuple[float, float], ...]
+    max_acceleration: float
+    closed: bool = True
+
+    def __post_init__(self) -> None:
+        corners = _points(self.corners, "corners", 2)
+        object.__setattr__(self, "corners", tuple(map(tuple, corners.tolist())))
+        _acceleration(self.max_acceleration)
+        for length in self._lengths:
+            if not length > 0.0:
+                raise InputError(
+                    "two neighbouring corners coincide", field="corners", value=self.corners, remedy="drop one of them"
+                )
+
+    @cached_property
+    def _vertices(self) -> NDArray[np.float64]:
+        corners = np.array(self.corners)
+        return np.vstack([corners, corners[:1]]) if self.closed else corners
+
+    @cached_property
+    def _lengths(self) -> NDArray[np.float64]:
+        return np.linalg.norm(np.diff(self._vertices, axis=0), axis=1)
+
+    @cached_property
+    def _laws(self) -> list[TrapezoidalLaw]:
+        return [TrapezoidalLaw(float(length), self.max_acceleration) for length in self._lengths]
+
+    @cached_property
+    def _starts(self) -> NDArray[np.float64]:
+        return np.cumsum([0.0] + [law.duration for law in self._laws])
+
+    @property
+    def duration(self) -> float:
+        """Of the motion [s]."""
+        return float(self._starts[-1])
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Ends of the phases of every segment [s]."""
+        times = [start + knot for start, law in zip(self._starts, self._laws, strict=False) for knot in law.knots[:-1]]
+        return (*times, self.duration)
+
+    def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
+        """The motion at times t."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        position = np.tile(self._vertices[0], (t.size, 1))
+        velocity, acceleration = np.zeros((t.size, 2)), np.zeros((t.size, 2))
+        directions = np.diff(self._vertices, axis=0) / self._lengths[:, None]
+        for start, law, direction in zip(self._starts, self._laws, directions, strict=False):
+            s, speed, rate = law.evaluate(t - start)
+            position += s[:, None] * direction
+            velocity += speed[:, None] * direction
+            acceleration += rate[:, None] * direction
+        return PathMotion(position, velocity, acceleration)
+
+
+def Line(start: Sequence[float], end: Sequence[float], max_acceleration: float) -> Polygon:  # noqa: N802
+    """A straight line from rest to rest: a polygon of one segment.
+
+    Parameters
+    ----------
+    start, end : (x, y)
+        [m]
+    max_acceleration : float
+        [m/s^2]
+    """
+    return Polygon((_pair(start, "start"), _pair(end, "end")), max_acceleration, closed=False)
+
+
+@dataclass(frozen=True)
+class Circle:
+    """An arc under the modified trapezoidal law along its length.
+
+    Attributes
+    ----------
+    centre : (x, y)
+        [m]
+    radius : float
+        [m]
+    max_acceleration : float
+        Along the path [m/s^2]; the centripetal one comes on top.
+    start_angle : float
+        Of the first point, seen from the centre [rad].
+    sweep : float
+        Angle swept, positive counter-clockwise; a full turn by default [rad].
+    """
+
+    centre: tuple[float, float]
+    radius: float
+    max_acceleration: float
+    start_angle: float = 0.0
+    sweep: float = 2.0 * pi
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", _pair(self.centre, "centre"))
+        if not (np.isfinite(self.radius) and self.radius > 0.0):
+            raise InputError("must be positive", field="radius", value=self.radius, remedy="give it in metres")
+        if not np.isfinite(self.start_angle):
+            raise InputError("not a finite number", field="start_angle", value=self.start_angle, remedy="give it in rad")
+        if not (np.isfinite(self.sweep) and self.sweep != 0.0):
+            raise InputError("no angle to sweep", field="sweep", value=self.sweep, remedy="give it in rad, not zero")
+        _acceleration(self.max_acceleration)
+
+    @cached_property
+    def _law(self) -> TrapezoidalLaw:
+        return TrapezoidalLaw(self.radius * abs(self.sweep), self.max_acceleration)
+
+    @property
+    def duration(self) -> float:
+        """Of the motion [s]."""
+        return self._law.duration
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Ends of the phases of the law [s]."""
+        return self._law.knots
+
+    def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
+        """The motion at times t."""
+        s, speed, rate = self._law.evaluate(np.atleast_1d(np.asarray(t, dtype=float)))
+        sense = np.sign(self.sweep) / self.radius
+        angle, turn, dturn = self.start_angle + sense * s, sense * speed, sense * rate
+        radial = np.column_stack([np.cos(angle), np.sin(angle)])
+        tangent = np.column_stack([-radial[:, 1], radial[:, 0]])
+        return PathMotion(
+            np.array(self.centre) + self.radius * radial,
+            self.radius * turn[:, None] * tangent,
+            self.radius * (dturn[:, None] * tangent - (turn**2)[:, None] * radial),
+        )
+
+
+@dataclass(frozen=True)
+class PointPath:
+    """A smooth motion through points: a quintic spline in time, from rest to rest without acceleration.
+
+    Attributes
+    ----------
+    points : sequence of (x, y)
+        At least two [m].
+    motion_time : float
+        From the first point to the last [s]; points are passed at times in proportion to the chords between them.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    motion_time: float
+
+    def __post_init__(self) -> None:
+        points = _points(self.points, "points", 2)
+        object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
+        if not (np.isfinite(self.motion_time) and self.motion_time > 0.0):
+            raise InputError(
+                "must be positive", field="motion_time", value=self.motion_time, remedy="give it in seconds"
+            )
+        if np.any(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0.0):
+            raise InputError("two neighbouring points coincide", field="points", remedy="drop one of them")
+
+    @cached_property
+    def _spline(self) -> scipy.interpolate.BSpline:
+        points = np.array(self.points)
+        chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        times = self.motion_time * np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
+        rest = [(1, np.zeros(2)), (2, np.zeros(2))]
+        return scipy.interpolate.make_interp_spline(times, points, k=5, bc_type=(rest, rest))
+
+    @property
+    def duration(self) -> float:
+        """Of the motion [s]."""
+        return self.motion_time
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """The spline is smooth between its ends [s]."""
+        return (0.0, self.motion_time)
+
+    def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
+        """The motion at times t."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        inside = ((t >= 0.0) & (t <= self.motion_time))[:, None]
+        x = np.clip(t, 0.0, self.motion_time)
+        return PathMotion(
+            self._spline(x), np.where(inside, self._spline(x, 1), 0.0), np.where(inside, self._spline(x, 2), 0.0)
+        )
+
+
+def _pair(value: Sequence[float], field: str) -> tuple[float, float]:
+    x, y = _points([value], field, 1)[0]
+    return float(x), float(y)
+
+
+def _points(values: Sequence[Sequence[float]], field: str, at_least: int) -> NDArray[np.float64]:
+    try:
+        points = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        points = np.zeros((0, 0))
+    if points.ndim != 2 or points.shape[1] != 2 or points.shape[0] < at_least or not np.all(np.isfinite(points)):
+        raise InputError(
+            "not a list of points", field=field, value=values, remedy=f"give at least {at_least} of [x, y] in metres"
+        )
+    return points
+
+
+def _acceleration(value: float) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise InputError("must be positive", field="max_acceleration", value=value, remedy="give it in m/s^2")

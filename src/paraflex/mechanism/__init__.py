@@ -1,0 +1,40 @@
+"""What the user means: frozen descriptions of bodies, joints, motors and the mechanism they form."""
+
+from paraflex.mechanism.bodies import Body, FlexibleBeam, LumpedMass, Material, RigidBody, Section
+from paraflex.mechanism.checks import check_mechanism
+from paraflex.mechanism.joints import GROUND, AngleLaw, Motor, PointRef, PrescribedAngle, RevoluteJoint, SampledAngle
+from paraflex.mechanism.mechanism import (
+    ActuationMode,
+    Assembly,
+    EndEffector,
+    Mechanism,
+    mode_of_motors,
+    mode_of_signs,
+    parse_mode,
+)
+from paraflex.mechanism.raparm import raparm_i
+
+__all__ = [
+    "GROUND",
+    "ActuationMode",
+    "AngleLaw",
+    "Assembly",
+    "Body",
+    "EndEffector",
+    "FlexibleBeam",
+    "LumpedMass",
+    "Material",
+    "Mechanism",
+    "Motor",
+    "PointRef",
+    "PrescribedAngle",
+    "RevoluteJoint",
+    "RigidBody",
+    "SampledAngle",
+    "Section",
+    "check_mechanism",
+    "mode_of_motors",
+    "mode_of_signs",
+    "parse_mode",
+    "raparm_i",
+]

@@ -1,0 +1,110 @@
+"""Bodies: rigid ones and flexible beams. Points are named and lie in the body frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from paraflex.fem import ReferenceCondition
+
+
+@dataclass(frozen=True)
+class Section:
+    """Cross-section of a beam.
+
+    Attributes
+    ----------
+    area : float
+        [m^2]
+    second_moment : float
+        Of area, about the axis normal to the plane of motion [m^4].
+    """
+
+    area: float
+    second_moment: float
+
+    @classmethod
+    def rectangle(cls, width: float, thickness: float) -> Section:
+        """A rectangle: width out of the plane of motion, thickness in it [m]."""
+        return cls(area=width * thickness, second_moment=width * thickness**3 / 12.0)
+
+
+@dataclass(frozen=True)
+class Material:
+    """Linear elastic material: Young's modulus [Pa] and density [kg/m^3]."""
+
+    youngs_modulus: float
+    density: float
+
+
+@dataclass(frozen=True)
+class LumpedMass:
+    """A mass [kg] and moment of inertia [kg m^2] sitting on a named point of a beam."""
+
+    point: str
+    mass: float
+    inertia: float = 0.0
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """A rigid body.
+
+    Attributes
+    ----------
+    name : str
+    mass : float
+        [kg]
+    inertia : float
+        About the centre of mass [kg m^2].
+    centre_of_mass : (x, y)
+        In the body frame [m].
+    points : mapping
+        Named points in the body frame [m].
+    """
+
+    name: str
+    mass: float
+    inertia: float
+    centre_of_mass: tuple[float, float] = (0.0, 0.0)
+    points: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class FlexibleBeam:
+    """A straight flexible beam along the x axis of its body frame, which starts at its first end.
+
+    Attributes
+    ----------
+    name : str
+    length : float
+        [m]
+    section : Section
+    material : Material
+    points : mapping
+        Distance of each named point from the first end [m]; every one becomes a node.
+    elements : int or tuple of int
+        Elements per span between neighbouring points and ends.
+    lumps : tuple of LumpedMass
+    reference : ReferenceCondition
+        How the floating frame is fixed to the beam; the paper's is the cantilever.
+    flexible : bool
+        False holds all flexible coordinates at zero: the same inertia, rigid.
+    """
+
+    name: str
+    length: float
+    section: Section
+    material: Material
+    points: Mapping[str, float] = field(default_factory=dict)
+    elements: int | tuple[int, ...] = 1
+    lumps: tuple[LumpedMass, ...] = ()
+    reference: ReferenceCondition = ReferenceCondition.CANTILEVER
+    flexible: bool = True
+
+    def as_rigid(self) -> FlexibleBeam:
+        """The same beam with its flexibility switched off."""
+        return replace(self, flexible=False)
+
+
+Body = RigidBody | FlexibleBeam

@@ -1,0 +1,210 @@
+"""Structural checks of a mechanism, each by name. A mechanism that passes can be turned into a system."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from paraflex.errors import InputError
+from paraflex.fem import mesh_beam
+from paraflex.mechanism.bodies import Body, RigidBody
+from paraflex.mechanism.joints import GROUND, PointRef
+
+if TYPE_CHECKING:
+    from paraflex.mechanism.mechanism import Mechanism
+
+
+def check_mechanism(mechanism: Mechanism) -> None:
+    """Run every check below.
+
+    Raises
+    ------
+    InputError
+        The first thing found wrong.
+    """
+    check_names(mechanism)
+    for body in mechanism.bodies:
+        check_body(body)
+    check_ground(mechanism)
+    check_references(mechanism)
+    check_connected(mechanism)
+    check_task(mechanism)
+
+
+def check_names(mechanism: Mechanism) -> None:
+    """Every body, joint, motor, assembly and mode has a name of its own, and "ground" is taken."""
+    groups = {
+        "body": mechanism.bodies,
+        "joint": mechanism.joints,
+        "motor": mechanism.motors,
+        "prescribed": mechanism.prescribed,
+        "assembly": mechanism.assemblies,
+        "mode": mechanism.modes,
+    }
+    for kind, members in groups.items():
+        counts = Counter(member.name for member in members)
+        for name, count in counts.items():
+            if count > 1:
+                raise InputError("duplicate name", field=kind, value=name, remedy="rename one of them")
+            if not name or "." in name or name == GROUND:
+                raise InputError(
+                    "not usable as a name", field=kind, value=name, remedy=f'avoid dots, blanks and "{GROUND}"'
+                )
+    if not mechanism.bodies:
+        raise InputError("a mechanism needs at least one body", field="body", remedy="add a beam or a rigid body")
+
+
+def check_body(body: Body) -> None:
+    """Masses, lengths and stiffnesses are numbers that make sense; lumps sit on points that exist."""
+    field = f"body.{body.name}"
+    if isinstance(body, RigidBody):
+        _positive(body.mass, f"{field}.mass", "kg")
+        _positive(body.inertia, f"{field}.inertia", "kg m^2")
+        _finite(body.centre_of_mass, f"{field}.centre_of_mass")
+        for name, position in body.points.items():
+            _finite(position, f"{field}.points.{name}")
+        return
+    _positive(body.length, f"{field}.length", "m")
+    _positive(body.section.area, f"{field}.section.area", "m^2")
+    _positive(body.section.second_moment, f"{field}.section.second_moment", "m^4")
+    _positive(body.material.youngs_modulus, f"{field}.material.youngs_modulus", "Pa")
+    _positive(body.material.density, f"{field}.material.density", "kg/m^3")
+    _finite(body.points.values(), f"{field}.points")
+    try:
+        mesh_beam(body.length, body.points, body.elements)
+    except InputError as error:
+        raise InputError(
+            error.problem, field=f"{field}.{error.field}", value=error.value, remedy=error.remedy
+        ) from error
+    for lump in body.lumps:
+        if lump.point not in body.points:
+            raise InputError(
+                "a lump on an unknown point",
+                field=f"{field}.lumps",
+                value=lump.point,
+                remedy=_choices(lump.point, body.points),
+            )
+        _not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
+        _not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
+
+
+def check_ground(mechanism: Mechanism) -> None:
+    """Ground points are finite."""
+    for name, position in mechanism.ground.items():
+        _finite(position, f"ground.{name}")
+
+
+def check_references(mechanism: Mechanism) -> None:
+    """Joints, motors, end-effector, assemblies and modes name things that exist."""
+    joints = [joint.name for joint in mechanism.joints]
+    motors = [motor.name for motor in mechanism.motors]
+    bodies = [body.name for body in mechanism.bodies]
+    for joint in mechanism.joints:
+        _known_point(mechanism, joint.a, f"joint.{joint.name}")
+        _known_point(mechanism, joint.b, f"joint.{joint.name}")
+        if joint.a.body == joint.b.body:
+            raise InputError(
+                "a joint needs two different bodies",
+                field=f"joint.{joint.name}",
+                value=f"{joint.a}, {joint.b}",
+                remedy="one side must lie on another body or on the ground",
+            )
+    for motor in mechanism.motors:
+        _known(motor.joint, joints, f"motor.{motor.name}.joint", "joint")
+    for prescribed in mechanism.prescribed:
+        _known(prescribed.joint, joints, f"prescribed.{prescribed.name}.joint", "joint")
+    for mode in mechanism.modes:
+        for name in mode.motors:
+            _known(name, motors, f"mode.{mode.name}", "motor")
+    for assembly in mechanism.assemblies:
+        for name, angle in assembly.angles.items():
+            _known(name, bodies, f"assembly.{assembly.name}", "body")
+            _finite([angle], f"assembly.{assembly.name}.{name}")
+        for name in bodies:
+            if name not in assembly.angles:
+                raise InputError(
+                    "no angle for a body",
+                    field=f"assembly.{assembly.name}",
+                    value=name,
+                    remedy="give its approximate angle in rad",
+                )
+
+
+def check_connected(mechanism: Mechanism) -> None:
+    """Where there is a ground joint, joints lead from the ground to every body. Free-floating: all hang together."""
+    neighbours: dict[str, set[str]] = {body.name: set() for body in mechanism.bodies} | {GROUND: set()}
+    for joint in mechanism.joints:
+        neighbours[joint.a.body].add(joint.b.body)
+        neighbours[joint.b.body].add(joint.a.body)
+    start = GROUND if neighbours[GROUND] else mechanism.bodies[0].name
+    reached, stack = {start}, [start]
+    while stack:
+        for other in neighbours[stack.pop()] - reached:
+            reached.add(other)
+            stack.append(other)
+    lost = [body.name for body in mechanism.bodies if body.name not in reached]
+    if lost:
+        raise InputError(
+            "the mechanism is not connected",
+            field="joint",
+            value=", ".join(lost),
+            remedy=f"join it to {start} or to a body that is",
+        )
+
+
+def check_task(mechanism: Mechanism) -> None:
+    """The end-effector is a point of a body and its task coordinates are x, y or angle, each once."""
+    if mechanism.end_effector is None:
+        return
+    point, coordinates = mechanism.end_effector.point, mechanism.end_effector.coordinates
+    _known_point(mechanism, point, "end_effector.point")
+    if point.on_ground:
+        raise InputError(
+            "the end-effector does not move", field="end_effector.point", value=str(point), remedy="name a body's point"
+        )
+    if not coordinates or len(set(coordinates)) != len(coordinates) or set(coordinates) - {"x", "y", "angle"}:
+        raise InputError(
+            "not a set of task coordinates",
+            field="end_effector.coordinates",
+            value=list(coordinates),
+            remedy='choose from "x", "y", "angle", each once',
+        )
+
+
+def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
+    points = {GROUND: mechanism.ground} | {body.name: body.points for body in mechanism.bodies}
+    _known(ref.body, list(points), field, "body")
+    if ref.point not in points[ref.body]:
+        raise InputError("unknown point", field=field, value=str(ref), remedy=_choices(ref.point, points[ref.body]))
+
+
+def _known(name: str, known: list[str], field: str, kind: str) -> None:
+    if name not in known:
+        raise InputError(f"unknown {kind}", field=field, value=name, remedy=_choices(name, known))
+
+
+def _choices(name: str, known: Iterable[str]) -> str:
+    known = list(known)
+    near = get_close_matches(name, known, n=1)
+    if near:
+        return f'did you mean "{near[0]}"?'
+    return f"choose from {', '.join(known)}" if known else "there is none to choose from"
+
+
+def _finite(values: Iterable[float], field: str) -> None:
+    for value in values:
+        if not math.isfinite(value):
+            raise InputError("not a finite number", field=field, value=value, remedy="give a number")
+
+
+def _positive(value: float, field: str, unit: str) -> None:
+    if not (math.isfinite(value) and value > 0.0):
+        raise InputError("must be positive", field=field, value=value, remedy=f"give it in {unit}")
+
+
+def _not_negative(value: float, field: str, unit: str) -> None:
+    if not (math.isfinite(value) and value >= 0.0):
+        raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")

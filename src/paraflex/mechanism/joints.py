@@ -1,0 +1,105 @@
+"""Joints between named points, prescribed joint angles, and motors at joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+
+GROUND = "ground"
+
+
+@dataclass(frozen=True, order=True)
+class PointRef:
+    """A named point of a body, or of the ground: written "link1.B1" or "ground.A1" in files."""
+
+    body: str
+    point: str
+
+    @classmethod
+    def parse(cls, text: str, field: str = "point") -> PointRef:
+        """Read "body.point".
+
+        Raises
+        ------
+        InputError
+            If the text is not of this form.
+        """
+        body, dot, point = text.partition(".")
+        if not (dot and body and point):
+            raise InputError("not a point", field=field, value=text, remedy='write "body.point", say "link1.B1"')
+        return cls(body, point)
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the point is fixed in the ground frame."""
+        return self.body == GROUND
+
+    def __str__(self) -> str:
+        return f"{self.body}.{self.point}"
+
+
+@dataclass(frozen=True)
+class RevoluteJoint:
+    """Two points held together: p_b - p_a = 0.
+
+    The joint's angle is that of body b relative to body a (or to the ground), each turned by the slope of its
+    beam at the joint.
+    """
+
+    name: str
+    a: PointRef
+    b: PointRef
+
+
+@runtime_checkable
+class AngleLaw(Protocol):
+    """An angle given in time."""
+
+    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Angle [rad], its rate [rad/s] and its acceleration [rad/s^2] at times t [s]."""
+        ...
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times [s] at which a derivative of the law jumps; integration steps end there."""
+        ...
+
+
+@dataclass(frozen=True)
+class SampledAngle:
+    """An angle law from three functions of time: the angle and its first two derivatives."""
+
+    angle: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    rate: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    acceleration: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    knots: tuple[float, ...] = ()
+
+    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Angle, rate and acceleration at times t."""
+        return self.angle(t), self.rate(t), self.acceleration(t)
+
+
+@dataclass(frozen=True)
+class PrescribedAngle:
+    """A rheonomic constraint: the angle of a revolute joint follows a law in time."""
+
+    name: str
+    joint: str
+    law: AngleLaw
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A motor at a revolute joint; positive torque turns body b of the joint relative to body a.
+
+    The torque acts on the material at the joint: on the body's angle and on the slope of the beam there.
+    """
+
+    name: str
+    joint: str

@@ -1,0 +1,195 @@
+"""The mechanism: bodies, joints, motors, end-effector, assemblies and actuation modes, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from paraflex.errors import InputError
+from paraflex.fem import ReferenceCondition
+from paraflex.mechanism.bodies import Body, FlexibleBeam
+from paraflex.mechanism.checks import check_mechanism
+from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint
+
+TASK_COORDINATES = ("x", "y", "angle")
+# The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
+_SIGNS = str.maketrans({"⊕": "+", "⊖": "-", "−": "-", "–": "-"})
+
+
+@dataclass(frozen=True)
+class EndEffector:
+    """The point whose motion is prescribed, and which of its coordinates are the task."""
+
+    point: PointRef
+    coordinates: tuple[str, ...] = ("x", "y")
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """One way of putting the mechanism together, given by an approximate angle [rad] of each body.
+
+    The solver closes the loops from there; several assemblies of one mechanism differ in their elbows.
+    """
+
+    name: str
+    angles: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class ActuationMode:
+    """A set of active motors; the others turn freely."""
+
+    name: str
+    motors: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A planar mechanism of rigid bodies and flexible beams. Checked when it is made.
+
+    Attributes
+    ----------
+    name : str
+    ground : mapping
+        Named points fixed in the ground frame [m].
+    bodies : tuple of RigidBody or FlexibleBeam
+    joints : tuple of RevoluteJoint
+    motors : tuple of Motor
+        Their order is that of the signs in a mode such as "+-+-".
+    prescribed : tuple of PrescribedAngle
+        Joint angles given in time.
+    end_effector : EndEffector, optional
+    assemblies : tuple of Assembly
+        The first is the default.
+    modes : tuple of ActuationMode
+        The modes to choose from by default; any other set of motors may be asked for.
+    description : str
+
+    Raises
+    ------
+    InputError
+        Anything that does not fit together: see `mechanism.checks`.
+    """
+
+    name: str
+    ground: Mapping[str, tuple[float, float]]
+    bodies: tuple[Body, ...]
+    joints: tuple[RevoluteJoint, ...]
+    motors: tuple[Motor, ...] = ()
+    prescribed: tuple[PrescribedAngle, ...] = ()
+    end_effector: EndEffector | None = None
+    assemblies: tuple[Assembly, ...] = ()
+    modes: tuple[ActuationMode, ...] = ()
+    description: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        check_mechanism(self)
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    def joint(self, name: str) -> RevoluteJoint:
+        """The joint of that name."""
+        return next(joint for joint in self.joints if joint.name == name)
+
+    def assembly(self, name: str | None = None) -> Assembly:
+        """The assembly of that name, or the first.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        known = ", ".join(assembly.name for assembly in self.assemblies) or "none"
+        for assembly in self.assemblies:
+            if name is None or assembly.name == name:
+                return assembly
+        raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {known}")
+
+    def with_bodies(self, bodies: Iterable[Body]) -> Mechanism:
+        """The same mechanism with other bodies in place of those of the same names."""
+        new = {body.name: body for body in bodies}
+        return replace(self, bodies=tuple(new.get(body.name, body) for body in self.bodies))
+
+    def rigid(self, names: Sequence[str] | None = None) -> Mechanism:
+        """The mechanism with the named bodies rigid, or all of them: then it is the RDM of Remark 3.
+
+        Raises
+        ------
+        InputError
+            If a name is not that of a body.
+        """
+        names = [body.name for body in self.bodies] if names is None else list(names)
+        known = {body.name for body in self.bodies}
+        for name in names:
+            if name not in known:
+                raise InputError("unknown body", field="rigid", value=name, remedy=f"choose from {', '.join(known)}")
+        beams = [self.body(name) for name in names]
+        return self.with_bodies(beam.as_rigid() for beam in beams if isinstance(beam, FlexibleBeam))
+
+    def with_beams(
+        self, *, elements: int | None = None, reference: ReferenceCondition | None = None
+    ) -> Mechanism:
+        """The mechanism with another mesh or reference condition on every flexible beam.
+
+        Parameters
+        ----------
+        elements : int, optional
+            Elements per span, the same for all.
+        reference : ReferenceCondition, optional
+        """
+        beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
+        if elements is not None:
+            beams = [replace(beam, elements=elements) for beam in beams]
+        if reference is not None:
+            beams = [replace(beam, reference=reference) for beam in beams]
+        return self.with_bodies(beams)
+
+
+def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:
+    """The mode a sign string names, one sign a motor: "+" active, "-" passive (Table 1).
+
+    Raises
+    ------
+    InputError
+        Any other character, or a wrong number of them.
+    """
+    plain = signs.translate(_SIGNS)
+    names = [motor.name for motor in mechanism.motors]
+    if len(plain) != len(names) or set(plain) - {"+", "-"}:
+        raise InputError(
+            "not an actuation mode",
+            field="mode",
+            value=signs,
+            remedy=f"write one + or - for each of the {len(names)} motors ({', '.join(names)}), or motor names",
+        )
+    return ActuationMode(plain, tuple(name for name, sign in zip(names, plain, strict=True) if sign == "+"))
+
+
+def mode_of_motors(mechanism: Mechanism, names: Sequence[str]) -> ActuationMode:
+    """The mode in which just these motors are active, named by its sign string.
+
+    Raises
+    ------
+    InputError
+        An unknown motor, or one named twice.
+    """
+    known = [motor.name for motor in mechanism.motors]
+    for name in names:
+        if name not in known:
+            raise InputError("unknown motor", field="mode", value=name, remedy=f"choose from {', '.join(known)}")
+    if len(set(names)) != len(names):
+        raise InputError("a motor is named twice", field="mode", value=",".join(names), remedy="name each once")
+    return mode_of_signs(mechanism, "".join("+" if name in names else "-" for name in known))
+
+
+def parse_mode(mechanism: Mechanism, text: str) -> ActuationMode:
+    """Read a mode: its name in the mechanism, signs ("+-+-"), or motor names ("tau1,tau5")."""
+    for mode in mechanism.modes:
+        if text == mode.name:
+            return mode
+    names = [part.strip() for part in text.split(",")]
+    if all(name in {motor.name for motor in mechanism.motors} for name in names):
+        return mode_of_motors(mechanism, names)
+    return mode_of_signs(mechanism, text.strip())

@@ -1,0 +1,113 @@
+"""RAParM-I built in Python: the redundantly actuated 2-DOF parallel manipulator with parallelogram branches.
+
+Two arms A_i B_i C meet at the end-effector C; beside each runs D_i E_i F_i, whose links are parallel to those of
+the arm, so that the distal link 4 (8) can be driven from the base as well (Figs. 2, 8 and 9 of the paper).
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+from paraflex.mechanism.bodies import FlexibleBeam, LumpedMass, Material, Section
+from paraflex.mechanism.joints import Motor, PointRef, RevoluteJoint
+from paraflex.mechanism.mechanism import ActuationMode, Assembly, EndEffector, Mechanism
+
+# Table 1: signs of the motors tau1 (A1B1), tau2 (D1E1), tau5 (A2B2), tau6 (D2E2).
+TABLE_1 = ("+-+-", "-+-+", "+--+", "-++-", "+++-", "++-+", "+-++", "-+++", "++++")
+MOTORS = ("tau1", "tau2", "tau5", "tau6")
+
+
+def raparm_i(
+    *,
+    e: float = 0.100,
+    l1: float = 0.250,
+    la: float = 0.100,
+    l2: float = 0.250,
+    section: Section = Section.rectangle(width=0.030, thickness=0.005),
+    material: Material = Material(youngs_modulus=70e9, density=2700.0),
+    joint_mass: float = 0.130,
+    joint_inertia: float = 2.0e-5,
+    end_mass: float = 0.225,
+    end_inertia: float = 2.5e-5,
+) -> Mechanism:
+    """Build RAParM-I; the defaults are the reference set, identified from the paper's results.
+
+    Parameters
+    ----------
+    e : float
+        Half distance of the base pivots [m].
+    l1 : float
+        Links 1, 5 (A_i B_i) and 3, 7 (E_i F_i) [m].
+    la : float
+        Links 2, 6 (D_i E_i), and B_i F_i on links 4, 8 [m].
+    l2 : float
+        Links 4, 8 (B_i C) [m].
+    section, material
+        Of all eight links.
+    joint_mass, joint_inertia : float
+        Lumped at both ends of every link and at F_i of links 4, 8, except at C [kg, kg m^2].
+    end_mass, end_inertia : float
+        Lumped at the C end of links 4 and 8, each [kg, kg m^2].
+    """
+
+    def link(number: int, points: dict[str, float], elements: int | tuple[int, ...]) -> FlexibleBeam:
+        lumps = tuple(
+            LumpedMass(p, end_mass, end_inertia) if p == "C" else LumpedMass(p, joint_mass, joint_inertia)
+            for p in points
+        )
+        length = max(points.values())
+        return FlexibleBeam(f"link{number}", length, section, material, points, elements, lumps)
+
+    bodies, joints, motors = [], [], []
+    for side, first in ((1, 1), (2, 5)):
+        a, b, d, f, g = (f"{letter}{side}" for letter in "ABDEF")
+        one, two, three, four = (f"link{first + k}" for k in range(4))
+        bodies += [
+            link(first, {a: 0.0, b: l1}, 3),
+            link(first + 1, {d: 0.0, f: la}, 1),
+            link(first + 2, {f: 0.0, g: l1}, 3),
+            link(first + 3, {b: 0.0, g: la, "C": l2}, (1, 2)),
+        ]
+        joints += [
+            RevoluteJoint(a, PointRef("ground", a), PointRef(one, a)),
+            RevoluteJoint(b, PointRef(one, b), PointRef(four, b)),
+            RevoluteJoint(d, PointRef("ground", d), PointRef(two, d)),
+            RevoluteJoint(f, PointRef(two, f), PointRef(three, f)),
+            RevoluteJoint(g, PointRef(three, g), PointRef(four, g)),
+        ]
+        motors += [Motor(MOTORS[2 * side - 2], a), Motor(MOTORS[2 * side - 1], d)]
+    joints.append(RevoluteJoint("C", PointRef("link4", "C"), PointRef("link8", "C")))
+    return Mechanism(
+        name="RAParM-I",
+        ground={"A1": (-e, 0.0), "D1": (-e, 0.0), "A2": (e, 0.0), "D2": (e, 0.0)},
+        bodies=tuple(bodies),
+        joints=tuple(joints),
+        motors=tuple(motors),
+        end_effector=EndEffector(PointRef("link4", "C")),
+        assemblies=tuple(_assembly(name, left, right) for name, (left, right) in _ELBOWS.items()),
+        modes=tuple(
+            ActuationMode(signs, tuple(m for m, sign in zip(MOTORS, signs, strict=True) if sign == "+"))
+            for signs in TABLE_1
+        ),
+    )
+
+
+# Proximal and distal angle of each arm [degrees] near the centre of the workspace, for the four ways to fold the
+# elbows: B1 left of the line A1 C and B2 right of A2 C is "outward".
+_LEFT = {"outward": (124.0, 14.0), "inward": (14.0, 124.0)}
+_RIGHT = {name: tuple(180.0 - angle for angle in angles) for name, angles in _LEFT.items()}
+_ELBOWS = {
+    "outward": (_LEFT["outward"], _RIGHT["outward"]),
+    "inward": (_LEFT["inward"], _RIGHT["inward"]),
+    "left": (_LEFT["outward"], _RIGHT["inward"]),
+    "right": (_LEFT["inward"], _RIGHT["outward"]),
+}
+
+
+def _assembly(name: str, left: tuple[float, ...], right: tuple[float, ...]) -> Assembly:
+    angles = {}
+    for first, (proximal, distal) in ((1, left), (5, right)):
+        # Links 1 and 3 are parallel, and so are 2 and 4: two parallelograms D_i E_i F_i B_i.
+        for offset, degrees in enumerate((proximal, distal, proximal, distal)):
+            angles[f"link{first + offset}"] = round(degrees * pi / 180.0, 3)
+    return Assembly(name, angles)

@@ -1,0 +1,185 @@
+"""The paper's study (Fig. 10), joined: desired path, rigid joint motion, torques of a mode, flexible mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
+from paraflex.dynamics import State, System, build_system, pack_signals
+from paraflex.errors import InputError, IntegrationError
+from paraflex.integrators import IntegrationOptions, Solution, integrate
+from paraflex.kinematics import Path, RigidMotion, follow_path
+from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
+
+# Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
+_SAME_TIME = 1e-9
+
+
+@dataclass(frozen=True)
+class TrackingTask:
+    """A mechanism, a path, and the rigid motion along it: what the runs of all modes share.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    system : System
+        Of the mechanism, flexible where its bodies are.
+    path : Path
+    motion : RigidMotion
+        At the sample times.
+    effort : Effort
+        Of that motion.
+    plan : TorquePlan
+    """
+
+    mechanism: Mechanism
+    system: System
+    path: Path
+    motion: RigidMotion
+    effort: Effort
+    plan: TorquePlan
+
+    def mode(self, mode: str | ActuationMode) -> ActuationMode:
+        """An actuation mode by name, signs or motor names."""
+        return mode if isinstance(mode, ActuationMode) else parse_mode(self.mechanism, mode)
+
+    def torques(self, mode: str | ActuationMode) -> FeedForward:
+        """Feed-forward torques of a mode: minimum norm, smooth in time."""
+        return self.plan.feed_forward(self.mode(mode))
+
+
+@dataclass(frozen=True)
+class TrackingRun:
+    """One mode of a task, simulated.
+
+    Attributes
+    ----------
+    task : TrackingTask
+    torques : FeedForward
+    condition : (k,) array
+        Condition number of the actuation matrix at the sample times.
+    solution : Solution
+    """
+
+    task: TrackingTask
+    torques: FeedForward
+    condition: NDArray[np.float64]
+    solution: Solution
+
+    @property
+    def mode(self) -> ActuationMode:
+        """The actuation mode."""
+        return self.torques.mode
+
+
+def plan_tracking(
+    mechanism: Mechanism,
+    path: Path,
+    *,
+    duration: float | None = None,
+    samples: int = 701,
+    assembly: str | None = None,
+    orientation: float = 0.0,
+) -> TrackingTask:
+    """Plan a motion of the end-effector: joint motion of the rigid mechanism and what it asks of the motors.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    path : Path
+    duration : float, optional
+        Of the run, dwell included [s]; the path's own by default.
+    samples : int
+        Times at which results are kept, evenly spaced, both ends among them.
+    assembly : str, optional
+        Which way the mechanism is put together; the first by default.
+    orientation : float
+        Angle of the end-effector where it is a task coordinate [rad].
+
+    Raises
+    ------
+    InputError, AssemblyError, UnreachablePathError
+        See `kinematics.follow_path`.
+    """
+    end = path.duration if duration is None else duration
+    if not (np.isfinite(end) and end > 0.0):
+        raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
+    if samples < 2:
+        raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+    times = np.linspace(0.0, end, samples)
+
+    def follow(t: NDArray[np.float64]) -> RigidMotion:
+        return follow_path(mechanism, path, t, assembly=assembly, orientation=orientation)
+
+    motion = follow(times)
+    return TrackingTask(
+        mechanism=mechanism,
+        system=build_system(mechanism),
+        path=path,
+        motion=motion,
+        effort=required_effort(motion),
+        plan=plan_torques(follow, _knots(path, end)),
+    )
+
+
+def simulate(
+    task: TrackingTask,
+    mode: str | ActuationMode,
+    *,
+    options: IntegrationOptions | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> TrackingRun:
+    """Drive the flexible mechanism with the torques of a mode.
+
+    Parameters
+    ----------
+    task : TrackingTask
+    mode : str or ActuationMode
+        Its name, signs ("+-+-") or motor names ("tau1,tau5").
+    options : IntegrationOptions, optional
+    on_progress : callable, optional
+        Told the time reached [s].
+
+    Returns
+    -------
+    TrackingRun
+
+    Raises
+    ------
+    ActuationError, SingularActuationError
+        The mode cannot drive the mechanism along the path.
+    IntegrationError
+        The run could not be finished; it carries a TrackingRun with what was computed.
+    """
+    torques = task.torques(mode)
+    condition = actuation_condition(task.effort, torques.mode)
+    times = task.motion.t
+    signals, knots = pack_signals(task.mechanism, torques.signals, float(times[-1]))
+    stops = np.sort(np.concatenate([torques.knots, knots]))
+    try:
+        solution = integrate(
+            task.system, signals, start_state(task), times, knots=stops, options=options, on_progress=on_progress
+        )
+    except IntegrationError as error:
+        error.partial = TrackingRun(task, torques, condition, error.partial)
+        raise
+    return TrackingRun(task, torques, condition, solution)
+
+
+def start_state(task: TrackingTask) -> State:
+    """The undeformed mechanism at the start of the path, moving as the path does."""
+    system, motion = task.system, task.motion
+    q, v = np.zeros(system.n), np.zeros(system.n)
+    for body, rigid in zip(system.bodies, motion.system.bodies, strict=True):
+        q[body.offset : body.offset + 3] = motion.q[0, rigid.all]
+        v[body.offset : body.offset + 3] = motion.v[0, rigid.all]
+    return State(float(motion.t[0]), q, v)
+
+
+def _knots(path: Path, end: float) -> NDArray[np.float64]:
+    knots = np.unique(np.concatenate([[0.0, end], [knot for knot in path.knots if 0.0 < knot < end]]))
+    return knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]
