@@ -354,9 +354,10 @@ def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
 
 def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
     values = []
-    flex = square = port = effort = 0
+    flex = square = port = effort = block = 0
     for body, body_ports, body_efforts in zip(bodies, ports, efforts, strict=True):
         s = body.integrals
+        rows = sum(port["rows"] for port in body_ports)
         values.append(
             {
                 "offset": body.offset,
@@ -367,6 +368,8 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
                 "port_end": port + len(body_ports),
                 "effort": effort,
                 "effort_end": effort + len(body_efforts),
+                "block": block,
+                "rows": rows,
                 "m": s.m,
                 "S1x": s.S1[0],
                 "S1y": s.S1[1],
@@ -377,6 +380,7 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
         square += body.nf**2
         port += len(body_ports)
         effort += len(body_efforts)
+        block += rows**2
     return _records(BODY, values)
 
 
@@ -391,8 +395,10 @@ def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
 def _port_records(bodies, ports) -> NDArray[np.void]:
     values, jac = [], 0
     for body, body_ports in zip(bodies, ports, strict=True):
+        local = 0
         for port in body_ports:
-            values.append(port | {"jac": jac})
+            values.append(port | {"jac": jac, "local": local})
+            local += port["rows"]
             jac += port["rows"] * (3 + body.nf)
     return _records(PORT, values)
 

@@ -45,6 +45,11 @@ from paraflex.kernel.packed import Signals
 _SLICE = 200
 # Where the first step starts from, as a fraction of the run; error control takes over at once.
 _FIRST_STEP = 1e-6
+# How long a velocity error that Newton leaves is taken to last, as a fraction of the run: it must count for more
+# than its share of one step, since it is of one sign while a factor is in use.
+_NEWTON_MEMORY = 0.002
+# A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average.
+_MEMORY = 0.1
 _CAUSES = {
     NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
     SINGULAR: "the constraints lose rank (singular position)",
@@ -198,13 +203,14 @@ def integrate(
     samples = _samples(times, system)
     controls = Controls(
         rate=options.tolerance / span,
-        time_scale=_time_scale(system),
+        newton_memory=_NEWTON_MEMORY * span,
+        memory=_MEMORY * span,
         alpha=options.alpha,
         beta=options.beta,
         max_step=options.max_step,
         dependent_rows=dependent_rows(system, initial.q),
     )
-    workspace = system.workspace()
+    workspace, slow = system.workspace(), system.workspace()
     arguments = (system.packed, signals, options.tableau, controls)
     status, message = "complete", ""
     code = start(*arguments, state, workspace, samples)
@@ -213,7 +219,7 @@ def integrate(
             attempts = int(state.count[STEPS] + state.count[REJECTED])
             if attempts >= options.max_steps:
                 break
-            code = march(*arguments, stops, min(_SLICE, options.max_steps - attempts), state, workspace, samples)
+            code = march(*arguments, stops, min(_SLICE, options.max_steps - attempts), state, workspace, slow, samples)
             if on_progress is not None:
                 on_progress(float(state.clock[TIME]))
     except KeyboardInterrupt:
@@ -231,10 +237,6 @@ def dependent_rows(system: System, q: NDArray[np.float64]) -> int:
     from paraflex.kernel.linear import factor_system
 
     return int(factor_system(system.packed, 0.0, q, system.workspace()))
-
-
-def _time_scale(system: System) -> float:
-    return 0.0
 
 
 def _samples(times: NDArray[np.float64], system: System) -> Samples:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from paraflex.kernel.compiling import kernel
+from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.packed import GJ, I1, OMEGA2, S2X, S2Y
 
 
-@kernel
+@inlined
 def body_equations(p, i, q, v, a, f):
     """M q'' + h + K u of body i into f; the translational part in the ground frame."""
     body = p.bodies[i]
@@ -62,7 +62,7 @@ def body_equations(p, i, q, v, a, f):
     f[o + 2] = sx * ay - sy * ax + (body.I0 + 2.0 * i1u + uI2u) * dw + mpf_a + 2.0 * w * (i1v + uI2v)
 
 
-@kernel
+@inlined
 def body_energy(p, i, q, v):
     """Kinetic and strain energy of body i."""
     body = p.bodies[i]

@@ -7,4 +7,9 @@ from numba import njit
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
 
-kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": FAST_MATH}
+
+kernel = njit(**_OPTIONS)
+# For what is called once a body in a hot loop: passing the packed system, some seventy machine words, costs as much
+# as the arithmetic. Not for more, because every copy is compiled again.
+inlined = njit(forceinline=True, **_OPTIONS)

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from paraflex.kernel.compiling import kernel
+from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.packed import ANGLE, NX, NY, SLOPE
 from paraflex.kernel.signals import evaluate_signal
 
 
-@kernel
+@inlined
 def marker_shape(p, marker, vector):
     """Body-frame displacement N z of a marker for the flexible part of a system vector z (q, v or a)."""
     body = p.bodies[marker.body]
@@ -26,7 +26,7 @@ def marker_shape(p, marker, vector):
     return x, y
 
 
-@kernel
+@inlined
 def marker_angle(p, marker, vector):
     """The angle phi + N2' u of a marker, or its rate or acceleration, by the system vector given."""
     body = p.bodies[marker.body]
@@ -37,7 +37,7 @@ def marker_angle(p, marker, vector):
     return angle
 
 
-@kernel
+@inlined
 def marker_motion(p, marker, q, v, a):
     """Position, velocity and acceleration of a marker in the ground frame, and its s there: (p, p', p'', R s)."""
     o = p.bodies[marker.body].offset
@@ -65,7 +65,7 @@ def marker_motion(p, marker, q, v, a):
     )
 
 
-@kernel
+@inlined
 def apply_force(p, marker, q, fx, fy, rx, ry, f):
     """Add to f the generalised force of a ground-frame force at a marker: J^T F, J = [1, R E s, R N]."""
     body = p.bodies[marker.body]
@@ -79,7 +79,7 @@ def apply_force(p, marker, q, fx, fy, rx, ry, f):
         f[e + j] += p.shape[NX, k + j] * bx + p.shape[NY, k + j] * by
 
 
-@kernel
+@inlined
 def apply_torque(p, marker, torque, f):
     """Add to f the generalised force of a torque at a marker: it works on phi and on the slope there."""
     body = p.bodies[marker.body]
@@ -100,7 +100,7 @@ def start_rows(p, signals, t, weight_v, weight_q, rows):
             rows[r] -= acceleration + weight_v * rate + weight_q * value
 
 
-@kernel
+@inlined
 def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
     """Add body i's part of Phi'' + weight_v Phi' + weight_q Phi to rows, and Phi_q^T lambda to f."""
     body = p.bodies[i]
@@ -122,7 +122,7 @@ def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
             apply_force(p, marker, q, sign * lam[r], sign * lam[r + 1], rx, ry, f)
 
 
-@kernel
+@inlined
 def body_efforts(p, i, torques, f):
     """Subtract the generalised force of the motors on body i from f."""
     body = p.bodies[i]

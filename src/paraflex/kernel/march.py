@@ -15,27 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.bodies import system_energy
-from paraflex.kernel.compiling import kernel
+from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.joints import constraint_values, marker_angle
-from paraflex.kernel.linear import factor_system, jacobian_times, mass_norm, mass_times, solve_system, to_body_frame
+from paraflex.kernel.linear import factor_bodies, factor_system, jacobian_times, mass_norm, mass_times, orient, solve_system, to_body_frame, to_ground_frame
 from paraflex.kernel.packed import OMEGA2
 from paraflex.kernel.signals import evaluate_signal
-from paraflex.kernel.stage import CONVERGED, FIRST_RATE, equations, solve_stage
+from paraflex.kernel.stage import CONVERGED, WORST_RATE, equations, solve_stage
 
 # Why `march` returned.
 PAUSED, FINISHED, NO_CONVERGENCE, SINGULAR, NOT_FINITE, ERROR_TEST = range(6)
 # March.clock
 TIME, STEP, LAST_STEP, WORK, FACTOR_G, RATE, ENERGY_0, BALANCE, PHI_MAX, DPHI_MAX = range(10)
 # March.count
-STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, CAUSE = range(8)
+STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES, CAUSE = range(9)
 
-SAFETY, MIN_FACTOR, MAX_FACTOR = 0.9, 0.2, 4.0
+SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
 # A new step this close to the old one is not worth a new factorisation.
 KEEP_ABOVE, KEEP_BELOW = 0.92, 1.2
-# Contraction beyond which the factor is renewed at the next step.
-STALE_RATE = 0.05
+# A stage that takes more iterations than this asks for a new factor, once the old one has served a few steps.
+ENOUGH_ITERATIONS, SERVED = 2, 5
 # Newton errors are held to this fraction of the error allowed in a step.
 NEWTON_FRACTION = 0.03
+# Steps after which the factor that filters velocity errors is renewed; it serves a norm, so an old one will do.
+SLOW_AGE = 25
 # The smallest step, as a fraction of the time span.
 MIN_STEP = 1e-12
 
@@ -58,7 +60,8 @@ class Controls(NamedTuple):
     """
 
     rate: float
-    time_scale: float
+    newton_memory: float  # how long a velocity error left by Newton is taken to last [s]
+    memory: float  # how long a velocity error of a step does, where no vibration turns it round [s]
     alpha: float
     beta: float
     max_step: float
@@ -102,7 +105,7 @@ def make_march(n: int, m: int, stages: int, motors: int) -> March:
     """Allocate the state of a run with n coordinates and m constraint rows."""
     return March(
         clock=np.zeros(10),
-        count=np.zeros(8, dtype=np.int64),
+        count=np.zeros(9, dtype=np.int64),
         q=np.zeros(n),
         v=np.zeros(n),
         stage_t=np.zeros((2, stages)),
@@ -135,7 +138,7 @@ def input_power(p, signals, t, q, v, lam, torques):
     return total
 
 
-@kernel
+@inlined
 def interpolate(q0, v0, a0, q1, v1, a1, h, x):
     """Cubic Hermite q and v at fraction x of an interval h, and the derivative of v as a."""
     y = 1.0 - x
@@ -204,15 +207,11 @@ def predict(tableau, i, t, h, m):
 
 
 @kernel
-def start(p, signals, tableau, controls, m, ws, out):
-    """Accelerations and multipliers at the first instant, solved exactly; the first sample if it is due."""
-    t = m.clock[TIME]
+def first_stage(p, signals, t, controls, m, ws):
+    """Accelerations and multipliers at (t, q, v), solved exactly, as the first stage; number of dependent rows."""
     a, lam = m.stage_a[1, 0], m.stage_lam[0]
-    a[:] = 0.0
-    lam[:] = 0.0
-    if factor_system(p, 0.0, m.q, ws) != controls.dependent_rows:
-        m.count[CAUSE] = SINGULAR
-        return SINGULAR
+    dependent = factor_system(p, 0.0, m.q, ws)
+    m.clock[FACTOR_G] = -1.0
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
     for _ in range(2):
         equations(p, signals, t, controls.alpha, controls.beta, m.q, m.v, a, lam, m.torques, ws)
@@ -225,6 +224,17 @@ def start(p, signals, tableau, controls, m, ws, out):
             a[j] += ws.x[j]
         for r in range(lam.size):
             lam[r] += ws.mu[r]
+    return dependent
+
+
+@kernel
+def start(p, signals, tableau, controls, m, ws, out):
+    """First stage and first sample of a run."""
+    t = m.clock[TIME]
+    if first_stage(p, signals, t, controls, m, ws) != controls.dependent_rows:
+        m.count[CAUSE] = SINGULAR
+        return SINGULAR
+    a, lam = m.stage_a[1, 0], m.stage_lam[0]
     m.stage_t[1, 0] = t
     m.stage_q[0, :] = m.q
     m.stage_v[0, :] = m.v
@@ -232,7 +242,6 @@ def start(p, signals, tableau, controls, m, ws, out):
     kinetic, strain = system_energy(p, m.q, m.v)
     m.clock[ENERGY_0] = kinetic + strain
     note_constraints(p, signals, t, m, ws)
-    m.clock[FACTOR_G] = -1.0
     if out.times.size > 0 and out.times[0] <= t:
         out.q[0, :] = m.q
         out.v[0, :] = m.v
@@ -253,15 +262,17 @@ def note_constraints(p, signals, t, m, ws):
 
 
 @kernel
-def filtered_error(p, tableau, h, controls, m, ws):
-    """Error of the step in the mass norm, filtered through the iteration matrix: (position, velocity).
+def filtered_error(p, tableau, h, controls, m, ws, slow):
+    """Error of the step in the mass norm, in position and by what its velocity error does later: (metres, metres).
+
+    The velocity error is filtered once more, as if by a step as long as `memory`: what is left of it is the part that
+    no elastic force turns round, and that moves the mechanism by memory times its size before the run ends.
 
     With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
     (M + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale.
     """
     stages = tableau.c.size
     g = tableau.A[stages - 1, stages - 1] * h
-    scale = 1.0 + 2.0 * controls.alpha * g + controls.beta * controls.beta * g * g
     for j in range(m.q.size):
         m.eq[j] = 0.0
         m.ev[j] = 0.0
@@ -270,9 +281,26 @@ def filtered_error(p, tableau, h, controls, m, ws):
         for j in range(m.q.size):
             m.eq[j] += weight * m.stage_v[s, j]
             m.ev[j] += weight * m.stage_a[1, s, j]
+    filter_error(p, g, controls, m.eq, m.ev, ws)
     for j in range(m.q.size):
-        ws.x[j] = m.ev[j]
-        ws.f[j] = m.eq[j]
+        m.eq[j] += g * ws.x[j]
+    position = mass_norm(p, ws, m.eq)
+    if m.count[STEPS] % SLOW_AGE == 0:
+        factor_system(p, controls.memory * controls.memory, m.q, slow)
+    for j in range(m.q.size):
+        m.eq[j] = 0.0
+        m.ev[j] = ws.x[j]
+    filter_error(p, controls.memory, controls, m.eq, m.ev, slow)
+    return position, controls.memory * mass_norm(p, slow, slow.x)
+
+
+@kernel
+def filter_error(p, g, controls, eq, ev, ws):
+    """eps_v of (1 - g J) eps = (e_q, e_v) into ws.x, with the factor in ws made for b = g^2."""
+    scale = 1.0 + 2.0 * controls.alpha * g + controls.beta * controls.beta * g * g
+    for j in range(eq.size):
+        ws.x[j] = ev[j]
+        ws.f[j] = eq[j]
     ws.mu[:] = 0.0
     for i in range(p.bodies.size):
         body = p.bodies[i]
@@ -281,19 +309,23 @@ def filtered_error(p, tableau, h, controls, m, ws):
         jacobian_times(p, i, ws, ws.x, 1.0 / scale, ws.mu)
         jacobian_times(p, i, ws, ws.f, -controls.beta * controls.beta * g / scale, ws.mu)
         mass_times(p, i, ws, ws.x)
-        o, e = body.offset, body.offset + 3
-        c, s = ws.frame[i, 0], ws.frame[i, 1]
+        e = body.offset + 3
         for j in range(body.nf):
-            ws.x[e + j] -= g * p.modal[OMEGA2, body.flex + j] * m.eq[e + j]
-        ws.x[o], ws.x[o + 1] = c * ws.x[o] - s * ws.x[o + 1], s * ws.x[o] + c * ws.x[o + 1]
+            ws.x[e + j] -= g * p.modal[OMEGA2, body.flex + j] * eq[e + j]
+        to_ground_frame(p, i, ws, ws.x)
     solve_system(p, ws, ws.x, ws.mu)
-    for j in range(m.q.size):
-        m.eq[j] += g * ws.x[j]
-    return mass_norm(p, ws, m.eq), mass_norm(p, ws, ws.x)
 
 
 @kernel
-def attempt(p, signals, tableau, controls, t, h, m, ws):
+def renew_factor(p, g, m, ws):
+    """Factor the bodies for stages of this g at the present deformation."""
+    factor_bodies(p, g * g, m.q, ws)
+    m.count[FACTORS] += 1
+    m.clock[FACTOR_G], m.clock[RATE], m.count[AGE] = g, WORST_RATE, 0
+
+
+@kernel
+def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     """One step from t: all stages and the error estimate, relative to what is allowed.
 
     Returns
@@ -304,15 +336,13 @@ def attempt(p, signals, tableau, controls, t, h, m, ws):
     stages = tableau.c.size
     g = tableau.A[stages - 1, stages - 1] * h
     b = g * g
-    fresh = False
-    if m.clock[FACTOR_G] != g:
-        if factor_system(p, b, m.q, ws) != controls.dependent_rows:
-            m.clock[FACTOR_G] = -1.0
-            return SINGULAR, 0.0
-        m.count[FACTORS] += 1
-        m.clock[FACTOR_G], m.clock[RATE] = g, FIRST_RATE
-        fresh = True
+    fresh = m.clock[FACTOR_G] != g
+    if fresh:
+        renew_factor(p, g, m, ws)
+    if orient(p, m.q, ws) != controls.dependent_rows:
+        return SINGULAR, 0.0
     tolerance = NEWTON_FRACTION * controls.rate * h
+    slowest = 0
     i = 1
     while i < stages:
         for j in range(m.q.size):
@@ -330,28 +360,28 @@ def attempt(p, signals, tableau, controls, t, h, m, ws):
         m.stage_lam[i, :] = m.stage_lam[i - 1]
         status, iterations, rate = solve_stage(
             p, signals, m.stage_t[1, i], g, b, controls.alpha, controls.beta, m.qs, m.vs,
-            m.stage_a[1, i], m.stage_lam[i], m.torques, tolerance, controls.time_scale, m.clock[RATE], ws,
+            m.stage_a[1, i], m.stage_lam[i], m.torques, tolerance, controls.newton_memory, m.clock[RATE], ws,
         )  # fmt: skip
         m.count[ITERATIONS] += iterations
         m.clock[RATE] = rate
         if status != CONVERGED:
             if fresh:
-                m.clock[FACTOR_G] = -1.0
                 return NO_CONVERGENCE, 0.0
             # An old factor may be to blame: once more with a new one before the step is cut.
-            if factor_system(p, b, m.q, ws) != controls.dependent_rows:
-                m.clock[FACTOR_G] = -1.0
+            renew_factor(p, g, m, ws)
+            if orient(p, m.q, ws) != controls.dependent_rows:
                 return SINGULAR, 0.0
-            m.count[FACTORS] += 1
-            m.clock[RATE] = FIRST_RATE
             fresh = True
             continue
+        slowest = max(slowest, iterations)
         m.stage_q[i, :] = ws.q
         m.stage_v[i, :] = ws.v
         m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques)
         i += 1
-    error_q, error_v = filtered_error(p, tableau, h, controls, m, ws)
-    error = max(error_q, controls.time_scale * error_v) / (controls.rate * h)
+    error_q, error_v = filtered_error(p, tableau, h, controls, m, ws, slow)
+    if slowest > ENOUGH_ITERATIONS and m.count[AGE] >= SERVED:
+        m.clock[FACTOR_G] = -1.0
+    error = max(error_q, error_v) / (controls.rate * h)
     if not isfinite(error):
         return NOT_FINITE, 0.0
     return PAUSED, error
@@ -375,6 +405,7 @@ def accept(p, signals, tableau, t, h, m, ws, out):
     m.stage_lam[0, :] = m.stage_lam[last]
     m.power[0] = m.power[last]
     m.count[STEPS] += 1
+    m.count[AGE] += 1
     m.count[FAILURES] = 0
     m.clock[LAST_STEP] = h
     kinetic, strain = system_energy(p, m.q, m.v)
@@ -384,7 +415,7 @@ def accept(p, signals, tableau, t, h, m, ws, out):
 
 
 @kernel
-def march(p, signals, tableau, controls, stops, max_steps, m, ws, out):
+def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
     """Advance by up to max_steps attempted steps, ending steps exactly at each of the times in `stops`.
 
     Returns
@@ -407,19 +438,21 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, out):
             h, landing = left, True
         elif left < 2.0 * h:
             h = 0.5 * left
-        cause, error = attempt(p, signals, tableau, controls, t, h, m, ws)
+        cause, error = attempt(p, signals, tableau, controls, t, h, m, ws, slow)
         if cause == PAUSED and error <= 1.0:
+            after_failure = m.count[FAILURES] > 0
             accept(p, signals, tableau, t, h, m, ws, out)
             m.clock[TIME] = stops[m.count[STOP]] if landing else t + h
             factor = min(MAX_FACTOR, SAFETY * (1.0 / max(error, 1e-12)) ** exponent)
             # Keep the step, and with it the factor, unless the change is worth it; a step cut short to land on a stop
             # says nothing about longer ones.
-            if factor < KEEP_ABOVE or (factor > KEEP_BELOW and h >= m.clock[STEP]):
+            if factor < KEEP_ABOVE or (factor > KEEP_BELOW and h >= m.clock[STEP] and not after_failure):
                 m.clock[STEP] = factor * h
-            if m.clock[RATE] > STALE_RATE:
-                m.clock[FACTOR_G] = -1.0
             continue
         m.count[REJECTED] += 1
+        if m.count[FAILURES] == 1:
+            # The first stage is the last step's last, with the error its longer step could bear: not so a shorter one.
+            first_stage(p, signals, t, controls, m, ws)
         m.count[FAILURES] += 1
         if cause == PAUSED:
             cause = ERROR_TEST

@@ -31,6 +31,8 @@ BODY = np.dtype(
         ("port_end", np.int64),
         ("effort", np.int64),  # its efforts: effort .. effort_end
         ("effort_end", np.int64),
+        ("block", np.int64),  # first entry of its rows x rows block J M^-1 J^T in Workspace.blocks
+        ("rows", np.int64),  # constraint rows that touch it
         ("m", np.float64),
         ("S1x", np.float64),
         ("S1y", np.float64),
@@ -54,6 +56,7 @@ PORT = np.dtype(
         ("row", np.int64),  # first constraint row
         ("rows", np.int64),  # 2 for a point, 1 for an angle
         ("jac", np.int64),  # first entry of its rows in Workspace.jac
+        ("local", np.int64),  # first of its rows among those of its body
         ("sign", np.float64),  # +1 on side b of the joint, -1 on side a
     ],
     align=True,
@@ -104,8 +107,9 @@ class Workspace(NamedTuple):
     v: NDArray[np.float64]
     frame: NDArray[np.float64]  # (bodies, 12): cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
     flex: NDArray[np.float64]  # (5, total nf)
-    jac: NDArray[np.float64]  # Jacobian rows of every port in its body frame's columns
+    jac: NDArray[np.float64]  # Jacobian rows of every port, wholly in the body frame
     inv: NDArray[np.float64]  # the same rows times the inverse of the body's iteration matrix
+    blocks: NDArray[np.float64]  # J M^-1 J^T of every body, in its frame
     schur: NDArray[np.float64]  # envelope of the Schur complement, then its Cholesky factor
     nf: NDArray[np.float64]  # (2, max nf) scratch
 
@@ -127,6 +131,7 @@ def make_workspace(p: PackedSystem) -> Workspace:
         flex=np.zeros((5, p.modal.shape[1])),
         jac=np.zeros(int(sum(widths))),
         inv=np.zeros(int(sum(widths))),
+        blocks=np.zeros(int(np.sum(p.bodies["rows"] ** 2))),
         schur=np.zeros(envelope),
         nf=np.zeros((2, max(1, int(p.bodies["nf"].max(initial=0))))),
     )

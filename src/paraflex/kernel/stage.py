@@ -22,8 +22,10 @@ from paraflex.kernel.signals import evaluate_signal
 
 MAX_ITERATIONS = 8
 CONVERGED, DIVERGED = 0, 1
-# Contraction assumed before any is measured, and the slowest one that is worth going on with.
-FIRST_RATE, WORST_RATE = 0.1, 0.5
+# The slowest contraction worth going on with, assumed of a new factor until one is measured.
+WORST_RATE = 0.5
+# A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it.
+AGEING = 1.05
 
 
 @kernel
@@ -77,10 +79,11 @@ def solve_stage(p, signals, t, g, b, alpha, beta, qs, vs, a, lam, torques, toler
         if not isfinite(change):
             return DIVERGED, iteration, rate
         if iteration > 1:
-            # Two corrections at rounding level say nothing about the contraction.
-            rate = max(0.3 * rate, change / previous)
+            rate = change / previous
             if rate > WORST_RATE and change > tolerance:
                 return DIVERGED, iteration, rate
+        else:
+            rate = min(WORST_RATE, AGEING * rate)
         if change * rate <= tolerance * (1.0 - min(rate, WORST_RATE)):
             for j in range(a.size):
                 ws.q[j] = qs[j] + b * a[j]
