@@ -1,0 +1,82 @@
+"""paraflex: rigid-flexible dynamics of planar mechanisms with closed loops and several actuation modes.
+
+The names below are the package's public ones; each is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from paraflex import plots
+    from paraflex.errors import InputError, NumericalError, ParaflexError
+    from paraflex.files import Model, library_names, load, load_path
+    from paraflex.integrators import IntegrationOptions
+    from paraflex.kinematics import Circle, Line, PointPath, Polygon
+    from paraflex.mechanism import Mechanism, raparm_i
+    from paraflex.results import load_results, save_results, summary, tracking_dataset
+    from paraflex.simulate import plan_tracking, simulate
+    from paraflex.studies import run_study
+
+_HOME = {
+    "Circle": "kinematics",
+    "InputError": "errors",
+    "IntegrationOptions": "integrators",
+    "Line": "kinematics",
+    "Mechanism": "mechanism",
+    "Model": "files",
+    "NumericalError": "errors",
+    "ParaflexError": "errors",
+    "PointPath": "kinematics",
+    "Polygon": "kinematics",
+    "library_names": "files",
+    "load": "files",
+    "load_path": "files",
+    "load_results": "results",
+    "plan_tracking": "simulate",
+    "raparm_i": "mechanism",
+    "run_study": "studies",
+    "save_results": "results",
+    "simulate": "simulate",
+    "summary": "results",
+    "tracking_dataset": "results",
+}
+
+__all__ = [
+    "Circle",
+    "InputError",
+    "IntegrationOptions",
+    "Line",
+    "Mechanism",
+    "Model",
+    "NumericalError",
+    "ParaflexError",
+    "PointPath",
+    "Polygon",
+    "library_names",
+    "load",
+    "load_path",
+    "load_results",
+    "plan_tracking",
+    "plots",
+    "raparm_i",
+    "run_study",
+    "save_results",
+    "simulate",
+    "summary",
+    "tracking_dataset",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "plots":
+        return import_module("paraflex.plots")
+    if name in _HOME:
+        # paraflex.simulate is a module too; the function of that name is what users call.
+        return getattr(import_module(f"paraflex.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'paraflex' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

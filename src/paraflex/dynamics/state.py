@@ -58,6 +58,11 @@ def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
     return linear, angular
 
 
+def constraint_rank(system: System, q: NDArray[np.float64]) -> int:
+    """Rank of Phi_q at q; rows beyond it are redundant."""
+    return int(np.linalg.matrix_rank(system.jacobian(q), tol=1e-9)) if system.m else 0
+
+
 def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
     """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
 

@@ -72,19 +72,22 @@ class IntegrationOptions:
         Largest step [s].
     max_steps : int
         Attempted steps before the run is given up.
+    newton_fraction : float
+        The part of the error allowed in a step that Newton's iteration may leave.
     tableau : Tableau
         The scheme.
     """
 
-    tolerance: float = 1e-5
+    tolerance: float = 5e-5
     alpha: float = 20.0
     beta: float = 20.0
     max_step: float = math.inf
     max_steps: int = 10_000_000
+    newton_fraction: float = 0.03
     tableau: Tableau = TR_BDF2
 
     def __post_init__(self) -> None:
-        for name in ("tolerance", "max_step", "max_steps"):
+        for name in ("tolerance", "max_step", "max_steps", "newton_fraction"):
             value = getattr(self, name)
             if not value > 0:
                 raise InputError("must be positive", field=name, value=value, remedy=_REMEDIES[name])
@@ -100,6 +103,7 @@ _REMEDIES = {
     "tolerance": "give a length in metres, say 1e-5",
     "max_step": "give a time in seconds",
     "max_steps": "give a number of steps",
+    "newton_fraction": "give a fraction, say 0.03",
 }
 
 
@@ -203,6 +207,7 @@ def integrate(
     samples = _samples(times, system)
     controls = Controls(
         rate=options.tolerance / span,
+        newton_fraction=options.newton_fraction,
         newton_memory=_NEWTON_MEMORY * span,
         memory=_MEMORY * span,
         alpha=options.alpha,

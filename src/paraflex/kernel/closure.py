@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from paraflex.kernel.arrays import copy, fill, largest
 from paraflex.kernel.compiling import kernel
+from paraflex.kernel.dense import solve_dense
 from paraflex.kernel.joints import (
     apply_force,
     apply_torque,
@@ -21,7 +23,9 @@ MAX_ITERATIONS = 20
 SMALLEST_MOVE = 1e-13
 # A body that turns or shifts this much against its prediction has jumped to another assembly [rad, m].
 LARGEST_JUMP = 0.3
-CLOSED, NO_CONVERGENCE, JUMPED = range(3)
+# A pivot below this fraction of the Jacobian's largest entry is a singular position.
+SINGULAR_PIVOT = 1e-11
+CLOSED, NO_CONVERGENCE, JUMPED, SINGULAR = range(4)
 
 
 @kernel
@@ -45,8 +49,9 @@ def task_values(p, marker, coordinates, q, v, a):
 def closure_jacobian(p, marker, coordinates, q, jacobian):
     """[Phi_q; task_q] at q."""
     m = p.rows.size
-    fill_jacobian(p, q, jacobian[:m])
-    jacobian[m:] = 0.0
+    fill_jacobian(p, q, jacobian)
+    for i in range(coordinates.size):
+        fill(jacobian[m + i], 0.0)
     _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
     for i in range(coordinates.size):
         if coordinates[i] == 2:
@@ -77,48 +82,66 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
     n, m, tasks = q.shape[1], p.rows.size, coordinates.size
     marker = p.markers[marker_index]
     jacobian = np.zeros((n, n))
-    residual, zero = np.zeros(n), np.zeros(n)
-    phi, dphi = np.zeros(m), np.zeros(m)
-    lam, unused = np.zeros(m), np.zeros(n)
+    single, zero, guess = np.zeros((n, 1)), np.zeros(n), np.zeros(n)
+    phi, dphi, lam = np.zeros(m), np.zeros(m), np.zeros(m)
+    unused = np.zeros(n)
     right = np.zeros((n, 1 + tasks))
     for k in range(times.size):
         t = times[k]
         if k > 0:
             dt = t - times[k - 1]
-            q[k] = q[k - 1] + dt * (v[k - 1] + 0.5 * dt * a[k - 1])
-        guess = q[k].copy()
+            for j in range(n):
+                q[k, j] = q[k - 1, j] + dt * (v[k - 1, j] + 0.5 * dt * a[k - 1, j])
+        copy(q[k], guess)
         closed = False
-        size = np.inf
+        size = 0.0
         for _ in range(MAX_ITERATIONS):
             constraint_values(p, signals, t, q[k], zero, phi, dphi)
-            residual[:m] = phi
-            residual[m:] = task_values(p, marker, coordinates, q[k], zero, zero)[0] - target[0, k]
-            size = np.max(np.abs(residual))
+            here = task_values(p, marker, coordinates, q[k], zero, zero)
+            for r in range(m):
+                single[r, 0] = phi[r]
+            for i in range(tasks):
+                single[m + i, 0] = here[0, i] - target[0, k, i]
+            size = largest(single[:, 0])
             closure_jacobian(p, marker, coordinates, q[k], jacobian)
-            move = np.linalg.solve(jacobian, residual)
-            q[k] -= move
-            if np.max(np.abs(move)) < SMALLEST_MOVE * (1.0 + np.max(np.abs(q[k]))):
+            if solve_dense(jacobian, single) < SINGULAR_PIVOT:
+                return SINGULAR, k, size
+            for j in range(n):
+                q[k, j] -= single[j, 0]
+            if largest(single[:, 0]) < SMALLEST_MOVE * (1.0 + largest(q[k])):
                 closed = True
                 break
         if not closed:
             return NO_CONVERGENCE, k, size
-        if k > 0 and np.max(np.abs(q[k] - guess)) > LARGEST_JUMP:
-            return JUMPED, k, size
-        closure_jacobian(p, marker, coordinates, q[k], jacobian)
+        for j in range(n):
+            if k > 0 and abs(q[k, j] - guess[j]) > LARGEST_JUMP:
+                return JUMPED, k, size
+        # Velocities, and with them the basis: one right-hand side each.
         constraint_values(p, signals, t, q[k], zero, phi, dphi)
-        right[:m, 0] = -dphi
-        right[m:, 0] = target[1, k]
-        right[:, 1:] = 0.0
+        for r in range(n):
+            fill(right[r], 0.0)
+        for r in range(m):
+            right[r, 0] = -dphi[r]
         for i in range(tasks):
+            right[m + i, 0] = target[1, k, i]
             right[m + i, 1 + i] = 1.0
-        solved = np.linalg.solve(jacobian, right)
-        v[k] = solved[:, 0]
-        basis[k] = solved[:, 1:]
+        closure_jacobian(p, marker, coordinates, q[k], jacobian)
+        solve_dense(jacobian, right)
+        for j in range(n):
+            v[k, j] = right[j, 0]
+            for i in range(tasks):
+                basis[k, j, i] = right[j, 1 + i]
         # The part of Phi'' and of the task's acceleration that does not depend on the accelerations.
         start_rows(p, signals, t, 0.0, 0.0, phi)
         for i in range(p.bodies.size):
             body_joints(p, i, q[k], v[k], zero, lam, 0.0, 0.0, unused, phi)
-        residual[:m] = -phi
-        residual[m:] = target[2, k] - task_values(p, marker, coordinates, q[k], v[k], zero)[2]
-        a[k] = np.linalg.solve(jacobian, residual)
+        here = task_values(p, marker, coordinates, q[k], v[k], zero)
+        for r in range(m):
+            single[r, 0] = -phi[r]
+        for i in range(tasks):
+            single[m + i, 0] = target[2, k, i] - here[2, i]
+        closure_jacobian(p, marker, coordinates, q[k], jacobian)
+        solve_dense(jacobian, single)
+        for j in range(n):
+            a[k, j] = single[j, 0]
     return CLOSED, times.size, 0.0

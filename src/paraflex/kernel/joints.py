@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
+from paraflex.kernel.arrays import fill
 from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.packed import ANGLE, NX, NY, SLOPE
 from paraflex.kernel.signals import evaluate_signal
@@ -160,7 +161,8 @@ def constraint_values(p, signals, t, q, v, phi, dphi):
 @kernel
 def fill_jacobian(p, q, jacobian):
     """Phi_q into a dense (rows, n) array; for closure and checks, not for the time loop."""
-    jacobian[:] = 0.0
+    for r in range(p.rows.size):
+        fill(jacobian[r], 0.0)
     for k in range(p.ports.size):
         port = p.ports[k]
         marker = p.markers[port.marker]

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
+from paraflex.kernel.arrays import fill
 from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.joints import marker_shape
 from paraflex.kernel.packed import ANGLE, DINV, GJ, I1, MPF, NX, NY, OMEGA2, POINT, S2X, S2Y, SLOPE, YP, YX, YY
@@ -215,7 +216,7 @@ def factor_bodies(p, b, q, ws):
 @kernel
 def orient(p, q, ws):
     """Turn the factored bodies to their angles in q and factor the Schur complement; number of dependent rows."""
-    ws.schur[:] = 0.0
+    fill(ws.schur, 0.0)
     for i in range(p.bodies.size):
         phi = q[p.bodies[i].offset + 2]
         ws.frame[i, 0], ws.frame[i, 1] = cos(phi), sin(phi)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.bodies import system_energy
 from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.joints import constraint_values, marker_angle
@@ -34,8 +35,6 @@ SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
 KEEP_ABOVE, KEEP_BELOW = 0.92, 1.2
 # A stage that takes more iterations than this asks for a new factor, once the old one has served a few steps.
 ENOUGH_ITERATIONS, SERVED = 2, 5
-# Newton errors are held to this fraction of the error allowed in a step.
-NEWTON_FRACTION = 0.03
 # Steps after which the factor that filters velocity errors is renewed; it serves a norm, so an old one will do.
 SLOW_AGE = 25
 # The smallest step, as a fraction of the time span.
@@ -60,6 +59,7 @@ class Controls(NamedTuple):
     """
 
     rate: float
+    newton_fraction: float  # of the error allowed in a step, the part left to Newton
     newton_memory: float  # how long a velocity error left by Newton is taken to last [s]
     memory: float  # how long a velocity error of a step does, where no vibration turns it round [s]
     alpha: float
@@ -195,7 +195,7 @@ def predict(tableau, i, t, h, m):
                 times[found], rows[found, 0], rows[found, 1] = m.stage_t[0, j], 0, j
                 found += 1
     x = t + tableau.c[i] * h
-    a[:] = 0.0
+    fill(a, 0.0)
     for k in range(found):
         weight = 1.0
         for l in range(found):
@@ -236,17 +236,17 @@ def start(p, signals, tableau, controls, m, ws, out):
         return SINGULAR
     a, lam = m.stage_a[1, 0], m.stage_lam[0]
     m.stage_t[1, 0] = t
-    m.stage_q[0, :] = m.q
-    m.stage_v[0, :] = m.v
+    copy(m.q, m.stage_q[0])
+    copy(m.v, m.stage_v[0])
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques)
     kinetic, strain = system_energy(p, m.q, m.v)
     m.clock[ENERGY_0] = kinetic + strain
     note_constraints(p, signals, t, m, ws)
     if out.times.size > 0 and out.times[0] <= t:
-        out.q[0, :] = m.q
-        out.v[0, :] = m.v
-        out.a[0, :] = a
-        out.lam[0, :] = lam
+        copy(m.q, out.q[0])
+        copy(m.v, out.v[0])
+        copy(a, out.a[0])
+        copy(lam, out.lam[0])
         out.energy[0, 0], out.energy[0, 1], out.energy[0, 2] = kinetic, strain, 0.0
         m.count[SAMPLE] = 1
     return PAUSED
@@ -301,7 +301,7 @@ def filter_error(p, g, controls, eq, ev, ws):
     for j in range(eq.size):
         ws.x[j] = ev[j]
         ws.f[j] = eq[j]
-    ws.mu[:] = 0.0
+    fill(ws.mu, 0.0)
     for i in range(p.bodies.size):
         body = p.bodies[i]
         to_body_frame(p, i, ws, ws.x)
@@ -341,7 +341,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
         renew_factor(p, g, m, ws)
     if orient(p, m.q, ws) != controls.dependent_rows:
         return SINGULAR, 0.0
-    tolerance = NEWTON_FRACTION * controls.rate * h
+    tolerance = controls.newton_fraction * controls.rate * h
     slowest = 0
     i = 1
     while i < stages:
@@ -357,7 +357,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
             m.qs[j] += g * m.vs[j]
         m.stage_t[1, i] = t + tableau.c[i] * h
         predict(tableau, i, t, h, m)
-        m.stage_lam[i, :] = m.stage_lam[i - 1]
+        copy(m.stage_lam[i - 1], m.stage_lam[i])
         status, iterations, rate = solve_stage(
             p, signals, m.stage_t[1, i], g, b, controls.alpha, controls.beta, m.qs, m.vs,
             m.stage_a[1, i], m.stage_lam[i], m.torques, tolerance, controls.newton_memory, m.clock[RATE], ws,
@@ -374,8 +374,8 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
             fresh = True
             continue
         slowest = max(slowest, iterations)
-        m.stage_q[i, :] = ws.q
-        m.stage_v[i, :] = ws.v
+        copy(ws.q, m.stage_q[i])
+        copy(ws.v, m.stage_v[i])
         m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques)
         i += 1
     error_q, error_v = filtered_error(p, tableau, h, controls, m, ws, slow)
@@ -392,17 +392,18 @@ def accept(p, signals, tableau, t, h, m, ws, out):
     """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1
     write_samples(p, tableau, t, h, m, out)
-    m.q[:] = m.stage_q[last]
-    m.v[:] = m.stage_v[last]
+    copy(m.stage_q[last], m.q)
+    copy(m.stage_v[last], m.v)
     for s in range(last + 1):
         m.clock[WORK] += h * tableau.A[last, s] * m.power[s]
-    m.stage_t[0, :] = m.stage_t[1]
-    m.stage_a[0, :, :] = m.stage_a[1]
+    copy(m.stage_t[1], m.stage_t[0])
+    for s in range(last + 1):
+        copy(m.stage_a[1, s], m.stage_a[0, s])
     m.stage_t[1, 0] = t + h
-    m.stage_q[0, :] = m.q
-    m.stage_v[0, :] = m.v
-    m.stage_a[1, 0, :] = m.stage_a[0, last]
-    m.stage_lam[0, :] = m.stage_lam[last]
+    copy(m.q, m.stage_q[0])
+    copy(m.v, m.stage_v[0])
+    copy(m.stage_a[0, last], m.stage_a[1, 0])
+    copy(m.stage_lam[last], m.stage_lam[0])
     m.power[0] = m.power[last]
     m.count[STEPS] += 1
     m.count[AGE] += 1

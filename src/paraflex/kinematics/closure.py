@@ -17,7 +17,7 @@ from paraflex.dynamics import (
     reference_pose,
 )
 from paraflex.errors import InputError, Moment, UnreachablePathError
-from paraflex.kernel.closure import CLOSED, JUMPED, close_path, task_values
+from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, close_path, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.mechanism import Assembly, Mechanism
@@ -165,14 +165,9 @@ class _Closure:
         q, v, a = np.zeros((3, k, n))
         basis = np.zeros((k, n, self.coordinates.size))
         q[0] = pose
-        try:
-            status, index, residual = close_path(
-                self.packed, self.signals, self.marker, self.coordinates, times, target, q, v, a, basis
-            )
-        except np.linalg.LinAlgError:
-            # Exactly singular: rows not yet written are zero, the first of them is where it stopped.
-            index = int(np.flatnonzero(~np.any(v != 0.0, axis=1) & ~np.any(basis != 0.0, axis=(1, 2)))[0])
-            status, residual = JUMPED, 0.0
+        status, index, residual = close_path(
+            self.packed, self.signals, self.marker, self.coordinates, times, target, q, v, a, basis
+        )
         return status, int(index), residual, (q, v, a, basis)
 
     def approach(self, path: Path, pose: NDArray[np.float64], start: float) -> NDArray[np.float64]:
@@ -200,8 +195,9 @@ class _Closure:
         )
         if status == CLOSED:
             return motion
-        what = "the path passes a Type I singularity" if status == JUMPED else "the path is out of reach"
-        gap = "" if status == JUMPED else f" (a gap of {residual:.3g} remains)"
+        away = status == NO_CONVERGENCE
+        what = "the path is out of reach" if away else "the path passes a Type I singularity"
+        gap = f" (a gap of {residual:.3g} remains)" if away else ""
         raise UnreachablePathError(f"{what}{gap}", Moment(grid[index], index, tuple(target[0, index])), partial=motion)
 
 

@@ -1,0 +1,47 @@
+# The two commands: `make run` simulates the study, `make test` checks everything. Each sets up .venv by itself.
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+KERNELS := $(wildcard src/paraflex/kernel/*.py)
+
+.PHONY: run test lint types imports tests docs clean
+
+run: $(VENV)/.kernels
+	$(BIN)/paraflex run --out results
+
+test: lint types imports tests docs
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff format --check src tests benchmarks examples
+	$(BIN)/ruff check src tests benchmarks examples
+
+types: $(VENV)/.dev
+	$(BIN)/pyright
+
+imports: $(VENV)/.dev
+	$(BIN)/lint-imports
+
+tests: $(VENV)/.dev $(VENV)/.kernels
+	$(BIN)/python -m pytest --cov --cov-report=term
+
+docs: $(VENV)/.dev
+	$(BIN)/mkdocs build --strict --quiet --site-dir site
+
+# Set-up is skipped while these stamps are newer than what they depend on.
+$(VENV)/.run: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	touch $@
+
+$(VENV)/.dev: $(VENV)/.run
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+# Numba looks at the file of a cached function only, not at those of the functions it calls: one kernel edited, all go.
+$(VENV)/.kernels: $(VENV)/.run $(KERNELS)
+	rm -f src/paraflex/kernel/__pycache__/*.nb?
+	touch $@
+
+clean:
+	rm -rf $(VENV) site results .coverage .pytest_cache .ruff_cache
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,54 @@
+"""What the commands print."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from paraflex.simulate import TrackingTask
+from paraflex.studies import StudyResult
+
+
+def plain_console(*, stderr: bool = False) -> Console:
+    """A console that leaves square brackets alone: here they hold units."""
+    return Console(highlight=False, markup=False, stderr=stderr)
+
+
+def study_table(figures: dict[str, Any], task: TrackingTask) -> Table:
+    """Tracking error and peak torques of every mode, and what the solver did."""
+    motors = [motor.name for motor in task.mechanism.motors]
+    table = Table(title=f"{figures['mechanism']}: tracking error and peak torques", title_justify="left", box=box.SIMPLE)
+    table.add_column("mode")
+    for heading in ("error\n[m]", *(f"{motor}\n[N m]" for motor in motors), "vibration\n[m]", "steps\n", "wall\n[s]"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for name, mode in figures["modes"].items():
+        if "steps" not in mode:
+            table.add_row(name, "failed", *["" for _ in motors], "", "", "")
+            continue
+        table.add_row(
+            name,
+            _figure(mode["tracking_rms"], ".4e") if mode["status"] == "complete" else mode["status"],
+            *(_figure(mode["peak_torque"][motor], ".2f") for motor in motors),
+            _figure(mode["residual_vibration"], ".2e"),
+            str(mode["steps"]),
+            _figure(mode["wall_time"], ".2f"),
+        )
+    return table
+
+
+def failures(console: Console, result: StudyResult) -> None:
+    """One line for each mode that did not run to its end."""
+    for reason in result.failed.values():
+        console.print(f"error: {reason}", soft_wrap=True)
+    if result.data is not None:
+        for mode in result.data["mode"].values:
+            run = result.data.sel(mode=mode)
+            if run["status"].item() != "complete":
+                console.print(f'error: mode "{mode}": {run["message"].item()}', soft_wrap=True)
+
+
+def _figure(value: float | None, form: str) -> str:
+    return "" if value is None else format(value, form)

@@ -1,0 +1,307 @@
+"""A model: the mechanism of a file with its named paths and the study it proposes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.fem import ReferenceCondition
+from paraflex.files.library import library_file, library_names
+from paraflex.files.read import read_toml, validate
+from paraflex.files.schema import (
+    BeamTable,
+    CircleTable,
+    GeneralSectionTable,
+    LineTable,
+    ModelTable,
+    PathFile,
+    PointsTable,
+    PolygonTable,
+    RigidTable,
+)
+from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
+from paraflex.mechanism import (
+    ActuationMode,
+    Assembly,
+    Body,
+    EndEffector,
+    FlexibleBeam,
+    LumpedMass,
+    Material,
+    Mechanism,
+    Motor,
+    PointRef,
+    PrescribedAngle,
+    RevoluteJoint,
+    RigidBody,
+    Section,
+    parse_mode,
+)
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """An angle law: a start angle [rad] and a constant speed [rad/s]."""
+
+    angle: float
+    speed: float
+    knots: tuple[float, ...] = ()
+
+    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Angle, rate and acceleration at times t."""
+        return self.angle + self.speed * t, np.full_like(t, self.speed), np.zeros_like(t)
+
+
+@dataclass(frozen=True)
+class StudyDefaults:
+    """What a study of the model does unless told otherwise.
+
+    Attributes
+    ----------
+    path : str or None
+        The name of one of the model's paths.
+    modes : tuple of str
+    duration : float or None
+        [s]; the path's own where None.
+    samples : int
+    assembly : str or None
+        The first of the mechanism where None.
+    """
+
+    path: str | None = None
+    modes: tuple[str, ...] = ()
+    duration: float | None = None
+    samples: int = 701
+    assembly: str | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a model file says.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    paths : mapping of str to Path
+    study : StudyDefaults
+    source : str
+        The file it came from, or the library name.
+    parameters : mapping
+        The file's content as read, for provenance.
+    """
+
+    mechanism: Mechanism
+    paths: Mapping[str, Path]
+    study: StudyDefaults
+    source: str
+    parameters: Mapping[str, Any] = field(repr=False, compare=False)
+
+    def path(self, name: str | None = None) -> Path:
+        """A path by name, or the study's.
+
+        Raises
+        ------
+        InputError
+            There is none of that name.
+        """
+        wanted = name or self.study.path or next(iter(self.paths), None)
+        if wanted is None:
+            raise InputError("the model has no path", field="path", remedy="add a [path.NAME] table", source=self.source)
+        if wanted not in self.paths:
+            raise InputError(
+                "unknown path", field="path", value=wanted, remedy=_choices(wanted, list(self.paths)), source=self.source
+            )
+        return self.paths[wanted]
+
+
+def load(name_or_file: str | FilePath) -> Model:
+    """Read a model from the library or from a TOML file.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        A name of `library_names()`, or a file.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    InputError
+        Unknown name, unreadable file, or anything in it that does not fit: it names file, field, value and remedy.
+    """
+    text = str(name_or_file)
+    if text in library_names():
+        path, source = FilePath(str(library_file(text))), f"{text}.toml"
+    else:
+        path, source = FilePath(name_or_file), text
+        if not path.exists() and path.suffix != ".toml":
+            raise InputError(
+                "neither a library mechanism nor a file",
+                field="mechanism",
+                value=text,
+                remedy=_choices(text, library_names()),
+            )
+    data = read_toml(path, source)
+    table = validate(ModelTable, data, source)
+    try:
+        return _model(table, data, source)
+    except InputError as error:
+        raise (error if error.source else error.in_file(source)) from None
+
+
+def load_path(file: str | FilePath) -> Path:
+    """Read a path from a TOML file with one [path] table.
+
+    Raises
+    ------
+    InputError
+        See `load`.
+    """
+    source = str(file)
+    table = validate(PathFile, read_toml(FilePath(file), source), source)
+    try:
+        return _path(table.path)
+    except InputError as error:
+        raise InputError(
+            error.problem, field=f"path.{error.field}", value=error.value, remedy=error.remedy, source=source
+        ) from None
+
+
+def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
+    mechanism = _mechanism(table)
+    paths = {}
+    for name, entry in table.path.items():
+        try:
+            paths[name] = _path(entry)
+        except InputError as error:
+            raise InputError(
+                error.problem, field=f"path.{name}.{error.field}", value=error.value, remedy=error.remedy
+            ) from error
+    study = StudyDefaults(
+        path=table.study.path,
+        modes=tuple(table.study.modes),
+        duration=table.study.duration,
+        samples=table.study.samples,
+        assembly=table.study.assembly,
+    )
+    _check_study(mechanism, paths, study)
+    return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data)
+
+
+def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
+    if study.path is not None and study.path not in paths:
+        raise InputError(
+            "unknown path", field="study.path", value=study.path, remedy=_choices(study.path, list(paths))
+        )
+    for mode in study.modes:
+        try:
+            parse_mode(mechanism, mode)
+        except InputError as error:
+            raise InputError(error.problem, field="study.modes", value=error.value, remedy=error.remedy) from error
+    if study.assembly is not None and study.assembly not in {a.name for a in mechanism.assemblies}:
+        raise InputError(
+            "unknown assembly",
+            field="study.assembly",
+            value=study.assembly,
+            remedy=_choices(study.assembly, [a.name for a in mechanism.assemblies]),
+        )
+    if study.duration is not None and not study.duration > 0.0:
+        raise InputError("must be positive", field="study.duration", value=study.duration, remedy="give it in s")
+    if study.samples < 2:
+        raise InputError("too few samples", field="study.samples", value=study.samples, remedy="ask for at least 2")
+
+
+def _mechanism(table: ModelTable) -> Mechanism:
+    effector = table.end_effector
+    return Mechanism(
+        name=table.name,
+        description=table.description,
+        ground={name: (point[0], point[1]) for name, point in table.ground.items()},
+        bodies=tuple(_body(name, body, table) for name, body in table.body.items()),
+        joints=tuple(
+            RevoluteJoint(name, *(PointRef.parse(side, f"joint.{name}") for side in sides))
+            for name, sides in table.joint.items()
+        ),
+        motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
+        prescribed=tuple(
+            PrescribedAngle(name, entry.joint, ConstantSpeed(entry.angle, entry.speed))
+            for name, entry in table.prescribed.items()
+        ),
+        end_effector=None
+        if effector is None
+        else EndEffector(PointRef.parse(effector.point, "end_effector.point"), tuple(effector.coordinates)),
+        assemblies=tuple(Assembly(name, angles) for name, angles in table.assembly.items()),
+        modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
+    )
+
+
+def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:
+    if isinstance(body, RigidTable):
+        return RigidBody(
+            name=name,
+            mass=body.mass,
+            inertia=body.inertia,
+            centre_of_mass=(body.centre_of_mass[0], body.centre_of_mass[1]),
+            points={key: (point[0], point[1]) for key, point in body.points.items()},
+        )
+    section = _named(table.section, body.section, f"body.{name}.section", "section")
+    material = _named(table.material, body.material, f"body.{name}.material", "material")
+    lumps = []
+    for point, lump_name in body.lumps.items():
+        lump = _named(table.lump, lump_name, f"body.{name}.lumps.{point}", "lump")
+        lumps.append(LumpedMass(point, lump.mass, lump.inertia))
+    if isinstance(section, GeneralSectionTable):
+        made = Section(section.area, section.second_moment)
+    else:
+        _check_sides(section.width, section.thickness, f"section.{body.section}")
+        made = Section.rectangle(section.width, section.thickness)
+    return FlexibleBeam(
+        name=name,
+        length=body.length,
+        section=made,
+        material=Material(material.youngs_modulus, material.density),
+        points=body.points,
+        elements=tuple(body.elements) if isinstance(body.elements, list) else body.elements,
+        lumps=tuple(lumps),
+        reference=ReferenceCondition(body.reference),
+        flexible=body.flexible,
+    )
+
+
+def _check_sides(width: float, thickness: float, name: str) -> None:
+    for side, value in (("width", width), ("thickness", thickness)):
+        if not value > 0.0:
+            raise InputError("must be positive", field=f"{name}.{side}", value=value, remedy="give it in m")
+
+
+def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:
+    if name not in tables:
+        raise InputError(f"unknown {kind}", field=where, value=name, remedy=_choices(name, list(tables)))
+    return tables[name]
+
+
+def _path(table: PolygonTable | LineTable | CircleTable | PointsTable) -> Path:
+    if isinstance(table, PolygonTable):
+        return Polygon(tuple((x, y) for x, y in table.corners), table.max_acceleration, table.closed)
+    if isinstance(table, LineTable):
+        return Line(table.start, table.end, table.max_acceleration)
+    if isinstance(table, CircleTable):
+        centre = (table.centre[0], table.centre[1])
+        return Circle(centre, table.radius, table.max_acceleration, table.start_angle, table.sweep)
+    return PointPath(tuple((x, y) for x, y in table.points), table.motion_time)
+
+
+def _choices(name: str, known: list[str]) -> str:
+    near = get_close_matches(name, known, n=1)
+    if near:
+        return f'did you mean "{near[0]}"?'
+    return f"choose from {', '.join(known)}" if known else "there is none to choose from"

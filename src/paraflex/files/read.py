@@ -1,0 +1,152 @@
+"""Reading TOML with errors that name file, field, value and remedy."""
+
+from __future__ import annotations
+
+import tomllib
+import typing
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from paraflex.errors import InputError
+
+# A mechanism written by hand is some kilobytes; far more is a wrong file, and parsing it would only take long.
+_LARGEST_FILE = 5_000_000
+
+T = typing.TypeVar("T", bound=BaseModel)
+
+
+def read_toml(path: Path, source: str) -> dict[str, Any]:
+    """Parse a TOML file.
+
+    Raises
+    ------
+    InputError
+        No such file, not readable, not UTF-8, or not TOML.
+    """
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise InputError("too large for a model file", field="file", remedy="name a TOML file", source=source)
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError("not a text file in UTF-8", field="file", remedy="name a TOML file", source=source) from error
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"cannot be read ({reason})", field="file", remedy="check its name", source=source) from error
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(
+            f"not valid TOML: {str(error)[0].lower()}{str(error)[1:]}",
+            field="file",
+            remedy="mend that line; a name may stand only once",
+            source=source,
+        ) from error
+
+
+def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
+    """Check parsed data against a schema.
+
+    Raises
+    ------
+    InputError
+        The first field that does not fit.
+    """
+    try:
+        return schema.model_validate(data)
+    except ValidationError as error:
+        raise _first_problem(schema, data, error, source) from None
+
+
+def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
+    # A misspelt name explains the missing one beside it; otherwise the shallowest problem is the plainest.
+    problem = min(error.errors(), key=lambda d: (not _is_misspelt(schema, data, d), len(d["loc"])))
+    location = _fields(problem)
+    field = ".".join(str(part) for part in location)
+    model, description = _look_up(schema, data, location)
+    kind, value = problem["type"], problem.get("input")
+    if kind == "missing":
+        return InputError("is missing", field=field, remedy=f"give {description}", source=source)
+    if kind == "extra_forbidden":
+        known = sorted(model.model_fields) if model is not None else []
+        near = get_close_matches(str(location[-1]), known, n=1)
+        remedy = f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
+        return InputError("unknown field", field=field, value=value, remedy=remedy, source=source)
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        tags = problem.get("ctx", {}).get("expected_tags", "")
+        got = value.get("type") if isinstance(value, dict) else value
+        return InputError("unknown type", field=f"{field}.type", value=got, remedy=f"use {tags}", source=source)
+    message = problem["msg"].removeprefix("Input ").replace(" after validation", "")
+    text = message[0].lower() + message[1:]
+    return InputError(text, field=field, value=value, remedy=f"give {description}", source=source)
+
+
+def _fields(problem: Any) -> list:
+    """An error's location without the variants of unions in it."""
+    return [part for part in problem["loc"] if not _is_variant(part, problem["loc"])]
+
+
+def _is_misspelt(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> bool:
+    """Whether an error is an unknown field with a name close to a known one."""
+    if problem["type"] != "extra_forbidden":
+        return False
+    location = _fields(problem)
+    model, _ = _look_up(schema, data, location)
+    return model is not None and bool(get_close_matches(str(location[-1]), list(model.model_fields), n=1))
+
+
+def _is_variant(part: Any, location: tuple) -> bool:
+    """Whether a part of an error's location names a variant of a union and not a field of the file."""
+    if not isinstance(part, str):
+        return False
+    variants = {"beam", "rigid", "polygon", "line", "circle", "points"}
+    position = location.index(part)
+    if part.endswith("Table") or "[" in part or part in ("int", "constrained-int"):
+        return True
+    # A discriminator's value stands right behind the name of the body or path it describes.
+    return part in variants and position == 2 and location[0] in ("body", "path")
+
+
+def _look_up(schema: type[BaseModel], data: Any, location: list) -> tuple[type[BaseModel] | None, str]:
+    """The model a field belongs to and the field's description, found by walking the annotations."""
+    model: Any = schema
+    owner: type[BaseModel] | None = schema
+    description = "a value"
+    for part in location:
+        data = data.get(part) if isinstance(data, dict) else None
+        if isinstance(model, type) and issubclass(model, BaseModel):
+            owner = model
+            info = model.model_fields.get(str(part))
+            if info is None:
+                return owner, description
+            description = info.description or f"a [{part}.NAME] table"
+            model = info.annotation
+        else:
+            model = _inner(model, data)
+        model = _resolve(model, data)
+    return owner, description
+
+
+def _inner(annotation: Any, data: Any) -> Any:
+    """What a dict or list annotation holds."""
+    arguments = typing.get_args(annotation)
+    return arguments[-1] if typing.get_origin(annotation) in (dict, list) and arguments else annotation
+
+
+def _resolve(annotation: Any, data: Any) -> Any:
+    """Strip Annotated, and of a union take the model whose `type` or fields the data has."""
+    while typing.get_origin(annotation) is typing.Annotated:
+        annotation = typing.get_args(annotation)[0]
+    members = [_resolve(member, data) for member in typing.get_args(annotation)]
+    models = [member for member in members if isinstance(member, type) and issubclass(member, BaseModel)]
+    if typing.get_origin(annotation) in (dict, list) or not models:
+        return annotation
+    if isinstance(data, dict):
+        for model in models:
+            kind = model.model_fields.get("type")
+            if kind is not None and data.get("type") in typing.get_args(kind.annotation):
+                return model
+        return max(models, key=lambda model: len(set(model.model_fields) & set(data)))
+    return models[0]

@@ -1,0 +1,171 @@
+"""The model file as pydantic sees it: which fields there are, of what type and unit.
+
+SI units and radians throughout. What a field must satisfy beyond its type (positive lengths, points that exist) is
+checked once, in `mechanism.checks` and by the paths themselves.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True)]
+Text = Annotated[str, Field(strict=True)]
+Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SectionTable(_Table):
+    """A rectangular cross-section."""
+
+    width: Number = Field(description="the width out of the plane of motion in m")
+    thickness: Number = Field(description="the thickness in the plane of motion in m")
+
+
+class GeneralSectionTable(_Table):
+    """A cross-section by its properties."""
+
+    area: Number = Field(description="the area in m^2")
+    second_moment: Number = Field(description="the second moment of area in m^4")
+
+
+class MaterialTable(_Table):
+    """A material."""
+
+    youngs_modulus: Number = Field(description="Young's modulus in Pa")
+    density: Number = Field(description="the density in kg/m^3")
+
+
+class LumpTable(_Table):
+    """A lumped mass."""
+
+    mass: Number = Field(description="the mass in kg")
+    inertia: Number = Field(default=0.0, description="the moment of inertia in kg m^2")
+
+
+class BeamTable(_Table):
+    """A flexible beam along its x axis."""
+
+    type: Literal["beam"] = Field(description='"beam" or "rigid"')
+    length: Number = Field(description="the length in m")
+    section: Text = Field(description="the name of a [section.NAME] table")
+    material: Text = Field(description="the name of a [material.NAME] table")
+    points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
+    elements: Count | list[Count] = Field(default=1, description="elements per span, one number or one a span")
+    lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
+    reference: Literal["cantilever", "pinned", "free"] = Field(
+        default="cantilever", description='how the body frame is fixed to the beam: "cantilever", "pinned" or "free"'
+    )
+    flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid beam")
+
+
+class RigidTable(_Table):
+    """A rigid body."""
+
+    type: Literal["rigid"] = Field(description='"beam" or "rigid"')
+    mass: Number = Field(description="the mass in kg")
+    inertia: Number = Field(description="the moment of inertia about the centre of mass in kg m^2")
+    centre_of_mass: Pair = Field(default=[0.0, 0.0], description="[x, y] in the body frame in m")
+    points: dict[str, Pair] = Field(default={}, description="[x, y] of each named point in the body frame in m")
+
+
+class PrescribedTable(_Table):
+    """A joint angle given in time: a constant speed from a start angle."""
+
+    joint: Text = Field(description="the name of a joint")
+    angle: Number = Field(default=0.0, description="the angle at t = 0 in rad")
+    speed: Number = Field(default=0.0, description="the speed in rad/s")
+
+
+class EndEffectorTable(_Table):
+    """The point that is to follow a path."""
+
+    point: Text = Field(description='"body.point"')
+    coordinates: list[Text] = Field(default=["x", "y"], description='task coordinates from "x", "y", "angle"')
+
+
+class PolygonTable(_Table):
+    """Straight segments from corner to corner."""
+
+    type: Literal["polygon"]
+    corners: list[Pair] = Field(description="a list of [x, y] in m")
+    max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
+    closed: Annotated[bool, Field(strict=True)] = Field(default=True, description="whether the path returns to start")
+
+
+class LineTable(_Table):
+    """A straight line."""
+
+    type: Literal["line"]
+    start: Pair = Field(description="[x, y] in m")
+    end: Pair = Field(description="[x, y] in m")
+    max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
+
+
+class CircleTable(_Table):
+    """A circle or arc."""
+
+    type: Literal["circle"]
+    centre: Pair = Field(description="[x, y] in m")
+    radius: Number = Field(description="the radius in m")
+    max_acceleration: Number = Field(description="the largest acceleration along the path in m/s^2")
+    start_angle: Number = Field(default=0.0, description="the angle of the first point in rad")
+    sweep: Number = Field(default=6.283185307179586, description="the angle swept in rad, positive counter-clockwise")
+
+
+class PointsTable(_Table):
+    """A smooth motion through points."""
+
+    type: Literal["points"]
+    points: list[Pair] = Field(description="a list of [x, y] in m")
+    motion_time: Number = Field(description="the time from the first point to the last in s")
+
+
+PathTable = Annotated[PolygonTable | LineTable | CircleTable | PointsTable, Field(discriminator="type")]
+
+
+class StudyTable(_Table):
+    """What `paraflex run` does unless told otherwise."""
+
+    path: Text | None = Field(default=None, description="the name of a [path.NAME] table")
+    modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
+    duration: Number | None = Field(default=None, description="the duration in s, dwell included")
+    samples: Count = Field(default=701, description="the number of samples kept")
+    assembly: Text | None = Field(default=None, description="the name of an [assembly.NAME] table")
+
+
+class ModelTable(_Table):
+    """A model file."""
+
+    name: Text = Field(description="a name for the mechanism")
+    description: Text = Field(default="", description="a sentence or two")
+    section: dict[str, SectionTable | GeneralSectionTable] = {}
+    material: dict[str, MaterialTable] = {}
+    lump: dict[str, LumpTable] = {}
+    ground: dict[str, Pair] = Field(default={}, description="[x, y] of each ground point in m")
+    body: dict[str, Annotated[BeamTable | RigidTable, Field(discriminator="type")]] = Field(
+        description="at least one [body.NAME] table"
+    )
+    joint: dict[str, Annotated[list[Text], Field(min_length=2, max_length=2)]] = Field(
+        default={}, description='["body.point", "body.point"] for each joint'
+    )
+    motor: dict[str, Text] = Field(default={}, description="the joint of each motor")
+    prescribed: dict[str, PrescribedTable] = {}
+    end_effector: EndEffectorTable | None = None
+    assembly: dict[str, dict[str, Number]] = Field(
+        default={}, description="approximate angles of all bodies in rad for each assembly"
+    )
+    mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
+    path: dict[str, PathTable] = {}
+    study: StudyTable = StudyTable()
+
+
+class PathFile(_Table):
+    """A file with one path."""
+
+    path: PathTable

@@ -1,0 +1,66 @@
+"""Text and units of the figures: symbols of names, signs of modes, prefixes that suit a range."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+_GREEK = ("alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "tau", "omega")
+
+
+class DisplayUnit(NamedTuple):
+    """A unit to show values in: its name, and what values in SI are multiplied by."""
+
+    name: str
+    factor: float
+
+
+_PREFIXES = {
+    "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
+    "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
+}
+
+
+def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
+    """The unit for lengths ("m") or angles ("rad") that shows the largest of `values` with few leading zeros."""
+    largest, choices = peak(values), _PREFIXES[unit]
+    if largest == 0.0:
+        return choices[0]
+    return next((choice for choice in choices if largest * choice.factor >= 0.1), choices[-1])
+
+
+def peak(values: ArrayLike) -> float:
+    """Largest finite magnitude; zero where there is none."""
+    magnitudes = np.abs(np.asarray(values, dtype=float))
+    return float(np.max(magnitudes, initial=0.0, where=np.isfinite(magnitudes)))
+
+
+def three_digits(value: float) -> str:
+    """A value to three significant digits: 48.0, 0.377, 120."""
+    return f"{value:#.3g}".rstrip(".")
+
+
+def symbol(name: str) -> str:
+    """A name as print shows it: "A1" and "tau1" with a subscript, "link1" as "link 1", others unchanged."""
+    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d+)", name)
+    if parts is None:
+        return name.replace("$", r"\$")
+    letters, number = parts.groups()
+    if letters in _GREEK:
+        return rf"$\{letters}_{{{number}}}$"
+    return rf"${letters}_{{{number}}}$" if len(letters) == 1 else f"{letters} {number}"
+
+
+def mode_label(name: str) -> str:
+    """A mode's name; signs in circles, as the paper writes them, where it is a row of signs."""
+    if is_signs(name):
+        return name.replace("+", "⊕").replace("-", "⊖")
+    return name.replace("$", r"\$")
+
+
+def is_signs(name: str) -> bool:
+    """Whether a mode is named by the signs of its motors ("+-+-")."""
+    return bool(name) and set(name) <= {"+", "-"}

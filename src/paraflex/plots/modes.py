@@ -1,0 +1,116 @@
+"""All modes side by side in time: motor torques and tracking errors (Figs. 12, 18)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from paraflex.plots.labels import display_unit, mode_label, peak, symbol, three_digits
+from paraflex.plots.runs import draw_actual, samples, select_run, shade_rest
+from paraflex.plots.style import (
+    BLUE,
+    COLOURS,
+    DASHES,
+    VERMILLION,
+    ZERO,
+    freeze_layout,
+    journal_style,
+    keep_flat,
+    label_outer_time,
+    panels,
+    shared_legend,
+)
+
+
+@journal_style()
+def motor_torques(data: xr.Dataset) -> Figure:
+    """Torque of every motor, a panel for each mode; the panels of a row share their scale (Fig. 12).
+
+    A motor without torque throughout is left out of a panel and named as passive above it.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `paraflex.results`.
+    """
+    names = [str(name) for name in data["mode"].values]
+    figure, axes = _mode_panels(len(names))
+    time, motors = data["time"].values, data["motor"].values
+    for row in range(axes.shape[0]):
+        shown = names[row * axes.shape[1] :][: axes.shape[1]]
+        scale = max(peak(select_run(data, name)["torque"]) for name in shown)
+        for panel, name in zip(axes[row], shown, strict=False):
+            run = select_run(data, name)
+            passive = []
+            for k, motor in enumerate(motors):
+                torque = run["torque"].sel(motor=motor).values
+                look = {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k % len(DASHES)]}
+                if peak(torque) <= 1e-9 * scale:
+                    passive.append(symbol(str(motor)))
+                    torque = np.full_like(torque, np.nan)  # Keeps its place in the legend.
+                panel.plot(time, torque, label=symbol(str(motor)), **look)
+            panel.axhline(0.0, **ZERO)
+            shade_rest(panel, data)
+            panel.set_ylim(-1.08 * scale or -1.0, 1.08 * scale or 1.0)
+            panel.set_title(mode_label(name), loc="left")
+            if passive:
+                text = ", ".join(passive) if len(passive) <= 4 else f"{len(passive)} motors"
+                panel.set_title(f"passive: {text}", loc="right")
+        axes[row, 0].set_ylabel(r"torque $\tau$ [N m]")
+    label_outer_time(axes)
+    shared_legend(figure)
+    return freeze_layout(figure)
+
+
+@journal_style()
+def tracking_errors(data: xr.Dataset) -> Figure:
+    """Actual less desired place of the end-effector in x and y, a panel for each mode (Fig. 18).
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `paraflex.results`. The titles hold its `tracking_rms` (Eq. 64).
+    """
+    names = [str(name) for name in data["mode"].values]
+    figure, axes = _mode_panels(len(names))
+    time = data["time"].values
+    looks = ({"color": BLUE, "linestyle": "-"}, {"color": VERMILLION, "linestyle": (0, (4, 1.2))})
+    for panel, name in zip(axes.flat, names, strict=False):
+        run = select_run(data, name)
+        errors = (run["end_effector"] - run["end_effector_desired"]).values
+        unit = display_unit("m", errors)
+        for k, (axis, look) in enumerate(zip(data["axis"].values, looks, strict=True)):
+            draw_actual(panel, run, time, unit.factor * errors[:, k], label=f"error in ${axis}$", **look)
+        panel.axhline(0.0, **ZERO)
+        shade_rest(panel, data)
+        keep_flat(panel, unit.factor * peak(errors))
+        panel.set_title(f"{mode_label(name)}: {_outcome(run)}")
+        panel.set_ylabel(f"error [{unit.name}]")
+    label_outer_time(axes)
+    shared_legend(figure)
+    return freeze_layout(figure)
+
+
+def _outcome(run: xr.Dataset) -> str:
+    """RMS tracking error of a run, or when it stopped."""
+    rms = float(run["tracking_rms"])
+    if math.isfinite(rms):
+        unit = display_unit("m", rms)
+        return f"RMS {three_digits(unit.factor * rms)} {unit.name}"
+    reached = samples(run)
+    return f"stopped at {run['time'].values[reached - 1]:.3g} s" if reached else "no samples"
+
+
+def _mode_panels(count: int) -> tuple[Figure, NDArray[Any]]:
+    """A panel for each mode, at most three beside one another; those left over are hidden."""
+    columns = 2 if count == 4 else min(count, 3)
+    rows = math.ceil(count / columns)
+    figure, axes = panels(rows, columns, height=16.0 + 42.0 * rows)
+    for panel in axes.flat[count:]:
+        panel.set_visible(False)
+    return figure, np.asarray(axes)

@@ -1,0 +1,88 @@
+"""Which run a figure shows, how far it got, and how desired and actual curves are drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import is_signs, mode_label
+from paraflex.plots.style import BLACK, BLUE, SHADE
+
+DESIRED: dict[str, Any] = {
+    "color": BLACK,
+    "linestyle": (0, (4, 2)),
+    "linewidth": 0.8,
+    "zorder": 2.5,
+    "label": "desired",
+}
+STOPPED: dict[str, Any] = {
+    "color": BLACK,
+    "linestyle": "none",
+    "marker": "x",
+    "markersize": 4.5,
+    "markeredgewidth": 1.2,
+    "zorder": 3.0,
+    "label": "the run stopped",
+}
+
+
+def select_run(data: xr.Dataset, mode: str) -> xr.Dataset:
+    """The run of one mode.
+
+    Raises
+    ------
+    InputError
+        No such mode.
+    """
+    names = [str(name) for name in data["mode"].values]
+    if mode not in names:
+        raise InputError("no such mode in these results", field="mode", value=mode, remedy="one of " + ", ".join(names))
+    return data.isel(mode=names.index(mode))
+
+
+def default_mode(data: xr.Dataset) -> str:
+    """The mode with most active motors where modes are named by their signs; else the first."""
+    names = [str(name) for name in data["mode"].values]
+    return max(names, key=lambda name: name.count("+")) if all(map(is_signs, names)) else names[0]
+
+
+def run_label(run: xr.Dataset) -> str:
+    """A run's mode for legends."""
+    return f"mode {mode_label(str(run['mode'].item()))}"
+
+
+def samples(run: xr.Dataset) -> int:
+    """How many samples of a run there are before the end or the first one it did not get to."""
+    missing = ~np.isfinite(run["end_effector"].values).all(axis=-1)
+    return int(np.argmax(missing)) if missing.any() else missing.size
+
+
+def draw_actual(axes: Axes, run: xr.Dataset, x: ArrayLike, y: ArrayLike, **look: Any) -> None:
+    """A curve of a run, with a mark at its end where the run did not get to the last sample.
+
+    Its label names the mode; `look` replaces that or any other of the line's properties.
+    """
+    xs, ys = np.asarray(x), np.asarray(y)
+    actual: dict[str, Any] = {"color": BLUE, "linestyle": "-", "label": f"actual, {run_label(run)}"}
+    axes.plot(xs, ys, **actual | look)
+    last = samples(run) - 1
+    if 0 <= last < run.sizes["time"] - 1:
+        axes.plot(xs[last], ys[last], **STOPPED)
+
+
+def draw_desired(axes: Axes, x: ArrayLike, y: ArrayLike) -> None:
+    """The curve a run should follow."""
+    axes.plot(x, y, **DESIRED)
+
+
+def shade_rest(axes: Axes, data: xr.Dataset) -> None:
+    """Span all of the time axis and shade what follows the end of the desired motion."""
+    time, end = data["time"].values, float(data.attrs["motion_end"])
+    axes.set_xlim(time[0], time[-1])
+    if end < time[-1]:
+        axes.axvspan(end, time[-1], color=SHADE, linewidth=0.0, zorder=0.0, label="after the end of the desired motion")

@@ -1,0 +1,71 @@
+"""All figures of a study as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import xarray as xr
+
+from paraflex.errors import OutputError
+from paraflex.plots.modes import motor_torques, tracking_errors
+from paraflex.plots.phase import phase_diagrams
+from paraflex.plots.runs import default_mode
+from paraflex.plots.style import journal_style
+from paraflex.plots.time_series import end_effector_motion, link_motions, tip_deflections
+from paraflex.plots.workspace import desired_path, end_effector_path
+
+# Files that do not depend on when they were written.
+_METADATA = {"png": {}, "svg": {"Date": None}}
+
+
+def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) -> list[Path]:
+    """Write figures 11 to 18 as PNG (200 dpi) and SVG, named like `fig11_desired_path.png`.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `paraflex.results`.
+    folder : str or Path
+        Made if it is not there; files of the same names are written over.
+    mode : str, optional
+        Of the figures that show one mode; by default the one with most active motors where modes are named by the
+        signs of their motors, else the first.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        No such mode.
+    OutputError
+        The folder cannot be written.
+    """
+    folder, mode = Path(folder), default_mode(data) if mode is None else mode
+    figures = {
+        "fig11_desired_path": lambda: desired_path(data),
+        "fig12_motor_torques": lambda: motor_torques(data),
+        "fig13_tip_deflections": lambda: tip_deflections(data, mode),
+        "fig14_link_motions": lambda: link_motions(data, mode),
+        "fig15_end_effector_path": lambda: end_effector_path(data, mode),
+        "fig16_end_effector_motion": lambda: end_effector_motion(data, mode),
+        "fig17_phase_diagrams": lambda: phase_diagrams(data, mode),
+        "fig18_tracking_errors": lambda: tracking_errors(data),
+    }
+    written: list[Path] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, draw in figures.items():
+            figure = draw()
+            for suffix, metadata in _METADATA.items():
+                path = folder / f"{name}.{suffix}"
+                with journal_style():
+                    figure.savefig(path, metadata=metadata)
+                written.append(path)
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written ({error.strerror or error})", field=str(folder), remedy="choose another folder"
+        ) from error
+    return written

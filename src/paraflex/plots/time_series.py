@@ -1,0 +1,153 @@
+"""One mode in time: tip deflections, motion of the links, motion of the end-effector (Figs. 13, 14, 16)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import display_unit, peak, symbol
+from paraflex.plots.runs import draw_actual, draw_desired, run_label, select_run, shade_rest
+from paraflex.plots.style import freeze_layout, journal_style, keep_flat, label_outer_time, panels, shared_legend
+
+# Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
+_ALIKE = 0.9
+
+
+@journal_style()
+def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = None) -> Figure:
+    """Axial and transverse displacement and slope of links' end points in their body frames (Fig. 13).
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `paraflex.results`.
+    mode : str
+        Actuation mode.
+    bodies : sequence of str, optional
+        A row each; by default the two whose tips move most across, twins of a symmetric mechanism counted once.
+
+    Raises
+    ------
+    InputError
+        No such mode or body.
+    """
+    run = select_run(data, mode)
+    chosen = _most_deflected(run) if bodies is None else list(bodies)
+    for name in chosen:
+        if name not in run["body"].values:
+            known = ", ".join(map(str, run["body"].values))
+            raise InputError("no such body in these results", field="bodies", value=name, remedy=f"one of {known}")
+    columns = (
+        ("tip_axial", "axial displacement", "displacement", "m"),
+        ("tip_transverse", "transverse displacement", "displacement", "m"),
+        ("tip_slope", "slope", "slope", "rad"),
+    )
+    figure, axes = panels(len(chosen), len(columns), height=16.0 + 38.0 * len(chosen))
+    for column, (variable, title, quantity, si_unit) in zip(axes.T, columns, strict=True):
+        curves = [run[variable].sel(body=name).values for name in chosen]
+        unit = display_unit(si_unit, curves)
+        for panel, curve, name in zip(column, curves, chosen, strict=True):
+            draw_actual(panel, run, data["time"].values, unit.factor * curve, label=run_label(run))
+            shade_rest(panel, data)
+            keep_flat(panel, unit.factor * peak(curves))
+            panel.set_title(f"{symbol(name)}: {title}")
+            panel.set_ylabel(f"{quantity} [{unit.name}]")
+    label_outer_time(axes)
+    shared_legend(figure)
+    return freeze_layout(figure)
+
+
+def _most_deflected(run: xr.Dataset) -> list[str]:
+    """Two bodies, in the order of the mechanism: those with largest transverse tip displacement that are not alike."""
+    peaks = {str(name): peak(run["tip_transverse"].sel(body=name)) for name in run["body"].values}
+    chosen: list[str] = []
+    rest = dict(peaks)
+    while rest and len(chosen) < 2:
+        alike = [name for name in rest if rest[name] >= _ALIKE * max(rest.values())]
+        chosen.append(alike[0])
+        rest = {name: value for name, value in rest.items() if name not in alike}
+    ranked = sorted((name for name in peaks if name not in chosen), key=lambda name: -peaks[name])
+    chosen += ranked[: 2 - len(chosen)]
+    return [name for name in peaks if name in chosen]
+
+
+@journal_style()
+def link_motions(data: xr.Dataset, mode: str) -> Figure:
+    """Angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14).
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `paraflex.results`.
+    mode : str
+        Actuation mode.
+
+    Raises
+    ------
+    InputError
+        No such mode.
+    """
+    columns = (
+        ("angle", "angle", r"$\varphi$ [rad]"),
+        ("angular_velocity", "angular velocity", r"$\dot\varphi$ [rad/s]"),
+        ("angular_acceleration", "angular acceleration", r"$\ddot\varphi$ [rad/s²]"),
+    )
+    run, time = select_run(data, mode), data["time"].values
+    bodies = data["body"].values
+    figure, axes = panels(len(bodies), len(columns), height=18.0 + 26.0 * len(bodies))
+    for column, (variable, title, label) in zip(axes.T, columns, strict=True):
+        scale = float(np.ptp(run[f"{variable}_desired"].values, axis=0).max())
+        for panel, body in zip(column, bodies, strict=True):
+            draw_actual(panel, run, time, run[variable].sel(body=body).values, linewidth=0.6)
+            draw_desired(panel, time, run[f"{variable}_desired"].sel(body=body).values)
+            shade_rest(panel, data)
+            keep_flat(panel, scale)
+            panel.set_title(f"{symbol(str(body))}: {title}")
+            panel.set_ylabel(label)
+    label_outer_time(axes)
+    shared_legend(figure)
+    return freeze_layout(figure)
+
+
+@journal_style()
+def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
+    """Displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16).
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `paraflex.results`.
+    mode : str
+        Actuation mode.
+
+    Raises
+    ------
+    InputError
+        No such mode.
+    """
+    rows = (
+        ("end_effector", r"${0}$ [mm]", 1e3),
+        ("end_effector_velocity", r"$\dot {0}$ [m/s]", 1.0),
+        ("end_effector_acceleration", r"$\ddot {0}$ [m/s²]", 1.0),
+    )
+    run, time = select_run(data, mode), data["time"].values
+    directions = [str(axis) for axis in data["axis"].values]
+    figure, axes = panels(len(rows), len(directions), height=118.0)
+    for row, (variable, label, factor) in zip(axes, rows, strict=True):
+        desired = factor * run[f"{variable}_desired"]
+        scale = float(np.ptp(desired.values, axis=0).max())
+        for panel, axis in zip(row, directions, strict=True):
+            draw_actual(panel, run, time, factor * run[variable].sel(axis=axis).values)
+            draw_desired(panel, time, desired.sel(axis=axis).values)
+            shade_rest(panel, data)
+            keep_flat(panel, scale)
+            panel.set_ylabel(label.replace("{0}", axis))
+    for panel, axis in zip(axes[0], directions, strict=True):
+        panel.set_title(f"{axis} direction")
+    label_outer_time(axes)
+    shared_legend(figure)
+    return freeze_layout(figure)

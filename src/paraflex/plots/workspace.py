@@ -1,0 +1,139 @@
+"""Paths of the end-effector in the workspace (Figs. 11, 15)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import peak
+from paraflex.plots.mechanism import draw_mechanism
+from paraflex.plots.runs import draw_actual, draw_desired, run_label, select_run
+from paraflex.plots.style import (
+    BLACK,
+    BLUE,
+    ONE_COLUMN,
+    fit_height,
+    freeze_layout,
+    journal_style,
+    panels,
+    shared_legend,
+)
+
+_START: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "s",
+    "markersize": 4.5,
+    "color": BLACK,
+    "zorder": 4.0,
+    "label": "start",
+}
+# The largest deviation is shown as at most this share of the path's extent.
+_SHOWN_DEVIATION = 0.15
+
+
+@journal_style()
+def desired_path(data: xr.Dataset) -> Figure:
+    """The path the end-effector should follow, and the mechanism in its start pose (Fig. 11).
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `paraflex.results`.
+    """
+    path = 1e3 * data["end_effector_desired"].isel(mode=0).transpose("time", "axis").values
+    figure, axes = _workspace_panel()
+    axes.plot(*path.T, color=BLUE, linewidth=1.3, zorder=2.6, label="desired path")
+    _draw_direction(axes, path)
+    axes.plot(*path[0], **_START)
+    draw_mechanism(axes, data, path)
+    return _finish(figure, axes)
+
+
+@journal_style()
+def end_effector_path(data: xr.Dataset, mode: str, magnification: float | None = None) -> Figure:
+    """Desired and actual path; the deviation from one to the other is drawn magnified (Fig. 15).
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `paraflex.results`.
+    mode : str
+        Actuation mode.
+    magnification : float, optional
+        Of the deviation; by default the largest of 1, 2, 5, 10, ... that keeps it small beside the path.
+
+    Raises
+    ------
+    InputError
+        No such mode, or a magnification that is not positive.
+    """
+    run = select_run(data, mode)
+    desired = 1e3 * run["end_effector_desired"].transpose("time", "axis").values
+    deviation = 1e3 * run["end_effector"].transpose("time", "axis").values - desired
+    if magnification is None:
+        magnification = _round_magnification(deviation, float(np.ptp(desired, axis=0).max()))
+    elif not (math.isfinite(magnification) and magnification > 0.0):
+        raise InputError(
+            "not a magnification", field="magnification", value=magnification, remedy="give a positive number"
+        )
+    shown = desired + magnification * deviation
+    label = f"actual, {run_label(run)}"
+    if magnification != 1.0:
+        label += f", deviation × {magnification:g}"
+    figure, axes = _workspace_panel()
+    draw_actual(axes, run, *shown.T, label=label)
+    draw_desired(axes, *desired.T)
+    axes.plot(*desired[0], **_START)
+    return _finish(figure, axes)
+
+
+def _round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
+    """Largest of 1, 2, 5, 10, ... at which the deviation [mm] stays small beside a path of this extent [mm]."""
+    lengths = np.linalg.norm(deviation, axis=1)
+    largest = peak(lengths)
+    if not largest > 1e-9 * extent:
+        return 1.0
+    room = _SHOWN_DEVIATION * extent / largest
+    if room < 1.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(room))
+    return power * max(digit for digit in (1.0, 2.0, 5.0) if digit * power <= room)
+
+
+def _workspace_panel() -> tuple[Figure, Axes]:
+    figure, axes = panels(1, 1, width=ONE_COLUMN, height=ONE_COLUMN)
+    panel: Axes = axes[0, 0]
+    panel.set_aspect("equal")
+    panel.margins(0.06)
+    panel.set_xlabel("$x$ [mm]")
+    panel.set_ylabel("$y$ [mm]")
+    return figure, panel
+
+
+def _draw_direction(axes: Axes, path: NDArray[np.float64]) -> None:
+    """Arrow heads along a path at an eighth, three, five and seven eighths of its length."""
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    if travelled[-1] == 0.0:
+        return
+    for share in (0.125, 0.375, 0.625, 0.875):
+        ends = [np.interp((share + d) * travelled[-1], travelled, path[:, k]) for d in (-0.01, 0.01) for k in (0, 1)]
+        axes.annotate(
+            "",
+            xytext=(ends[0], ends[1]),
+            xy=(ends[2], ends[3]),
+            arrowprops={"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 9.0, "shrinkA": 0.0, "shrinkB": 0.0},
+            zorder=2.7,
+        )
+
+
+def _finish(figure: Figure, axes: Axes) -> Figure:
+    shared_legend(figure)
+    fit_height(figure, axes)
+    return freeze_layout(figure)

@@ -1,0 +1,58 @@
+"""Motion of named points and beam tips from coordinates over time, for all instants at once."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System
+from paraflex.mechanism import PointRef
+
+
+class PointMotion(NamedTuple):
+    """Position [m], velocity [m/s], acceleration [m/s^2] in the ground frame, each (k, 2)."""
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+
+
+def point_motion(
+    system: System, ref: PointRef, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
+) -> PointMotion:
+    """Motion of a point for coordinates (k, n) and their derivatives.
+
+    p = r + R s, p' = r' + R (phi' E s + N u'), p'' = r'' + R (phi'' E s - phi'^2 s + 2 phi' E N u' + N u'').
+    """
+    marker = system.marker(ref)
+    body = system.bodies[marker.body]
+    phi, w, dw = q[:, body.angle], v[:, body.angle, None], a[:, body.angle, None]
+    c, s = np.cos(phi)[:, None], np.sin(phi)[:, None]
+
+    def turned(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.hstack([c * x[:, :1] - s * x[:, 1:], s * x[:, :1] + c * x[:, 1:]])
+
+    def quarter(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.column_stack([-x[:, 1], x[:, 0]])
+
+    local = marker.x0 + q[:, body.flexible] @ marker.N.T
+    rate, second = v[:, body.flexible] @ marker.N.T, a[:, body.flexible] @ marker.N.T
+    return PointMotion(
+        q[:, body.position] + turned(local),
+        v[:, body.position] + turned(w * quarter(local) + rate),
+        a[:, body.position] + turned(dw * quarter(local) - w**2 * local + 2.0 * w * quarter(rate) + second),
+    )
+
+
+def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Axial [m] and transverse [m] displacement and slope [rad] of a beam's last node in its body frame: (k, 3).
+
+    Zero for a body without flexible coordinates.
+    """
+    body = system.body(name)
+    if body.nf == 0:
+        return np.zeros((q.shape[0], 3))
+    # The last node's axial, transverse and slope rows of D; its curvature is the fourth.
+    return q[:, body.flexible] @ body.integrals.D[-4:-1].T

@@ -1,0 +1,150 @@
+"""Mechanisms, paths and plans that several test files share."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from paraflex.dynamics import build_system
+from paraflex.fem import ReferenceCondition
+from paraflex.kinematics import Polygon
+from paraflex.mechanism import (
+    Assembly,
+    EndEffector,
+    FlexibleBeam,
+    LumpedMass,
+    Material,
+    Mechanism,
+    Motor,
+    PointRef,
+    PrescribedAngle,
+    RevoluteJoint,
+    RigidBody,
+    SampledAngle,
+    Section,
+    raparm_i,
+)
+from paraflex.simulate import plan_tracking
+
+SQUARE = ((0.050, 0.314), (-0.050, 0.314), (-0.050, 0.214), (0.050, 0.214))
+# Soft enough that bending, stretching and inertia are of one magnitude in a random state.
+RUBBER = Material(youngs_modulus=5e6, density=1100.0)
+
+
+@pytest.fixture(scope="session")
+def raparm():
+    """RAParM-I with the reference set."""
+    return raparm_i()
+
+
+@pytest.fixture(scope="session")
+def square():
+    """The paper's path (section 6 of the formulation)."""
+    return Polygon(SQUARE, 40.0)
+
+
+@pytest.fixture(scope="session")
+def tracking(raparm, square):
+    """The paper's study, planned; every fifth of its 701 samples."""
+    return plan_tracking(raparm, square, duration=0.7, samples=141)
+
+
+@pytest.fixture(scope="session", params=list(ReferenceCondition), ids=lambda c: c.value)
+def condition(request):
+    """Each way of fixing the floating frame to a beam."""
+    return request.param
+
+
+def make_linkage(condition=ReferenceCondition.CANTILEVER):
+    """A linkage with one of everything, no two alike.
+
+    Two beams with lumps, one a beam with three points, and two rigid bodies with their masses off their origins;
+    the ground is side a of one joint and side b of another; one prescribed angle between two beams and one against
+    the ground; motors on the ground, between bodies and with a beam on side a.
+    """
+    crank = FlexibleBeam(
+        "crank",
+        0.3,
+        Section.rectangle(width=0.02, thickness=0.01),
+        RUBBER,
+        points={"O": 0.0, "P": 0.3},
+        elements=2,
+        lumps=(LumpedMass("O", 0.02, 1e-5), LumpedMass("P", 0.05, 4e-5)),
+        reference=condition,
+    )
+    coupler = FlexibleBeam(
+        "coupler",
+        0.7,
+        Section.rectangle(width=0.03, thickness=0.012),
+        RUBBER,
+        points={"P": 0.0, "Q": 0.45, "R": 0.7},
+        elements=(1, 2),
+        lumps=(LumpedMass("Q", 0.04, 2e-5), LumpedMass("R", 0.03, 3e-5)),
+        reference=condition,
+    )
+    rocker = RigidBody("rocker", 0.2, 3e-3, (0.1, 0.04), {"S": (-0.02, 0.01), "Q": (0.3, -0.05)})
+    flap = RigidBody("flap", 0.1, 1e-3, (-0.05, 0.02), {"R": (0.0, 0.1)})
+    ramp = SampledAngle(lambda t: 0.3 + np.sin(3 * t), lambda t: 3 * np.cos(3 * t), lambda t: -9 * np.sin(3 * t))
+    swing = SampledAngle(lambda t: 0.2 * t**2 - t, lambda t: 0.4 * t - 1, lambda t: 0.4 + 0 * t)
+    return Mechanism(
+        name="linkage",
+        ground={"O": (-0.2, 0.1), "S": (0.5, -0.15)},
+        bodies=(crank, coupler, rocker, flap),
+        joints=(
+            RevoluteJoint("O", PointRef("ground", "O"), PointRef("crank", "O")),
+            RevoluteJoint("P", PointRef("crank", "P"), PointRef("coupler", "P")),
+            RevoluteJoint("Q", PointRef("rocker", "Q"), PointRef("coupler", "Q")),
+            RevoluteJoint("S", PointRef("rocker", "S"), PointRef("ground", "S")),
+            RevoluteJoint("R", PointRef("coupler", "R"), PointRef("flap", "R")),
+        ),
+        motors=(Motor("base", "O"), Motor("knee", "P"), Motor("foot", "S"), Motor("hand", "R")),
+        prescribed=(PrescribedAngle("wave", "R", ramp), PrescribedAngle("turn", "S", swing)),
+    )
+
+
+@pytest.fixture(scope="session")
+def raparm_system(raparm, condition):
+    """RAParM-I as a system, under each reference condition."""
+    return build_system(raparm.with_beams(reference=condition))
+
+
+@pytest.fixture(scope="session")
+def linkage(condition):
+    """The linkage of `make_linkage` as a system, under each reference condition."""
+    return build_system(make_linkage(condition))
+
+
+@pytest.fixture(scope="session", params=["RAParM-I", "linkage"])
+def system(request, raparm_system, linkage):
+    """Each of the two above."""
+    return {"RAParM-I": raparm_system, "linkage": linkage}[request.param]
+
+
+def make_five_bar(base=0.1, proximal=0.25, distal=0.25):
+    """The traditional 5R: two motors at the base, arms A_i B_i C, the outward assembly first (rigid bodies)."""
+
+    def bar(name, length, points):
+        return RigidBody(name, 0.2 * length, 0.01 * length**3, (length / 2, 0.0), points)
+
+    bodies = tuple(
+        bar(f"{kind}{side}", length, {a: (0.0, 0.0), b: (length, 0.0)})
+        for side in "12"
+        for kind, length, a, b in (("proximal", proximal, f"A{side}", f"B{side}"), ("distal", distal, f"B{side}", "C"))
+    )
+    joints = []
+    for side in "12":
+        joints += [
+            RevoluteJoint(f"A{side}", PointRef("ground", f"A{side}"), PointRef(f"proximal{side}", f"A{side}")),
+            RevoluteJoint(f"B{side}", PointRef(f"proximal{side}", f"B{side}"), PointRef(f"distal{side}", f"B{side}")),
+        ]
+    joints.append(RevoluteJoint("C", PointRef("distal1", "C"), PointRef("distal2", "C")))
+    angles = {"proximal1": 2.16, "distal1": 0.25, "proximal2": 0.98, "distal2": 2.89}
+    return Mechanism(
+        name="5R",
+        ground={"A1": (-base, 0.0), "A2": (base, 0.0)},
+        bodies=bodies,
+        joints=tuple(joints),
+        motors=(Motor("left", "A1"), Motor("right", "A2")),
+        end_effector=EndEffector(PointRef("distal1", "C")),
+        assemblies=(Assembly("outward", angles),),
+    )
