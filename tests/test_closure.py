@@ -18,8 +18,10 @@ from paraflex.mechanism import (
     EndEffector,
     Mechanism,
     PointRef,
+    PrescribedAngle,
     RevoluteJoint,
     RigidBody,
+    SampledAngle,
 )
 
 # Both links of an arm of RAParM-I, stretched [m].
@@ -92,7 +94,7 @@ def test_the_assembly_stays_the_same_all_along_the_path(raparm, path, assembly):
     reason="follow_path walks through a Type I singularity that lies on no sample and comes out in another assembly",
 )
 def test_a_path_through_a_type_i_singularity_is_refused(raparm):
-    # C passes over A1, where arm 1 is folded and may leave with its twins.elbow on either side.
+    # C passes over A1, where arm 1 is folded and may leave with its elbow on either side.
     path = Line((-0.3, 0.0), (0.09, 0.0), 5.0)
     with pytest.raises(UnreachablePathError):
         follow_path(raparm, path, np.linspace(0.0, path.duration, 201))
@@ -253,6 +255,42 @@ def test_an_arm_of_three_links_carries_its_tool_upright():
         np.testing.assert_allclose(motion.q[k, [2, 5, 8]], [upper, lower, 1.3], rtol=0, atol=1e-12)
 
 
+def test_a_joint_driven_in_time_moves_the_rest_along():
+    # Two links: the first turned by a law, the tip at a given height; th2 = asin((y - l1 sin th1)/l2).
+    l1, l2 = 0.4, 0.3
+    law = SampledAngle(
+        lambda t: 0.6 + 0.4 * np.sin(9 * t), lambda t: 3.6 * np.cos(9 * t), lambda t: -32.4 * np.sin(9 * t)
+    )
+    arm2 = Mechanism(
+        "arm",
+        {"O": (0.1, 0.0)},
+        tuple(
+            RigidBody(name, 1.0, 0.01, (0.1, 0.0), {"a": (0.0, 0.0), "b": (length, 0.0)})
+            for name, length in (("upper", l1), ("lower", l2))
+        ),
+        (
+            RevoluteJoint("O", PointRef("ground", "O"), PointRef("upper", "a")),
+            RevoluteJoint("E", PointRef("upper", "b"), PointRef("lower", "a")),
+        ),
+        prescribed=(PrescribedAngle("drive", "O", law),),
+        end_effector=EndEffector(PointRef("lower", "b"), ("y",)),
+        assemblies=(Assembly("right", {"upper": 0.6, "lower": 0.2}),),
+    )
+    path = Line((0.0, 0.25), (0.0, 0.4), 2.0)
+    times = np.linspace(0.0, path.duration, 21)
+    motion = follow_path(arm2, path, times)
+    for k, (y, dy, ddy) in enumerate(np.array(path.evaluate(times))[:, :, 1].T):
+        th1, w1, e1 = law.evaluate(times[k])
+        th2 = np.arcsin((y - l1 * np.sin(th1)) / l2)
+        w2 = (dy - l1 * np.cos(th1) * w1) / (l2 * np.cos(th2))
+        e2 = (ddy - l1 * (np.cos(th1) * e1 - np.sin(th1) * w1**2) + l2 * np.sin(th2) * w2**2) / (l2 * np.cos(th2))
+        # The law reaches the solver as quintic pieces that take their one-sided limits 1e-12 of the run inside
+        # its ends: 4 rad/s times that. Derivatives have rounding errors of 1e-16/h^2, h some 5e-4 s.
+        np.testing.assert_allclose(motion.q[k, [2, 5]], [th1, th2], rtol=0, atol=2e-11)
+        np.testing.assert_allclose(motion.v[k, [2, 5]], [w1, w2], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(motion.a[k, [2, 5]], [e1, e2], rtol=0, atol=1e-7)
+
+
 # --- Errors --------------------------------------------------------------------------------------------------------
 
 
@@ -266,7 +304,7 @@ def test_a_path_out_of_reach_says_when_and_where_and_keeps_what_was_reached(rapa
     # C is as far from one of the bases as its arm is long, found on the path without the code.
     direction = np.array(end) - start
     s = np.linspace(0.0, 1.0, 2001)
-    far = np.max([np.linalg.norm(start + s[:, None] * direction - base, axis=1) for base in BASES], axis=0)
+    far = np.max([np.linalg.norm(start + s[:, None] * direction - base, axis=1) for base in twins.BASES], axis=0)
     first = int(np.argmax(far > REACH))
     reach = s[first - 1] + (REACH - far[first - 1]) / (far[first] - far[first - 1]) * (s[1] - s[0])
     law = TrapezoidalLaw(float(np.linalg.norm(direction)), 5.0)

@@ -113,4 +113,4 @@ def _singular_values(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]
     active = effort.matrix[:, :, effort.active(mode)]
     values = np.linalg.svd(active, compute_uv=False)
     missing = effort.required.shape[1] - values.shape[1]
-    return np.pad(values, ((0, 0), (0, max(0, missing))))
+    return np.pad(values, ((0, 0), (0, max(0, missing)))).astype(float)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from math import factorial
 
 import numpy as np
@@ -93,9 +94,7 @@ class TorquePlan:
         raise NumericalError(f'the torques of mode "{mode.name}" are too steep to interpolate: near a singularity')
 
 
-def plan_torques(
-    follow: Callable[[NDArray[np.float64]], RigidMotion], knots: NDArray[np.float64]
-) -> TorquePlan:
+def plan_torques(follow: Callable[[NDArray[np.float64]], RigidMotion], knots: NDArray[np.float64]) -> TorquePlan:
     """Efforts of a rigid motion on grids for `TorquePlan.feed_forward`.
 
     Parameters
@@ -105,10 +104,7 @@ def plan_torques(
     knots : (j,) array
         Times between which the motion is smooth, its start and end among them [s].
     """
-    stretches = [
-        np.linspace(a, b, max(_FEWEST, int(np.ceil((b - a) / _SPACING)) + 1))
-        for a, b in zip(knots, knots[1:], strict=False)
-    ]
+    stretches = [np.linspace(a, b, max(_FEWEST, int(np.ceil((b - a) / _SPACING)) + 1)) for a, b in pairwise(knots)]
     times = np.unique(np.concatenate(stretches))
     return TorquePlan(
         required_effort(follow(times)), required_effort(follow(_with_middles(times))), np.asarray(knots), follow
@@ -123,7 +119,7 @@ def _splines(t: NDArray[np.float64], values: NDArray[np.float64], knots: NDArray
     """A quintic spline of each column between neighbouring knots, joined."""
     breaks, coefficients = [], []
     edges = np.searchsorted(t, knots)
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in pairwise(edges):
         spline = scipy.interpolate.make_interp_spline(t[a : b + 1], values[a : b + 1], k=_DEGREE)
         start = np.unique(spline.t)[:-1]
         breaks.append(start)

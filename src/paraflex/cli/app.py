@@ -21,7 +21,10 @@ BAD_INPUT, TROUBLE, INTERRUPTED = 2, 1, 130
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 PathOption = Annotated[
-    str | None, typer.Option("--path", metavar="NAME|FILE", help="A path of the model (square, line, circle, ...) or a TOML file with one.")
+    str | None,
+    typer.Option(
+        "--path", metavar="NAME|FILE", help="A path of the model (square, line, circle, ...) or a TOML file with one."
+    ),
 ]
 Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
 
@@ -59,7 +62,9 @@ def run(
     tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance of the integration.")] = None,
     duration: Annotated[float | None, typer.Option(metavar="S", help="Duration, dwell included.")] = None,
     samples: Annotated[int | None, typer.Option(metavar="N", help="Samples kept.")] = None,
-    assembly: Annotated[str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")] = None,
+    assembly: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")
+    ] = None,
     alpha: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient alpha.")] = None,
     beta: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient beta.")] = None,
     max_steps: Annotated[int | None, typer.Option(metavar="N", help="Steps before a run is given up.")] = None,

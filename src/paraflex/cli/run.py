@@ -189,24 +189,25 @@ def _simulate(
 
 
 def _folder(out: str) -> Path:
-    """The results folder, made if need be and proved writable."""
+    """The results folder, proved writable; nothing is left of the proof until there are results."""
     folder = Path(out)
-    probe = folder / ".paraflex-writable"
     made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".paraflex-writable"
         probe.touch()
         probe.unlink()
     except OSError as error:
-        for parent in made:
-            if parent.is_dir() and not any(parent.iterdir()):
-                parent.rmdir()
         raise OutputError(
             f"cannot be written ({(error.strerror or str(error)).lower()})",
             field="--out",
             value=out,
             remedy="choose another folder",
         ) from error
+    finally:
+        for parent in made:
+            if parent.is_dir() and not any(parent.iterdir()):
+                parent.rmdir()
     return folder
 
 
@@ -214,6 +215,7 @@ def _write(result: StudyResult, folder: Path) -> None:
     from paraflex.plots import save_figures
 
     assert result.data is not None
+    folder.mkdir(parents=True, exist_ok=True)
     save_results(result.data, folder / "results.nc")
     unfinished = folder / "summary.json.part"
     unfinished.write_text(json.dumps(summary(result.data, result.failed), indent=2) + "\n", encoding="utf-8")

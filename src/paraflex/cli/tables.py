@@ -20,7 +20,9 @@ def plain_console(*, stderr: bool = False) -> Console:
 def study_table(figures: dict[str, Any], task: TrackingTask) -> Table:
     """Tracking error and peak torques of every mode, and what the solver did."""
     motors = [motor.name for motor in task.mechanism.motors]
-    table = Table(title=f"{figures['mechanism']}: tracking error and peak torques", title_justify="left", box=box.SIMPLE)
+    table = Table(
+        title=f"{figures['mechanism']}: tracking error and peak torques", title_justify="left", box=box.SIMPLE
+    )
     table.add_column("mode")
     for heading in ("error\n[m]", *(f"{motor}\n[N m]" for motor in motors), "vibration\n[m]", "steps\n", "wall\n[s]"):
         table.add_column(heading, justify="right", no_wrap=True)

@@ -1,8 +1,16 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker
 from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
-from paraflex.dynamics.state import State, consistent_state, momentum, project_position, project_velocity, reference_pose
-from paraflex.dynamics.system import BodyCoordinates, Marker, System, build_system
+from paraflex.dynamics.state import (
+    State,
+    consistent_state,
+    momentum,
+    project_position,
+    project_velocity,
+    reference_pose,
+)
+from paraflex.dynamics.system import System, build_system
 
 __all__ = [
     "BodyCoordinates",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +80,7 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
         edges = np.array([0.0, *inner, end])
         # The law may jump in a derivative at a knot: pieces on either side take its one-sided limits.
         parts = []
-        for a, b in zip(edges, edges[1:], strict=False):
+        for a, b in pairwise(edges):
             count = max(8, round(_LAW_PIECES * (b - a) / end))
             t = np.linspace(a, b, count + 1)
             inside = t.copy()

@@ -112,6 +112,7 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     """
     q = q.copy()
     zero = np.zeros(system.n)
+    phi = np.zeros(system.m)
     for _ in range(_MAX_ITERATIONS):
         phi, _ = system.constraints(signals, t, q, zero)
         if np.max(np.abs(phi), initial=0.0) < CLOSED:

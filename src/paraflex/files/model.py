@@ -113,10 +113,16 @@ class Model:
         """
         wanted = name or self.study.path or next(iter(self.paths), None)
         if wanted is None:
-            raise InputError("the model has no path", field="path", remedy="add a [path.NAME] table", source=self.source)
+            raise InputError(
+                "the model has no path", field="path", remedy="add a [path.NAME] table", source=self.source
+            )
         if wanted not in self.paths:
             raise InputError(
-                "unknown path", field="path", value=wanted, remedy=_choices(wanted, list(self.paths)), source=self.source
+                "unknown path",
+                field="path",
+                value=wanted,
+                remedy=_choices(wanted, list(self.paths)),
+                source=self.source,
             )
         return self.paths[wanted]
 
@@ -199,9 +205,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
 
 def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
     if study.path is not None and study.path not in paths:
-        raise InputError(
-            "unknown path", field="study.path", value=study.path, remedy=_choices(study.path, list(paths))
-        )
+        raise InputError("unknown path", field="study.path", value=study.path, remedy=_choices(study.path, list(paths)))
     for mode in study.modes:
         try:
             parse_mode(mechanism, mode)

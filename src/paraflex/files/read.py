@@ -61,8 +61,7 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
 
 
 def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
-    # A misspelt name explains the missing one beside it; otherwise the shallowest problem is the plainest.
-    problem = min(error.errors(), key=lambda d: (not _is_misspelt(schema, data, d), len(d["loc"])))
+    problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
     location = _fields(problem)
     field = ".".join(str(part) for part in location)
     model, description = _look_up(schema, data, location)
@@ -88,13 +87,17 @@ def _fields(problem: Any) -> list:
     return [part for part in problem["loc"] if not _is_variant(part, problem["loc"])]
 
 
-def _is_misspelt(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> bool:
-    """Whether an error is an unknown field with a name close to a known one."""
-    if problem["type"] != "extra_forbidden":
-        return False
+def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
+    """How well a problem explains itself: a misspelt name best, for it explains the missing one beside it."""
     location = _fields(problem)
     model, _ = _look_up(schema, data, location)
-    return model is not None and bool(get_close_matches(str(location[-1]), list(model.model_fields), n=1))
+    known = set(model.model_fields) if model is not None else set()
+    name = str(location[-1])
+    if problem["type"] == "extra_forbidden":
+        if name in known:  # said by another variant of a union than the one that is meant
+            return 2
+        return 0 if get_close_matches(name, list(known), n=1) else 1
+    return 2 if problem["type"] == "missing" and name not in known else 1
 
 
 def _is_variant(part: Any, location: tuple) -> bool:

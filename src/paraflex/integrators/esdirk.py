@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from paraflex.dynamics import State, System
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.integrators.tableaux import TR_BDF2
-from paraflex.kernel.march import (
+from paraflex.kernel.linear import factor_system
+from paraflex.kernel.march import march, start
+from paraflex.kernel.packed import Signals
+from paraflex.kernel.run_state import (
     BALANCE,
-    CAUSE,
     DPHI_MAX,
     ERROR_TEST,
     FACTORS,
@@ -36,10 +38,7 @@ from paraflex.kernel.march import (
     Samples,
     Tableau,
     make_march,
-    march,
-    start,
 )
-from paraflex.kernel.packed import Signals
 
 # Attempted steps between two looks: some milliseconds for a dozen bodies.
 _SLICE = 200
@@ -49,7 +48,7 @@ _FIRST_STEP = 1e-6
 # than its share of one step, since it is of one sign while a factor is in use.
 _NEWTON_MEMORY = 0.002
 # A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average.
-_MEMORY = 0.1
+_MEMORY = 0.25
 _CAUSES = {
     NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
     SINGULAR: "the constraints lose rank (singular position)",
@@ -221,7 +220,7 @@ def integrate(
     code = start(*arguments, state, workspace, samples)
     try:
         while code == PAUSED:
-            attempts = int(state.count[STEPS] + state.count[REJECTED])
+            attempts = int(state.counts[STEPS] + state.counts[REJECTED])
             if attempts >= options.max_steps:
                 break
             code = march(*arguments, stops, min(_SLICE, options.max_steps - attempts), state, workspace, slow, samples)
@@ -233,14 +232,12 @@ def integrate(
     if code == FINISHED or status == "interrupted":
         return solution
     cause = f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code]
-    moment = Moment(float(state.clock[TIME]), int(state.count[STEPS]))
+    moment = Moment(float(state.clock[TIME]), int(state.counts[STEPS]))
     raise IntegrationError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
 
 
 def dependent_rows(system: System, q: NDArray[np.float64]) -> int:
     """Number of constraint rows that follow from the others at q: redundant constraints."""
-    from paraflex.kernel.linear import factor_system
-
     return int(factor_system(system.packed, 0.0, q, system.workspace()))
 
 
@@ -257,7 +254,7 @@ def _samples(times: NDArray[np.float64], system: System) -> Samples:
 
 
 def _solution(samples: Samples, state: March, wall_time: float, status: str, message: str) -> Solution:
-    reached = slice(0, int(state.count[SAMPLE]))
+    reached = slice(0, int(state.counts[SAMPLE]))
     return Solution(
         t=samples.times[reached],
         q=samples.q[reached],
@@ -269,10 +266,10 @@ def _solution(samples: Samples, state: March, wall_time: float, status: str, mes
         work=samples.energy[reached, 2],
         status=status,
         message=message,
-        steps=int(state.count[STEPS]),
-        rejected=int(state.count[REJECTED]),
-        newton_iterations=int(state.count[ITERATIONS]),
-        factorisations=int(state.count[FACTORS]),
+        steps=int(state.counts[STEPS]),
+        rejected=int(state.counts[REJECTED]),
+        newton_iterations=int(state.counts[ITERATIONS]),
+        factorisations=int(state.counts[FACTORS]),
         wall_time=wall_time,
         constraint_position_max=float(state.clock[PHI_MAX]),
         constraint_velocity_max=float(state.clock[DPHI_MAX]),

@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from paraflex.kernel.march import Tableau
+from paraflex.kernel.run_state import Tableau
 
 # TR-BDF2 (Bank et al. 1985, as an ESDIRK by Hosea and Shampine 1996). The trapezoidal rule leads to gamma h, the
 # second backward difference formula from there to h; gamma = 2 - sqrt 2 gives both stages one diagonal,

@@ -69,7 +69,7 @@ def factor_body(p, i, b, q, ws):
 
 @inlined
 def solve_body(p, i, ws, y, x, at):
-    """x = (M + b K)^-1 y of body i in its body frame; y and x hold 3 + nf entries from `at` on, and may be one."""
+    """X = (M + b K)^-1 y of body i in its body frame; y and x hold 3 + nf entries from `at` on, and may be one."""
     body = p.bodies[i]
     n, k = body.nf, body.flex
     fr = ws.frame[i]

@@ -9,26 +9,50 @@ that an undamped axial mode would dictate the step.
 from __future__ import annotations
 
 from math import isfinite
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.bodies import system_energy
 from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.joints import constraint_values, marker_angle
-from paraflex.kernel.linear import factor_bodies, factor_system, jacobian_times, mass_norm, mass_times, orient, solve_system, to_body_frame, to_ground_frame
+from paraflex.kernel.linear import (
+    factor_bodies,
+    factor_system,
+    jacobian_times,
+    mass_norm,
+    mass_times,
+    orient,
+    solve_system,
+    to_body_frame,
+    to_ground_frame,
+)
 from paraflex.kernel.packed import OMEGA2
+from paraflex.kernel.run_state import (
+    AGE,
+    BALANCE,
+    DPHI_MAX,
+    ENERGY_0,
+    ERROR_TEST,
+    FACTOR_G,
+    FACTORS,
+    FAILURES,
+    FINISHED,
+    ITERATIONS,
+    NO_CONVERGENCE,
+    NOT_FINITE,
+    PAUSED,
+    PHI_MAX,
+    RATE,
+    REJECTED,
+    SAMPLE,
+    SINGULAR,
+    STEP,
+    STEPS,
+    STOP,
+    TIME,
+    WORK,
+)
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.stage import CONVERGED, WORST_RATE, equations, solve_stage
-
-# Why `march` returned.
-PAUSED, FINISHED, NO_CONVERGENCE, SINGULAR, NOT_FINITE, ERROR_TEST = range(6)
-# March.clock
-TIME, STEP, LAST_STEP, WORK, FACTOR_G, RATE, ENERGY_0, BALANCE, PHI_MAX, DPHI_MAX = range(10)
-# March.count
-STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES, CAUSE = range(9)
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
 # A new step this close to the old one is not worth a new factorisation.
@@ -39,89 +63,6 @@ ENOUGH_ITERATIONS, SERVED = 2, 5
 SLOW_AGE = 25
 # The smallest step, as a fraction of the time span.
 MIN_STEP = 1e-12
-
-
-class Tableau(NamedTuple):
-    """An ESDIRK scheme: A, c, the difference b - b^ of the embedded formula, and where dense output may join."""
-
-    A: NDArray[np.float64]
-    c: NDArray[np.float64]
-    error: NDArray[np.float64]
-    dense: NDArray[np.int64]  # stages accurate enough to interpolate between, first and last among them
-    order: int
-
-
-class Controls(NamedTuple):
-    """What the user chooses of a run.
-
-    `rate` is the error allowed per second [m/s]: local errors of a run of duration T add up to the tolerance
-    when each step's stays below tolerance h / T.
-    """
-
-    rate: float
-    newton_fraction: float  # of the error allowed in a step, the part left to Newton
-    newton_memory: float  # how long a velocity error left by Newton is taken to last [s]
-    memory: float  # how long a velocity error of a step does, where no vibration turns it round [s]
-    alpha: float
-    beta: float
-    max_step: float
-    dependent_rows: int
-
-
-class March(NamedTuple):
-    """The state of a run between calls, and its scratch."""
-
-    clock: NDArray[np.float64]
-    count: NDArray[np.int64]
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
-    stage_t: NDArray[np.float64]  # (2, stages): of the last accepted step and of this one
-    stage_q: NDArray[np.float64]  # (stages, n)
-    stage_v: NDArray[np.float64]
-    stage_a: NDArray[np.float64]  # (2, stages, n)
-    stage_lam: NDArray[np.float64]  # (stages, m)
-    power: NDArray[np.float64]  # (stages,)
-    qs: NDArray[np.float64]
-    vs: NDArray[np.float64]
-    eq: NDArray[np.float64]
-    ev: NDArray[np.float64]
-    torques: NDArray[np.float64]
-    guess_t: NDArray[np.float64]  # (3,) times of the stages a guess is extrapolated from
-    guess_s: NDArray[np.int64]  # (3, 2) and where they stand in stage_a
-
-
-class Samples(NamedTuple):
-    """Dense output: times asked for and what stood there."""
-
-    times: NDArray[np.float64]
-    q: NDArray[np.float64]  # (times, n)
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
-    lam: NDArray[np.float64]  # (times, m)
-    energy: NDArray[np.float64]  # (times, 3): kinetic, strain, work done by motors and prescribed motion
-
-
-def make_march(n: int, m: int, stages: int, motors: int) -> March:
-    """Allocate the state of a run with n coordinates and m constraint rows."""
-    return March(
-        clock=np.zeros(10),
-        count=np.zeros(9, dtype=np.int64),
-        q=np.zeros(n),
-        v=np.zeros(n),
-        stage_t=np.zeros((2, stages)),
-        stage_q=np.zeros((stages, n)),
-        stage_v=np.zeros((stages, n)),
-        stage_a=np.zeros((2, stages, n)),
-        stage_lam=np.zeros((stages, m)),
-        power=np.zeros(stages),
-        qs=np.zeros(n),
-        vs=np.zeros(n),
-        eq=np.zeros(n),
-        ev=np.zeros(n),
-        torques=np.zeros(motors),
-        guess_t=np.zeros(3),
-        guess_s=np.zeros((3, 2), dtype=np.int64),
-    )
 
 
 @kernel
@@ -154,7 +95,7 @@ def interpolate(q0, v0, a0, q1, v1, a1, h, x):
 def write_samples(p, tableau, t, h, m, out):
     """Fill every sample time within the accepted step from t to t + h."""
     piece = 0
-    i = m.count[SAMPLE]
+    i = m.counts[SAMPLE]
     while i < out.times.size and out.times[i] <= t + h * (1.0 + 1e-12):
         time = out.times[i]
         while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
@@ -176,7 +117,7 @@ def write_samples(p, tableau, t, h, m, out):
             (1.0 - 0.5 * done) * m.power[0] + 0.5 * done * m.power[m.power.size - 1]
         )
         i += 1
-    m.count[SAMPLE] = i
+    m.counts[SAMPLE] = i
 
 
 @kernel
@@ -189,7 +130,7 @@ def predict(tableau, i, t, h, m):
         if found < 3:
             times[found], rows[found, 0], rows[found, 1] = m.stage_t[1, j], 1, j
             found += 1
-    if m.count[STEPS] > 0:
+    if m.counts[STEPS] > 0:
         for j in range(stages - 2, -1, -1):
             if found < 3:
                 times[found], rows[found, 0], rows[found, 1] = m.stage_t[0, j], 0, j
@@ -232,7 +173,6 @@ def start(p, signals, tableau, controls, m, ws, out):
     """First stage and first sample of a run."""
     t = m.clock[TIME]
     if first_stage(p, signals, t, controls, m, ws) != controls.dependent_rows:
-        m.count[CAUSE] = SINGULAR
         return SINGULAR
     a, lam = m.stage_a[1, 0], m.stage_lam[0]
     m.stage_t[1, 0] = t
@@ -248,7 +188,7 @@ def start(p, signals, tableau, controls, m, ws, out):
         copy(a, out.a[0])
         copy(lam, out.lam[0])
         out.energy[0, 0], out.energy[0, 1], out.energy[0, 2] = kinetic, strain, 0.0
-        m.count[SAMPLE] = 1
+        m.counts[SAMPLE] = 1
     return PAUSED
 
 
@@ -285,7 +225,7 @@ def filtered_error(p, tableau, h, controls, m, ws, slow):
     for j in range(m.q.size):
         m.eq[j] += g * ws.x[j]
     position = mass_norm(p, ws, m.eq)
-    if m.count[STEPS] % SLOW_AGE == 0:
+    if m.counts[STEPS] % SLOW_AGE == 0:
         factor_system(p, controls.memory * controls.memory, m.q, slow)
     for j in range(m.q.size):
         m.eq[j] = 0.0
@@ -320,8 +260,8 @@ def filter_error(p, g, controls, eq, ev, ws):
 def renew_factor(p, g, m, ws):
     """Factor the bodies for stages of this g at the present deformation."""
     factor_bodies(p, g * g, m.q, ws)
-    m.count[FACTORS] += 1
-    m.clock[FACTOR_G], m.clock[RATE], m.count[AGE] = g, WORST_RATE, 0
+    m.counts[FACTORS] += 1
+    m.clock[FACTOR_G], m.clock[RATE], m.counts[AGE] = g, WORST_RATE, 0
 
 
 @kernel
@@ -362,7 +302,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
             p, signals, m.stage_t[1, i], g, b, controls.alpha, controls.beta, m.qs, m.vs,
             m.stage_a[1, i], m.stage_lam[i], m.torques, tolerance, controls.newton_memory, m.clock[RATE], ws,
         )  # fmt: skip
-        m.count[ITERATIONS] += iterations
+        m.counts[ITERATIONS] += iterations
         m.clock[RATE] = rate
         if status != CONVERGED:
             if fresh:
@@ -379,7 +319,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
         m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques)
         i += 1
     error_q, error_v = filtered_error(p, tableau, h, controls, m, ws, slow)
-    if slowest > ENOUGH_ITERATIONS and m.count[AGE] >= SERVED:
+    if slowest > ENOUGH_ITERATIONS and m.counts[AGE] >= SERVED:
         m.clock[FACTOR_G] = -1.0
     error = max(error_q, error_v) / (controls.rate * h)
     if not isfinite(error):
@@ -405,10 +345,9 @@ def accept(p, signals, tableau, t, h, m, ws, out):
     copy(m.stage_a[0, last], m.stage_a[1, 0])
     copy(m.stage_lam[last], m.stage_lam[0])
     m.power[0] = m.power[last]
-    m.count[STEPS] += 1
-    m.count[AGE] += 1
-    m.count[FAILURES] = 0
-    m.clock[LAST_STEP] = h
+    m.counts[STEPS] += 1
+    m.counts[AGE] += 1
+    m.counts[FAILURES] = 0
     kinetic, strain = system_energy(p, m.q, m.v)
     balance = abs(kinetic + strain - m.clock[ENERGY_0] - m.clock[WORK])
     m.clock[BALANCE] = max(m.clock[BALANCE], balance)
@@ -428,11 +367,11 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
     span = stops[stops.size - 1]
     for _ in range(max_steps):
         t = m.clock[TIME]
-        while m.count[STOP] < stops.size and stops[m.count[STOP]] <= t:
-            m.count[STOP] += 1
-        if m.count[STOP] == stops.size:
+        while m.counts[STOP] < stops.size and stops[m.counts[STOP]] <= t:
+            m.counts[STOP] += 1
+        if m.counts[STOP] == stops.size:
             return FINISHED
-        left = stops[m.count[STOP]] - t
+        left = stops[m.counts[STOP]] - t
         h = min(m.clock[STEP], controls.max_step)
         landing = False
         if left <= h * (1.0 + 1e-9):
@@ -441,26 +380,25 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
             h = 0.5 * left
         cause, error = attempt(p, signals, tableau, controls, t, h, m, ws, slow)
         if cause == PAUSED and error <= 1.0:
-            after_failure = m.count[FAILURES] > 0
+            after_failure = m.counts[FAILURES] > 0
             accept(p, signals, tableau, t, h, m, ws, out)
-            m.clock[TIME] = stops[m.count[STOP]] if landing else t + h
+            m.clock[TIME] = stops[m.counts[STOP]] if landing else t + h
             factor = min(MAX_FACTOR, SAFETY * (1.0 / max(error, 1e-12)) ** exponent)
             # Keep the step, and with it the factor, unless the change is worth it; a step cut short to land on a stop
             # says nothing about longer ones.
             if factor < KEEP_ABOVE or (factor > KEEP_BELOW and h >= m.clock[STEP] and not after_failure):
                 m.clock[STEP] = factor * h
             continue
-        m.count[REJECTED] += 1
-        if m.count[FAILURES] == 1:
+        m.counts[REJECTED] += 1
+        if m.counts[FAILURES] == 1:
             # The first stage is the last step's last, with the error its longer step could bear: not so a shorter one.
             first_stage(p, signals, t, controls, m, ws)
-        m.count[FAILURES] += 1
+        m.counts[FAILURES] += 1
         if cause == PAUSED:
             cause = ERROR_TEST
             m.clock[STEP] = h * max(MIN_FACTOR, SAFETY * (1.0 / error) ** exponent)
         else:
             m.clock[STEP] = h * MIN_FACTOR
         if m.clock[STEP] < MIN_STEP * span:
-            m.count[CAUSE] = cause
             return cause
     return PAUSED

@@ -174,6 +174,7 @@ class _Closure:
         """Move the end-effector from where the assembly has it to the start of the path, staying in that assembly."""
         goal = self.target(path.evaluate(np.array([start])))[0, 0]
         here = self.task(pose)
+        residual = 0.0
         for steps in _APPROACHES:
             fractions = np.linspace(0.0, 1.0, steps + 1)
             target = np.zeros((3, steps + 1, goal.size))
@@ -191,7 +192,13 @@ class _Closure:
         status, index, residual, (q, v, a, basis) = self.run(grid, target, pose)
         done = keep[:index]
         motion = RigidMotion(
-            self.system, path, grid[:index][done], q[:index][done], v[:index][done], a[:index][done], basis[:index][done]
+            self.system,
+            path,
+            grid[:index][done],
+            q[:index][done],
+            v[:index][done],
+            a[:index][done],
+            basis[:index][done],
         )
         if status == CLOSED:
             return motion
@@ -208,5 +215,3 @@ def _with_marker(system: System, ref) -> tuple[PackedSystem, int]:
     record["body"], record["x"], record["y"] = marker.body, *marker.x0
     markers = np.concatenate([system.packed.markers, record])
     return system.packed._replace(markers=markers), markers.size - 1
-
-

@@ -113,7 +113,7 @@ class Polygon:
         return PathMotion(position, velocity, acceleration)
 
 
-def Line(start: Sequence[float], end: Sequence[float], max_acceleration: float) -> Polygon:  # noqa: N802
+def Line(start: Sequence[float], end: Sequence[float], max_acceleration: float) -> Polygon:
     """A straight line from rest to rest: a polygon of one segment.
 
     Parameters
@@ -155,7 +155,9 @@ class Circle:
         if not (np.isfinite(self.radius) and self.radius > 0.0):
             raise InputError("must be positive", field="radius", value=self.radius, remedy="give it in metres")
         if not np.isfinite(self.start_angle):
-            raise InputError("not a finite number", field="start_angle", value=self.start_angle, remedy="give it in rad")
+            raise InputError(
+                "not a finite number", field="start_angle", value=self.start_angle, remedy="give it in rad"
+            )
         if not (np.isfinite(self.sweep) and self.sweep != 0.0):
             raise InputError("no angle to sweep", field="sweep", value=self.sweep, remedy="give it in rad, not zero")
         _acceleration(self.max_acceleration)

@@ -128,9 +128,7 @@ class Mechanism:
         beams = [self.body(name) for name in names]
         return self.with_bodies(beam.as_rigid() for beam in beams if isinstance(beam, FlexibleBeam))
 
-    def with_beams(
-        self, *, elements: int | None = None, reference: ReferenceCondition | None = None
-    ) -> Mechanism:
+    def with_beams(self, *, elements: int | None = None, reference: ReferenceCondition | None = None) -> Mechanism:
         """The mechanism with another mesh or reference condition on every flexible beam.
 
         Parameters

@@ -39,19 +39,20 @@ def peak(values: ArrayLike) -> float:
 
 
 def three_digits(value: float) -> str:
-    """A value to three significant digits: 48.0, 0.377, 120."""
-    return f"{value:#.3g}".rstrip(".")
+    """A value to three significant digits: 48.0, 0.377, 120; 0."""
+    return f"{value:#.3g}".rstrip(".") if value else "0"
 
 
 def symbol(name: str) -> str:
-    """A name as print shows it: "A1" and "tau1" with a subscript, "link1" as "link 1", others unchanged."""
-    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d+)", name)
+    """A name as print shows it: "A1" and "tau1" as symbols with a subscript, "link1" as "link 1", others unchanged."""
+    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
     if parts is None:
         return name.replace("$", r"\$")
     letters, number = parts.groups()
-    if letters in _GREEK:
-        return rf"$\{letters}_{{{number}}}$"
-    return rf"${letters}_{{{number}}}$" if len(letters) == 1 else f"{letters} {number}"
+    if len(letters) == 1 or letters in _GREEK:
+        letter = letters if len(letters) == 1 else rf"\{letters}"
+        return rf"${letter}_{{{number}}}$" if number else f"${letter}$"
+    return f"{letters} {number}".rstrip()
 
 
 def mode_label(name: str) -> str:

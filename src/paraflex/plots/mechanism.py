@@ -27,6 +27,7 @@ JOINT: dict[str, Any] = {
     "markeredgewidth": 0.8,
     "zorder": 3.0,
 }
+POINT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
 # A triangle on a base line, hanging from the pivot.
 _SUPPORT = Path(
     [(0.0, 0.0), (-0.7, -1.2), (0.7, -1.2), (0.0, 0.0), (-1.1, -1.2), (1.1, -1.2)],
@@ -41,6 +42,7 @@ GROUND: dict[str, Any] = {
     "markeredgewidth": 0.6,
     "zorder": 2.0,
 }
+IN_LEGEND: dict[str, Any] = {**GROUND, "markersize": 9.0}  # As high as one of its lines.
 
 # Points this near to each other, or moving this little, share of the mechanism's size: constraints hold no better.
 _SAME = 1e-4
@@ -75,10 +77,18 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
     fixed = moves <= _SAME * size if moves.max() > _SAME * size else np.zeros(len(names), dtype=bool)
     taken = [*map(_sampled, outlines), clear_of]
     if fixed.any():
-        axes.plot(*places[0, fixed].T, label="ground", **GROUND)
+        axes.plot(*places[0, fixed].T, **GROUND)
+        axes.plot([], [], label="ground", **IN_LEGEND)
+        axes.update_datalim(places[0, fixed] - [0.0, 0.045 * size])
         taken += [places[0, fixed] - [0.0, depth * size] for depth in (0.02, 0.04)]
-    axes.plot(*places[0].T, label="joints", **JOINT)
-    _name_points(axes, places[0], names, np.vstack(taken), size)
+    groups = _coincident(places[0], size)
+    joints = [group[0] for group in groups if len(group) > 1 or fixed[group[0]]]
+    others = [group[0] for group in groups if group[0] not in joints]
+    if joints:
+        axes.plot(*places[0, joints].T, label="joints", **JOINT)
+    if others:
+        axes.plot(*places[0, others].T, label="other points", **POINT)
+    _name_points(axes, places[0], groups, names, np.vstack(taken))
 
 
 def _outline(points: Points) -> Points:
@@ -97,22 +107,28 @@ def _sampled(outline: Points) -> Points:
     return np.vstack([a + share * (b - a) for a, b in pairwise(outline)] + [outline[:1]])
 
 
-def _name_points(axes: Axes, points: Points, names: list[str], taken: Points, size: float) -> None:
+def _coincident(points: Points, size: float) -> list[list[int]]:
+    """Indices of points, those at one place together."""
+    groups: dict[int, list[int]] = {}
+    for k, point in enumerate(points):
+        first = int(np.argmax(np.linalg.norm(points - point, axis=1) <= _SAME * size))
+        groups.setdefault(first, []).append(k)
+    return list(groups.values())
+
+
+def _name_points(axes: Axes, points: Points, groups: list[list[int]], names: list[str], taken: Points) -> None:
     """Write names beside points, each on the side with most room; points at one place share theirs."""
+    size = float(np.ptp(points, axis=0).max())
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    shared: dict[int, list[str]] = {}
-    for k, name in enumerate(names):
-        first = int(np.argmax(np.linalg.norm(points - points[k], axis=1) <= _SAME * size))
-        text = symbol(name.rpartition(".")[2])
-        if text not in shared.setdefault(first, []):
-            shared[first].append(text)
-    for k, texts in shared.items():
-        candidates = points[k] + 0.055 * size * directions
+    for group in groups:
+        point = points[group[0]]
+        texts = dict.fromkeys(symbol(names[k].rpartition(".")[2]) for k in group)
+        candidates = point + 0.055 * size * directions
         room = np.linalg.norm(candidates[:, None] - taken[None], axis=2).min(axis=1)
         best = int(np.argmax(room))
         right, up = directions[best]
-        x, y = points[k] + 0.025 * size * directions[best]
+        x, y = point + 0.025 * size * directions[best]
         axes.text(
             x,
             y,
@@ -122,4 +138,4 @@ def _name_points(axes: Axes, points: Points, names: list[str], taken: Points, si
             zorder=3.5,
         )
         taken = np.vstack([taken, candidates[best]])
-        axes.update_datalim([(points[k] + 0.08 * size * directions[best]).tolist()])
+        axes.update_datalim([(point + 0.08 * size * directions[best]).tolist()])

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.plots.labels import display_unit, mode_label, peak, symbol, three_digits
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, samples, select_run, shade_rest
 from paraflex.plots.style import (
     BLUE,
@@ -18,13 +19,12 @@ from paraflex.plots.style import (
     DASHES,
     VERMILLION,
     ZERO,
-    freeze_layout,
     journal_style,
     keep_flat,
-    label_outer_time,
-    panels,
-    shared_legend,
 )
+
+# Of a mode and the names of its passive motors, as many as fit above a panel.
+_TITLE_LETTERS = 26
 
 
 @journal_style()
@@ -51,7 +51,7 @@ def motor_torques(data: xr.Dataset) -> Figure:
                 torque = run["torque"].sel(motor=motor).values
                 look = {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k % len(DASHES)]}
                 if peak(torque) <= 1e-9 * scale:
-                    passive.append(symbol(str(motor)))
+                    passive.append(str(motor))
                     torque = np.full_like(torque, np.nan)  # Keeps its place in the legend.
                 panel.plot(time, torque, label=symbol(str(motor)), **look)
             panel.axhline(0.0, **ZERO)
@@ -59,12 +59,12 @@ def motor_torques(data: xr.Dataset) -> Figure:
             panel.set_ylim(-1.08 * scale or -1.0, 1.08 * scale or 1.0)
             panel.set_title(mode_label(name), loc="left")
             if passive:
-                text = ", ".join(passive) if len(passive) <= 4 else f"{len(passive)} motors"
-                panel.set_title(f"passive: {text}", loc="right")
+                short = len(name) + len(", ".join(passive)) <= _TITLE_LETTERS
+                listed = ", ".join(map(symbol, passive)) if short else f"{len(passive)} motors"
+                panel.set_title(f"passive: {listed}", loc="right")
         axes[row, 0].set_ylabel(r"torque $\tau$ [N m]")
     label_outer_time(axes)
-    shared_legend(figure)
-    return freeze_layout(figure)
+    return lay_out(figure, axes, panel_height=38.0)
 
 
 @journal_style()
@@ -92,8 +92,7 @@ def tracking_errors(data: xr.Dataset) -> Figure:
         panel.set_title(f"{mode_label(name)}: {_outcome(run)}")
         panel.set_ylabel(f"error [{unit.name}]")
     label_outer_time(axes)
-    shared_legend(figure)
-    return freeze_layout(figure)
+    return lay_out(figure, axes, panel_height=38.0)
 
 
 def _outcome(run: xr.Dataset) -> str:
@@ -110,7 +109,7 @@ def _mode_panels(count: int) -> tuple[Figure, NDArray[Any]]:
     """A panel for each mode, at most three beside one another; those left over are hidden."""
     columns = 2 if count == 4 else min(count, 3)
     rows = math.ceil(count / columns)
-    figure, axes = panels(rows, columns, height=16.0 + 42.0 * rows)
+    figure, axes = panels(rows, columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)
     for panel in axes.flat[count:]:
         panel.set_visible(False)
     return figure, np.asarray(axes)

@@ -29,6 +29,14 @@ STOPPED: dict[str, Any] = {
     "zorder": 3.0,
     "label": "the run stopped",
 }
+START: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "s",
+    "markersize": 4.5,
+    "color": BLACK,
+    "zorder": 4.0,
+    "label": "start",
+}
 
 
 def select_run(data: xr.Dataset, mode: str) -> xr.Dataset:

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
 from paraflex.plots.labels import display_unit, peak, symbol
+from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, draw_desired, run_label, select_run, shade_rest
-from paraflex.plots.style import freeze_layout, journal_style, keep_flat, label_outer_time, panels, shared_legend
+from paraflex.plots.style import journal_style, keep_flat
 
 # Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
 _ALIKE = 0.9
@@ -46,7 +47,7 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
         ("tip_transverse", "transverse displacement", "displacement", "m"),
         ("tip_slope", "slope", "slope", "rad"),
     )
-    figure, axes = panels(len(chosen), len(columns), height=16.0 + 38.0 * len(chosen))
+    figure, axes = panels(len(chosen), len(columns))
     for column, (variable, title, quantity, si_unit) in zip(axes.T, columns, strict=True):
         curves = [run[variable].sel(body=name).values for name in chosen]
         unit = display_unit(si_unit, curves)
@@ -57,8 +58,7 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
             panel.set_title(f"{symbol(name)}: {title}")
             panel.set_ylabel(f"{quantity} [{unit.name}]")
     label_outer_time(axes)
-    shared_legend(figure)
-    return freeze_layout(figure)
+    return lay_out(figure, axes, panel_height=34.0)
 
 
 def _most_deflected(run: xr.Dataset) -> list[str]:
@@ -98,7 +98,7 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
     )
     run, time = select_run(data, mode), data["time"].values
     bodies = data["body"].values
-    figure, axes = panels(len(bodies), len(columns), height=18.0 + 26.0 * len(bodies))
+    figure, axes = panels(len(bodies), len(columns))
     for column, (variable, title, label) in zip(axes.T, columns, strict=True):
         scale = float(np.ptp(run[f"{variable}_desired"].values, axis=0).max())
         for panel, body in zip(column, bodies, strict=True):
@@ -109,8 +109,7 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
             panel.set_title(f"{symbol(str(body))}: {title}")
             panel.set_ylabel(label)
     label_outer_time(axes)
-    shared_legend(figure)
-    return freeze_layout(figure)
+    return lay_out(figure, axes, panel_height=21.5)
 
 
 @journal_style()
@@ -136,7 +135,7 @@ def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
     )
     run, time = select_run(data, mode), data["time"].values
     directions = [str(axis) for axis in data["axis"].values]
-    figure, axes = panels(len(rows), len(directions), height=118.0)
+    figure, axes = panels(len(rows), len(directions))
     for row, (variable, label, factor) in zip(axes, rows, strict=True):
         desired = factor * run[f"{variable}_desired"]
         scale = float(np.ptp(desired.values, axis=0).max())
@@ -147,7 +146,6 @@ def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
             keep_flat(panel, scale)
             panel.set_ylabel(label.replace("{0}", axis))
     for panel, axis in zip(axes[0], directions, strict=True):
-        panel.set_title(f"{axis} direction")
+        panel.set_title(f"${axis}$ direction")
     label_outer_time(axes)
-    shared_legend(figure)
-    return freeze_layout(figure)
+    return lay_out(figure, axes, panel_height=33.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,27 +12,13 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.labels import peak
+from paraflex.plots.layout import ONE_COLUMN, equal_scales_height, lay_out, panels
 from paraflex.plots.mechanism import draw_mechanism
-from paraflex.plots.runs import draw_actual, draw_desired, run_label, select_run
-from paraflex.plots.style import (
-    BLACK,
-    BLUE,
-    ONE_COLUMN,
-    fit_height,
-    freeze_layout,
-    journal_style,
-    panels,
-    shared_legend,
-)
+from paraflex.plots.runs import START, draw_actual, draw_desired, run_label, select_run
+from paraflex.plots.style import BLUE, journal_style
 
-_START: dict[str, Any] = {
-    "linestyle": "none",
-    "marker": "s",
-    "markersize": 4.5,
-    "color": BLACK,
-    "zorder": 4.0,
-    "label": "start",
-}
+# Room round what is drawn, and the height of a panel beside its width, at least and at most.
+_MARGIN, _FLATTEST, _TALLEST = 0.06, 0.3, 1.3
 # The largest deviation is shown as at most this share of the path's extent.
 _SHOWN_DEVIATION = 0.15
 
@@ -51,7 +36,7 @@ def desired_path(data: xr.Dataset) -> Figure:
     figure, axes = _workspace_panel()
     axes.plot(*path.T, color=BLUE, linewidth=1.3, zorder=2.6, label="desired path")
     _draw_direction(axes, path)
-    axes.plot(*path[0], **_START)
+    axes.plot(*path[0], **START)
     draw_mechanism(axes, data, path)
     return _finish(figure, axes)
 
@@ -90,7 +75,7 @@ def end_effector_path(data: xr.Dataset, mode: str, magnification: float | None =
     figure, axes = _workspace_panel()
     draw_actual(axes, run, *shown.T, label=label)
     draw_desired(axes, *desired.T)
-    axes.plot(*desired[0], **_START)
+    axes.plot(*desired[0], **START)
     return _finish(figure, axes)
 
 
@@ -108,10 +93,9 @@ def _round_magnification(deviation: NDArray[np.float64], extent: float) -> float
 
 
 def _workspace_panel() -> tuple[Figure, Axes]:
-    figure, axes = panels(1, 1, width=ONE_COLUMN, height=ONE_COLUMN)
+    figure, axes = panels(1, 1, width=ONE_COLUMN)
     panel: Axes = axes[0, 0]
     panel.set_aspect("equal")
-    panel.margins(0.06)
     panel.set_xlabel("$x$ [mm]")
     panel.set_ylabel("$y$ [mm]")
     return figure, panel
@@ -134,6 +118,12 @@ def _draw_direction(axes: Axes, path: NDArray[np.float64]) -> None:
 
 
 def _finish(figure: Figure, axes: Axes) -> Figure:
-    shared_legend(figure)
-    fit_height(figure, axes)
-    return freeze_layout(figure)
+    """Frame what is drawn, with room round a path that is a line or a point, and lay the figure out."""
+    box = axes.dataLim
+    width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
+    width = max(width, height / _TALLEST) or 1.0
+    height = max(height, _FLATTEST * width)
+    middle_x, middle_y = box.x0 + 0.5 * box.width, box.y0 + 0.5 * box.height
+    axes.set_xlim(middle_x - 0.5 * width, middle_x + 0.5 * width)
+    axes.set_ylim(middle_y - 0.5 * height, middle_y + 0.5 * height)
+    return lay_out(figure, np.array([[axes]]), panel_height=equal_scales_height(figure, axes))

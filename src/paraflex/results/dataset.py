@@ -87,7 +87,7 @@ def tracking_dataset(
     system, motion = task.system, task.motion
     points = [PointRef(body.name, point) for body in task.mechanism.bodies for point in body.points]
     frames = [_frame(run, points) for run in runs]
-    data = {
+    data: dict[str, tuple] = {
         name: (("mode", "time", *frames[0][name][0]), np.stack([frame[name][1] for frame in frames]))
         for name in frames[0]
     }

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import xarray as xr
 
-from paraflex.errors import ActuationError, IntegrationError
+from paraflex.errors import IntegrationError, NumericalError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import tracking_dataset
@@ -45,6 +48,7 @@ def run_study(
     options: IntegrationOptions | None = None,
     parameters: dict | None = None,
     on_progress: Callable[[str, float], None] | None = None,
+    workers: int | None = None,
 ) -> StudyResult:
     """Simulate every mode; one that fails is reported and the others go on.
 
@@ -56,7 +60,9 @@ def run_study(
     parameters : dict, optional
         Kept as provenance.
     on_progress : callable, optional
-        Told the mode's name and the time reached [s].
+        Told the mode's name and the time reached [s]; called from several threads.
+    workers : int, optional
+        Threads; as many as there are processors by default. The results do not depend on it.
 
     Returns
     -------
@@ -68,25 +74,34 @@ def run_study(
         A mode that is none of the mechanism's, before anything runs.
     """
     chosen = list(dict.fromkeys(task.mode(mode) for mode in modes))
-    runs: list[TrackingRun] = []
-    failed: dict[str, str] = {}
-    interrupted = False
-    for mode in chosen:
+    stop = threading.Event()
 
-        def report(time: float, name: str = mode.name) -> None:
+    def run(mode: ActuationMode) -> TrackingRun | str | None:
+        def report(time: float) -> None:
+            if stop.is_set():
+                raise KeyboardInterrupt
             if on_progress is not None:
-                on_progress(name, time)
+                on_progress(mode.name, time)
 
+        if stop.is_set():
+            return None
         try:
-            runs.append(simulate(task, mode, options=options, on_progress=report))
-        except ActuationError as error:
-            failed[mode.name] = str(error)
+            return simulate(task, mode, options=options, on_progress=report)
         except IntegrationError as error:
-            runs.append(error.partial)
+            return error.partial
+        except NumericalError as error:
+            return str(error)
+
+    # The kernels release the GIL, so threads are enough; each run is the same whichever thread it is in.
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        futures = [pool.submit(run, mode) for mode in chosen]
+        try:
+            wait(futures)
         except KeyboardInterrupt:
-            interrupted = True
-        if interrupted or (runs and runs[-1].solution.status == "interrupted"):
-            interrupted = True
-            break
+            # Ctrl-C reaches the main thread only; the runs hear of it at their next report and keep what they have.
+            stop.set()
+    outcomes = {mode.name: future.result() for mode, future in zip(chosen, futures, strict=True)}
+    runs = [outcome for outcome in outcomes.values() if isinstance(outcome, TrackingRun)]
+    failed = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
     data = tracking_dataset(runs, options=options, parameters=parameters) if runs else None
-    return StudyResult(data, failed, interrupted)
+    return StudyResult(data, failed, stop.is_set())

@@ -1,0 +1,145 @@
+"""A body's coordinates and its material points: which slice of q is whose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.fem import (
+    BeamMesh,
+    Lump,
+    ModalBasis,
+    ShapeIntegrals,
+    SpanProperties,
+    beam_integrals,
+    mesh_beam,
+    modal_basis,
+    rigid_integrals,
+)
+from paraflex.mechanism import Body, Mechanism, PointRef, RigidBody
+
+GROUND_INDEX = -1
+
+
+@dataclass(frozen=True)
+class BodyCoordinates:
+    """Where a body's coordinates stand and what they mean.
+
+    Attributes
+    ----------
+    name : str
+    offset : int
+        Of r in q; phi follows at offset + 2, flexible coordinates from offset + 3.
+    integrals : ShapeIntegrals
+        In modal coordinates: u of the formulation is `modes.vectors @ q[flexible]`.
+    modes : ModalBasis
+    mesh : BeamMesh or None
+        None for a rigid body.
+    """
+
+    name: str
+    offset: int
+    integrals: ShapeIntegrals
+    modes: ModalBasis
+    mesh: BeamMesh | None
+
+    @property
+    def nf(self) -> int:
+        """Number of flexible coordinates."""
+        return self.integrals.nf
+
+    @property
+    def angle(self) -> int:
+        """Index of phi in q."""
+        return self.offset + 2
+
+    @property
+    def position(self) -> slice:
+        """Of r in q."""
+        return slice(self.offset, self.offset + 2)
+
+    @property
+    def flexible(self) -> slice:
+        """Of the modal coordinates in q."""
+        return slice(self.offset + 3, self.offset + 3 + self.nf)
+
+    @property
+    def all(self) -> slice:
+        """Of every coordinate of the body in q."""
+        return slice(self.offset, self.offset + 3 + self.nf)
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A material point: its place in the undeformed body and its shape rows in modal coordinates.
+
+    Attributes
+    ----------
+    body : int
+        Index of the body.
+    x0 : (2,) array
+        Body-frame position [m].
+    N : (2, nf) array
+        Displacement per modal coordinate.
+    slope : (nf,) array
+        Turn of the beam there per modal coordinate.
+    """
+
+    body: int
+    x0: NDArray[np.float64]
+    N: NDArray[np.float64]
+    slope: NDArray[np.float64]
+
+
+def body_coordinates(body: Body, offset: int) -> BodyCoordinates:
+    """Coordinates of a body that start at an offset in q.
+
+    Raises
+    ------
+    InputError
+        A mass matrix that is not positive definite.
+    """
+    if isinstance(body, RigidBody):
+        integrals = rigid_integrals(body.mass, body.centre_of_mass, body.inertia)
+        return BodyCoordinates(body.name, offset, integrals, modal_basis(integrals), None)
+    mesh = mesh_beam(body.length, body.points, body.elements)
+    span = SpanProperties(
+        mass_per_length=body.material.density * body.section.area,
+        axial_stiffness=body.material.youngs_modulus * body.section.area,
+        bending_stiffness=body.material.youngs_modulus * body.section.second_moment,
+    )
+    spans = [span] * (int(mesh.spans[-1]) + 1)
+    lumps = [Lump(mesh.points[lump.point], lump.mass, lump.inertia) for lump in body.lumps]
+    try:
+        integrals = beam_integrals(mesh, spans, lumps, body.reference)
+        if not body.flexible:
+            integrals = integrals.without_flexibility()
+        modes = modal_basis(integrals)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "its mass matrix is not positive definite",
+            field=f"body.{body.name}",
+            remedy="check section, material and lumped masses for values many orders of magnitude apart",
+        ) from error
+    return BodyCoordinates(body.name, offset, integrals.in_basis(modes.vectors), modes, mesh)
+
+
+def make_marker(
+    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], ref: PointRef
+) -> Marker:
+    """The material point of that name; of the ground, a place without a body."""
+    if ref.on_ground:
+        return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point], dtype=float), np.zeros((2, 0)), np.zeros(0))
+    i = index[ref.body]
+    body = mechanism.bodies[i]
+    if isinstance(body, RigidBody):
+        return Marker(i, np.array(body.points[ref.point], dtype=float), np.zeros((2, 0)), np.zeros(0))
+    mesh = bodies[i].mesh
+    assert mesh is not None
+    x = float(mesh.nodes[mesh.points[ref.point]])
+    N, slope = mesh.shape_at(x)
+    D = bodies[i].integrals.D
+    return Marker(i, np.array([x, 0.0]), N @ D, slope @ D)

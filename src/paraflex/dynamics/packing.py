@@ -1,0 +1,181 @@
+"""A system's joints, motors and bodies as the records the kernels read; which row is which joint's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
+from paraflex.kernel.packed import ANGLE, BODY, EFFORT, MARKER, POINT, PORT, ROW, PackedSystem
+from paraflex.mechanism import Mechanism, PointRef
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A joint or a prescribed angle before packing: two points, and a signal where it is driven in time."""
+
+    name: str
+    kind: int
+    a: PointRef
+    b: PointRef
+    signal: int
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """One name a row."""
+        return (f"{self.name} angle",) if self.kind == ANGLE else (f"{self.name} x", f"{self.name} y")
+
+
+def _constraints(mechanism: Mechanism) -> list[Constraint]:
+    constraints = [Constraint(joint.name, POINT, joint.a, joint.b, -1) for joint in mechanism.joints]
+    # Signals are the motors' torques first, then the prescribed angles.
+    for k, prescribed in enumerate(mechanism.prescribed):
+        joint = mechanism.joint(prescribed.joint)
+        constraints.append(Constraint(prescribed.name, ANGLE, joint.a, joint.b, len(mechanism.motors) + k))
+    return constraints
+
+
+def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
+    """Constraints in an order that keeps the envelope of the Schur complement small (reverse Cuthill-McKee)."""
+    constraints = _constraints(mechanism)
+    touched = np.zeros((len(constraints), len(index)))
+    for i, constraint in enumerate(constraints):
+        for ref in (constraint.a, constraint.b):
+            if not ref.on_ground:
+                touched[i, index[ref.body]] = 1.0
+    incidence = scipy.sparse.csr_matrix(touched)
+    graph = scipy.sparse.csr_matrix(incidence @ incidence.T)
+    order = scipy.sparse.csgraph.reverse_cuthill_mckee(graph, symmetric_mode=True)
+    return [constraints[i] for i in order]
+
+
+def pack_system(
+    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], constraints: list[Constraint]
+) -> tuple[PackedSystem, tuple[str, ...]]:
+    """Records and arrays for the kernels, and the name of every constraint row."""
+    markers: list[Marker] = []
+    ports: list[list[dict]] = [[] for _ in bodies]
+    efforts: list[list[dict]] = [[] for _ in bodies]
+    labels: list[str] = []
+    ground: list[float] = []
+    signals: list[int] = []
+
+    def add_marker(ref: PointRef) -> int:
+        markers.append(make_marker(mechanism, bodies, index, ref))
+        return len(markers) - 1
+
+    for constraint in constraints:
+        row, n_rows = len(labels), len(constraint.labels)
+        labels += constraint.labels
+        signals += [constraint.signal] * n_rows
+        ground += [0.0] * n_rows
+        for ref, sign in ((constraint.a, -1.0), (constraint.b, 1.0)):
+            if ref.on_ground:
+                if constraint.kind == POINT:
+                    for axis in range(2):
+                        ground[row + axis] += sign * mechanism.ground[ref.point][axis]
+                continue
+            ports[index[ref.body]].append(
+                {"marker": add_marker(ref), "kind": constraint.kind, "row": row, "rows": n_rows, "sign": sign}
+            )
+    for k, motor in enumerate(mechanism.motors):
+        joint = mechanism.joint(motor.joint)
+        for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
+            if not ref.on_ground:
+                efforts[index[ref.body]].append({"marker": add_marker(ref), "signal": k, "sign": sign})
+
+    packed = PackedSystem(
+        bodies=_body_records(bodies, ports, efforts),
+        markers=_marker_records(markers),
+        ports=_port_records(bodies, ports),
+        efforts=_records(EFFORT, [effort for group in efforts for effort in group]),
+        rows=_row_records(signals, ground, ports),
+        modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
+        I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
+        G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
+        shape=np.concatenate([np.zeros((3, 0)), *(np.vstack([m.N, m.slope]) for m in markers)], axis=1),
+        total_mass=float(sum(body.integrals.m for body in bodies)),
+    )
+    return packed, tuple(labels)
+
+
+def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
+    s = body.integrals
+    return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2])
+
+
+def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
+    out = np.zeros(len(values), dtype=dtype)
+    for record, value in zip(out, values, strict=True):
+        for key, entry in value.items():
+            record[key] = entry
+    return out
+
+
+def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
+    values = []
+    flex = square = port = effort = block = 0
+    for body, body_ports, body_efforts in zip(bodies, ports, efforts, strict=True):
+        s = body.integrals
+        rows = sum(port["rows"] for port in body_ports)
+        values.append(
+            {
+                "offset": body.offset,
+                "nf": body.nf,
+                "flex": flex,
+                "square": square,
+                "port": port,
+                "port_end": port + len(body_ports),
+                "effort": effort,
+                "effort_end": effort + len(body_efforts),
+                "block": block,
+                "rows": rows,
+                "m": s.m,
+                "S1x": s.S1[0],
+                "S1y": s.S1[1],
+                "I0": s.I0 + s.J,
+            }
+        )
+        flex += body.nf
+        square += body.nf**2
+        port += len(body_ports)
+        effort += len(body_efforts)
+        block += rows**2
+    return _records(BODY, values)
+
+
+def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
+    values, shape = [], 0
+    for marker in markers:
+        values.append({"body": marker.body, "shape": shape, "x": marker.x0[0], "y": marker.x0[1]})
+        shape += marker.slope.size
+    return _records(MARKER, values)
+
+
+def _port_records(bodies, ports) -> NDArray[np.void]:
+    values, jac = [], 0
+    for body, body_ports in zip(bodies, ports, strict=True):
+        local = 0
+        for port in body_ports:
+            values.append(port | {"jac": jac, "local": local})
+            local += port["rows"]
+            jac += port["rows"] * (3 + body.nf)
+    return _records(PORT, values)
+
+
+def _row_records(signals: list[int], ground: list[float], ports: list[list[dict]]) -> NDArray[np.void]:
+    """Constraint rows with the envelope of the Schur complement: rows of one body are coupled."""
+    first = list(range(len(signals)))
+    for body_ports in ports:
+        low = min((port["row"] for port in body_ports), default=0)
+        for port in body_ports:
+            for row in range(port["row"], port["row"] + port["rows"]):
+                first[row] = min(first[row], low)
+    values, start = [], 0
+    for row, (signal, value) in enumerate(zip(signals, ground, strict=True)):
+        values.append({"signal": signal, "ground": value, "first": first[row], "start": start})
+        start += row + 1 - first[row]
+    return _records(ROW, values)

@@ -1,0 +1,98 @@
+"""What a run is made of for the time loop: its scheme, the user's controls, its state between calls, its samples."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Why `march` returned.
+PAUSED, FINISHED, NO_CONVERGENCE, SINGULAR, NOT_FINITE, ERROR_TEST = range(6)
+# March.clock
+TIME, STEP, WORK, FACTOR_G, RATE, ENERGY_0, BALANCE, PHI_MAX, DPHI_MAX = range(9)
+# March.counts
+STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES = range(8)
+
+
+class Tableau(NamedTuple):
+    """An ESDIRK scheme: A, c, the difference b - b^ of the embedded formula, and where dense output may join."""
+
+    A: NDArray[np.float64]
+    c: NDArray[np.float64]
+    error: NDArray[np.float64]
+    dense: NDArray[np.int64]  # stages accurate enough to interpolate between, first and last among them
+    order: int
+
+
+class Controls(NamedTuple):
+    """What the user chooses of a run.
+
+    `rate` is the error allowed per second [m/s]: local errors of a run of duration T add up to the tolerance
+    when each step's stays below tolerance h / T.
+    """
+
+    rate: float
+    newton_fraction: float  # of the error allowed in a step, the part left to Newton
+    newton_memory: float  # how long a velocity error left by Newton is taken to last [s]
+    memory: float  # how long a velocity error of a step does, where no vibration turns it round [s]
+    alpha: float
+    beta: float
+    max_step: float
+    dependent_rows: int
+
+
+class March(NamedTuple):
+    """The state of a run between calls, and its scratch."""
+
+    clock: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    stage_t: NDArray[np.float64]  # (2, stages): of the last accepted step and of this one
+    stage_q: NDArray[np.float64]  # (stages, n)
+    stage_v: NDArray[np.float64]
+    stage_a: NDArray[np.float64]  # (2, stages, n)
+    stage_lam: NDArray[np.float64]  # (stages, m)
+    power: NDArray[np.float64]  # (stages,)
+    qs: NDArray[np.float64]
+    vs: NDArray[np.float64]
+    eq: NDArray[np.float64]
+    ev: NDArray[np.float64]
+    torques: NDArray[np.float64]
+    guess_t: NDArray[np.float64]  # (3,) times of the stages a guess is extrapolated from
+    guess_s: NDArray[np.int64]  # (3, 2) and where they stand in stage_a
+
+
+class Samples(NamedTuple):
+    """Dense output: times asked for and what stood there."""
+
+    times: NDArray[np.float64]
+    q: NDArray[np.float64]  # (times, n)
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    lam: NDArray[np.float64]  # (times, m)
+    energy: NDArray[np.float64]  # (times, 3): kinetic, strain, work done by motors and prescribed motion
+
+
+def make_march(n: int, m: int, stages: int, motors: int) -> March:
+    """Allocate the state of a run with n coordinates and m constraint rows."""
+    return March(
+        clock=np.zeros(9),
+        counts=np.zeros(8, dtype=np.int64),
+        q=np.zeros(n),
+        v=np.zeros(n),
+        stage_t=np.zeros((2, stages)),
+        stage_q=np.zeros((stages, n)),
+        stage_v=np.zeros((stages, n)),
+        stage_a=np.zeros((2, stages, n)),
+        stage_lam=np.zeros((stages, m)),
+        power=np.zeros(stages),
+        qs=np.zeros(n),
+        vs=np.zeros(n),
+        eq=np.zeros(n),
+        ev=np.zeros(n),
+        torques=np.zeros(motors),
+        guess_t=np.zeros(3),
+        guess_s=np.zeros((3, 2), dtype=np.int64),
+    )

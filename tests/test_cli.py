@@ -1,0 +1,216 @@
+"""The command line as a user meets it: exit codes, one-line errors, files written, interrupted and repeated runs."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from paraflex.files import library_file
+from paraflex.results import load_results
+
+FAST = ["--tol", "1e-3", "--duration", "0.1", "--samples", "51"]
+
+
+def paraflex(*arguments, cwd=None):
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "paraflex", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+        timeout=300,
+    )
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    out = tmp_path_factory.mktemp("run") / "deep" / "results"
+    done = paraflex("run", "--mode", "++++", "--mode", "-+-+", *FAST, "--out", str(out))
+    return done, out
+
+
+def test_run_writes_summary_results_and_figures(results):
+    done, out = results
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "tracking error" in done.stdout
+    assert sorted(entry.name for entry in out.iterdir()) == ["figures", "results.nc", "summary.json"]
+    names = {entry.name[:5] for entry in (out / "figures").iterdir()}
+    assert names == {f"fig{number}" for number in range(11, 19)}
+    assert {entry.suffix for entry in (out / "figures").iterdir()} == {".png", ".svg"}
+
+
+def test_summary_has_what_it_promises(results):
+    _, out = results
+    summary = json.loads((out / "summary.json").read_text())
+    mode = summary["modes"]["++++"]
+    for key in ("steps", "rejected", "newton_iterations"):
+        assert isinstance(mode[key], int)
+    for key in (
+        "tracking_rms",
+        "wall_time",
+        "constraint_position_max",
+        "constraint_velocity_max",
+        "energy_balance_max",
+    ):
+        assert mode[key] > 0.0
+    assert set(mode["peak_torque"]) == {"tau1", "tau2", "tau5", "tau6"}
+    assert len(mode["end_effector_final"]) == 2
+    assert summary["modes"]["-+-+"]["peak_torque"]["tau1"] == 0.0
+    assert summary["parameters"]["run"]["tolerance"] == 1e-3
+    assert summary["version"]
+
+
+def test_results_agree_with_the_summary(results):
+    _, out = results
+    data = load_results(out / "results.nc")
+    summary = json.loads((out / "summary.json").read_text())
+    assert data["end_effector"].dims == ("mode", "time", "axis")
+    assert data["torque"].dims == ("mode", "time", "motor")
+    for name in ("angle", "angular_velocity", "angular_acceleration"):
+        assert data[name].dims == data[f"{name}_desired"].dims == ("mode", "time", "body")
+    for name in ("tip_axial", "tip_transverse", "tip_slope"):
+        assert data[name].dims == ("mode", "time", "body")
+    assert data.sizes["time"] == 51
+    assert all(data[name].attrs["units"] for name in data.data_vars)
+    distance = ((data["end_effector"] - data["end_effector_desired"]) ** 2).sum("axis").sel(mode="++++")
+    rms = float(np.sqrt(distance.mean("time")))
+    assert rms == pytest.approx(summary["modes"]["++++"]["tracking_rms"], rel=1e-12)
+    final = data["end_effector"].sel(mode="++++").isel(time=-1)
+    assert list(final.values) == summary["modes"]["++++"]["end_effector_final"]
+    assert json.loads(data.attrs["parameters"])["model"]["name"] == "RAParM-I"
+
+
+def test_second_run_gives_the_same_numbers(results, tmp_path):
+    _, out = results
+    again = paraflex("run", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
+    assert again.returncode == 0
+    first, second = json.loads((out / "summary.json").read_text()), json.loads(again.stdout)
+    assert first["modes"]["++++"]["tracking_rms"] == second["modes"]["++++"]["tracking_rms"]
+
+
+def test_json_is_all_that_is_on_stdout(tmp_path):
+    done = paraflex("run", "--mode", "++++", "--rigid", *FAST, "--out", str(tmp_path), "--json")
+    summary = json.loads(done.stdout)
+    assert summary["modes"]["++++"]["tracking_rms"] < 1e-3
+    assert summary["parameters"]["run"]["rigid"] is True
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--mode", "+-+"], "--mode: not an actuation mode (got '+-+'); write one + or - for each of the 4 motors"),
+        (["--mode", "tau1,tau9"], "--mode: not an actuation mode (got 'tau1,tau9')"),
+        (["--tol", "0"], "--tol: must be positive (got 0.0); give a length in metres"),
+        (["--tol", "nan"], "--tol: must be positive"),
+        (["--duration", "-1"], "--duration: must be positive (got -1.0); give it in seconds"),
+        (["--samples", "1"], "--samples: too few samples (got 1); ask for at least 2"),
+        (["--alpha", "-1"], "--alpha: must not be negative"),
+        (["--path", "spiral"], "raparm_i.toml: path: unknown path (got 'spiral'); choose from square, line, circle"),
+        (["--path", "none.toml"], "none.toml: file: cannot be read (no such file or directory)"),
+        (["--assembly", "sideways"], "--assembly: unknown assembly (got 'sideways')"),
+        (
+            ["--mechanism", "raparm"],
+            "mechanism: neither a library mechanism nor a file (got 'raparm'); did you mean \"",
+        ),
+        (["--mechanism", "none.toml"], "none.toml: file: cannot be read"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(tmp_path, arguments, says):
+    done = paraflex("run", *arguments, "--out", str(tmp_path / "out"), cwd=tmp_path)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not list(tmp_path.rglob("*.nc*"))
+    assert not list(tmp_path.rglob("summary*"))
+
+
+def test_unwritable_folder(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    done = paraflex("run", *FAST, "--out", str(tmp_path / "file" / "results"))
+    assert done.returncode == 2
+    assert "--out: cannot be written" in done.stderr
+    assert "choose another folder" in done.stderr
+    assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
+
+
+def test_unreachable_path_names_file_time_and_place(tmp_path):
+    source = library_file("raparm_i").read_text(encoding="utf-8")
+    model = tmp_path / "far.toml"
+    model.write_text(source.replace("[[0.050, 0.314], [-0.050, 0.314]", "[[0.050, 0.314], [-0.050, 0.614]"))
+    out = tmp_path / "out"
+    done = paraflex("run", "--mechanism", str(model), *FAST[:2], "--out", str(out))
+    assert done.returncode == 2
+    assert f"error: {model}: path.square: " in done.stderr
+    assert "t = 0." in done.stderr
+    assert "end-effector at (" in done.stderr
+    assert not out.exists()
+
+
+def test_mode_that_cannot_drive_is_reported_and_the_others_go_on(tmp_path):
+    done = paraflex("run", "--mode", "tau1", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
+    assert done.returncode == 1
+    assert 'mode "+---" cannot drive the mechanism: 1 active motor(s) for 2 degrees of freedom' in done.stderr
+    modes = json.loads(done.stdout)["modes"]
+    assert modes["+---"]["status"] == "failed"
+    assert modes["++++"]["status"] == "complete"
+
+
+def test_too_many_steps_keep_what_there_is(tmp_path):
+    done = paraflex("run", "--mode", "++++", *FAST, "--max-steps", "20", "--out", str(tmp_path), "--json")
+    assert done.returncode == 1
+    assert 'mode "++++": no end after 20 steps at t = ' in done.stderr
+    data = load_results(tmp_path / "results.nc")
+    assert data["status"].item() == "failed"
+    assert data["end_effector"].notnull().any()
+    assert data["end_effector"].isnull().any()
+
+
+def test_interrupt_keeps_what_there_is(tmp_path):
+    # A tolerance that takes minutes; SIGINT is Ctrl-C.
+    command = [sys.executable, "-m", "paraflex", "run", "--mode", "+-+-", "--tol", "1e-9", "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    time.sleep(8.0)
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    assert "interrupted at t = " in errors
+    data = load_results(tmp_path / "results.nc")
+    assert data["status"].item() == "interrupted"
+    assert data["end_effector"].notnull().any()
+    assert json.loads((tmp_path / "summary.json").read_text())["modes"]["+-+-"]["tracking_rms"] is None
+
+
+def test_info_counts():
+    done = paraflex("info", "--json")
+    facts = json.loads(done.stdout)
+    assert (facts["bodies"], facts["coordinates"], facts["constraints"]) == (8, 104, 22)
+    assert facts["degrees_of_freedom"] == 2
+    assert facts["redundant_constraints"] == 0
+    # Eight links of 0.03 x 0.005 m aluminium, 16 joint lumps and two end lumps.
+    length = 2 * (0.25 + 0.1 + 0.25 + 0.25)
+    assert facts["total_mass"] == pytest.approx(length * 0.00015 * 2700 + 16 * 0.130 + 2 * 0.225, rel=1e-12)
+    table = paraflex("info").stdout
+    assert "total mass [kg]" in table
+    assert "link8" in table
+
+
+def test_modes_lists_table_1():
+    done = paraflex("modes", "--json")
+    rows = json.loads(done.stdout)
+    assert [row["mode"] for row in rows] == ["+-+-", "-+-+", "+--+", "-++-", "+++-", "++-+", "+-++", "-+++", "++++"]
+    assert all(row["drives_path"] for row in rows)
+    assert [row["redundancy"] for row in rows] == [0, 0, 0, 0, 1, 1, 1, 1, 2]
+    assert "tau1, tau5" in paraflex("modes").stdout
+
+
+def test_version_and_help():
+    assert paraflex("--version").stdout.strip().count(".") == 2
+    assert "run" in paraflex("--help").stdout
+    assert paraflex("rum").returncode == 2

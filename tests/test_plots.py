@@ -1,0 +1,398 @@
+"""The figures show the dataset's values in the units they name, and their files are the same each time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from paraflex import plots
+from paraflex.errors import InputError, OutputError
+from paraflex.plots.labels import display_unit, mode_label, symbol, three_digits
+
+FULL, PARTIAL = "++", "+-"
+STOP = 25  # Samples of the partial run.
+DESIRED_TWINS = (
+    "end_effector",
+    "end_effector_velocity",
+    "end_effector_acceleration",
+    "angle",
+    "angular_velocity",
+    "angular_acceleration",
+)
+SINGLE = ("tip_deflections", "link_motions", "end_effector_path", "end_effector_motion", "phase_diagrams")
+NAMES = (
+    "fig11_desired_path",
+    "fig12_motor_torques",
+    "fig13_tip_deflections",
+    "fig14_link_motions",
+    "fig15_end_effector_path",
+    "fig16_end_effector_motion",
+    "fig17_phase_diagrams",
+    "fig18_tracking_errors",
+)
+
+
+@pytest.fixture
+def data() -> xr.Dataset:
+    """Two modes of an arm of two links; the second run stops on the way, its second motor is passive."""
+    rng = np.random.default_rng(11)
+    time = np.linspace(0.0, 0.4, 41)
+    phase = 2.0 * np.pi * np.minimum(time / 0.3, 1.0)
+    waves = np.sin(np.outer(time, [20.0, 33.0]))
+
+    def vary(size: float) -> np.ndarray:
+        return size * rng.uniform(0.5, 1.0, (2, 1, 2)) * waves
+
+    variables = {}
+    for name, scale in zip(DESIRED_TWINS, (0.05, 1.0, 30.0, 0.8, 5.0, 200.0), strict=True):
+        desired = scale * np.column_stack([np.cos(phase), np.sin(phase)]) + [0.1 * scale, 0.3 * scale]
+        last = "axis" if name.startswith("end") else "body"
+        variables[f"{name}_desired"] = (("mode", "time", last), np.stack([desired, desired]))
+        variables[name] = (("mode", "time", last), np.stack([desired, desired]) + vary(0.01 * scale))
+    for name, scale in (("tip_axial", 3e-6), ("tip_transverse", 2e-3), ("tip_slope", 0.03)):
+        variables[name] = (("mode", "time", "body"), vary(scale))
+    elbow = np.column_stack([0.1 + 0.01 * np.sin(phase), 0.2 + 0.02 * np.sin(phase)])
+    tip = variables["end_effector_desired"][1][0]
+    places = np.stack([np.zeros_like(elbow), elbow, elbow, tip], axis=1)
+    variables["point_position"] = (("mode", "time", "point", "axis"), np.stack([places, places]))
+    for name, (_, values) in variables.items():
+        if not name.endswith("_desired"):
+            values[1, STOP:] = np.nan
+    torque = vary(7.0)
+    torque[1, :, 1] = 0.0
+    variables["torque"] = (("mode", "time", "motor"), torque)
+    variables["tracking_rms"] = (("mode",), np.array([3.25e-4, np.nan]))
+    return xr.Dataset(
+        variables,
+        coords={
+            "mode": [FULL, PARTIAL],
+            "time": time,
+            "axis": ["x", "y"],
+            "body": ["link1", "link2"],
+            "motor": ["tau1", "tau2"],
+            "point": ["link1.A", "link1.B", "link2.B", "link2.P"],
+        },
+        attrs={"mechanism": "arm", "motion_end": 0.3},
+    )
+
+
+def figure_of(name: str, data: xr.Dataset, mode: str = FULL) -> Figure:
+    draw: Callable[..., Figure] = getattr(plots, name)
+    return draw(data, mode) if name in SINGLE else draw(data)
+
+
+def curve(axes: Axes, label: str) -> np.ndarray:
+    """Points (n, 2) of the one line whose label starts so."""
+    lines = [line for line in axes.lines if str(line.get_label()).startswith(label)]
+    assert len(lines) == 1
+    return points_of(lines[0])
+
+
+def points_of(line: Line2D) -> np.ndarray:
+    return np.column_stack([np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)])
+
+
+def stops(figure: Figure) -> list[np.ndarray]:
+    return [points_of(line) for axes in figure.axes for line in axes.lines if line.get_label() == "the run stopped"]
+
+
+same = partial(np.testing.assert_allclose, rtol=1e-12, atol=0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "units"),
+    [
+        ("desired_path", {"mm"}),
+        ("motor_torques", {"N m", "s"}),
+        ("tip_deflections", {"µm", "mm", "mrad", "s"}),
+        ("link_motions", {"rad", "rad/s", "rad/s²", "s"}),
+        ("end_effector_path", {"mm"}),
+        ("end_effector_motion", {"mm", "m/s", "m/s²", "s"}),
+        ("phase_diagrams", {"mm", "m/s", "m/s²"}),
+        ("tracking_errors", {"mm", "s"}),
+    ],
+)
+def test_every_axis_label_names_its_unit(data: xr.Dataset, name: str, units: set[str]) -> None:
+    figure = figure_of(name, data)
+    labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
+    found = [re.search(r"\[(.+)\]$", label) for label in labels]
+    assert all(found), labels
+    assert {match[1] for match in found if match} == units
+
+
+@pytest.mark.parametrize("mode", [FULL, PARTIAL])
+@pytest.mark.parametrize("name", [name for name in plots.__all__ if name != "save_figures"])
+def test_nothing_overlaps_or_leaves_the_page(data: xr.Dataset, name: str, mode: str) -> None:
+    data["angular_acceleration"] *= 50.0  # five digits and a sign
+    figure = figure_of(name, data, mode)
+    figure.draw_without_rendering()
+    boxes = [axes.get_tightbbox() for axes in figure.axes]
+    boxes += [legend.get_window_extent() for legend in figure.legends]
+    page = figure.bbox
+    for k, box in enumerate(boxes):
+        assert box is not None
+        assert page.x0 <= box.x0 < box.x1 <= page.x1
+        assert page.y0 <= box.y0 < box.y1 <= page.y1
+        for other in boxes[:k]:
+            assert other is not None
+            assert min(box.x1, other.x1) <= max(box.x0, other.x0) or min(box.y1, other.y1) <= max(box.y0, other.y0)
+
+
+def test_desired_path_and_the_mechanism_at_its_start(data: xr.Dataset) -> None:
+    (axes,) = plots.desired_path(data).axes
+    same(curve(axes, "desired path"), 1e3 * data["end_effector_desired"].values[0])
+    same(curve(axes, "start"), 1e3 * data["end_effector_desired"].values[0, :1])
+    base, elbow, _, tip = 1e3 * data["point_position"].values[0, 0]
+    links = [points_of(line) for line in axes.lines if line.get_linewidth() > 2.0]
+    # A link's ends, in either order.
+    assert [sorted(map(tuple, link)) for link in links] == [
+        sorted([tuple(base), tuple(elbow)]),
+        sorted([tuple(elbow), tuple(tip)]),
+    ]
+    same(curve(axes, "joints"), [base, elbow])
+    same(curve(axes, "other points"), [tip])
+    supports = [points_of(line) for line in axes.lines if line.get_markersize() > 12.0]
+    assert len(supports) == 1
+    same(supports[0], [base])
+    assert {text.get_text() for text in axes.texts} >= {"$A$", "$B$", "$P$"}
+
+
+def test_a_link_with_points_off_a_line_is_a_closed_outline(data: xr.Dataset) -> None:
+    data = data.assign_coords(point=["plate.A", "plate.B", "plate.C", "rod.P"])
+    data["point_position"][:, :, 2] = [0.3, 0.05]
+    (axes,) = plots.desired_path(data).axes
+    outline = points_of(next(line for line in axes.lines if line.get_label() == "links"))
+    same(outline[0], outline[-1])
+    corners = 1e3 * data["point_position"].values[0, 0, :3]
+    assert sorted(map(tuple, outline[:-1])) == sorted(map(tuple, corners))
+
+
+def test_torques_and_passive_motors(data: xr.Dataset) -> None:
+    full, part = plots.motor_torques(data).axes
+    for axes, mode, motor in ((full, FULL, "tau1"), (full, FULL, "tau2"), (part, PARTIAL, "tau1")):
+        same(curve(axes, symbol(motor))[:, 0], data["time"])
+        same(curve(axes, symbol(motor))[:, 1], data["torque"].sel(mode=mode, motor=motor))
+    assert np.isnan(curve(part, symbol("tau2"))[:, 1]).all()
+    assert (full.get_title(loc="left"), full.get_title(loc="right")) == ("⊕⊕", "")
+    assert (part.get_title(loc="left"), part.get_title(loc="right")) == ("⊕⊖", r"passive: $\tau_{2}$")
+    assert full.get_ylim() == part.get_ylim()
+
+
+def test_motors_differ_in_line_style_as_well_as_colour(data: xr.Dataset) -> None:
+    axes = plots.motor_torques(data).axes[0]
+    lines = [line for line in axes.lines if str(line.get_label()).startswith("$")]
+    assert len({line.get_linestyle() for line in lines}) == len({line.get_color() for line in lines}) == 2
+
+
+def test_tip_deflections_of_chosen_links(data: xr.Dataset) -> None:
+    axes = plots.tip_deflections(data, FULL, ["link2"]).axes
+    # 3 µm, 2 mm and 0.03 rad at most.
+    for panel, variable, factor in zip(
+        axes, ("tip_axial", "tip_transverse", "tip_slope"), (1e6, 1e3, 1e3), strict=True
+    ):
+        same(curve(panel, "mode")[:, 1], factor * data[variable].sel(mode=FULL, body="link2"))
+    with pytest.raises(InputError, match="link9"):
+        plots.tip_deflections(data, FULL, ["link9"])
+
+
+def test_twins_of_a_symmetric_mechanism_are_shown_once(data: xr.Dataset) -> None:
+    wave = np.sin(30.0 * data["time"].values)[:, None]
+    names = ["left1", "left2", "right1", "right2"]
+    run = data.isel(body=[0, 1, 0, 1]).assign_coords(body=names)
+    run["tip_transverse"][:] = wave * [0.0070, 0.0041, 0.0075, 0.0040]
+    titles = [axes.get_title() for axes in plots.tip_deflections(run, FULL).axes]
+    assert titles[::3] == ["left 1: axial displacement", "left 2: axial displacement"]
+
+
+def test_link_motions_desired_and_actual(data: xr.Dataset) -> None:
+    panels = np.reshape(np.array(plots.link_motions(data, FULL).axes, dtype=object), (2, 3))
+    for row, body in zip(panels, ("link1", "link2"), strict=True):
+        for axes, variable in zip(row, DESIRED_TWINS[3:], strict=True):
+            same(curve(axes, "actual")[:, 1], data[variable].sel(mode=FULL, body=body))
+            same(curve(axes, "desired")[:, 1], data[f"{variable}_desired"].sel(mode=FULL, body=body))
+
+
+def test_end_effector_motion_desired_and_actual(data: xr.Dataset) -> None:
+    panels = np.reshape(np.array(plots.end_effector_motion(data, FULL).axes, dtype=object), (3, 2))
+    for row, variable, factor in zip(panels, DESIRED_TWINS[:3], (1e3, 1.0, 1.0), strict=True):
+        for axes, axis in zip(row, "xy", strict=True):
+            same(curve(axes, "actual")[:, 0], data["time"])
+            same(curve(axes, "actual")[:, 1], factor * data[variable].sel(mode=FULL, axis=axis))
+            same(curve(axes, "desired")[:, 1], factor * data[f"{variable}_desired"].sel(mode=FULL, axis=axis))
+
+
+def test_phase_diagrams_desired_and_actual(data: xr.Dataset) -> None:
+    panels = np.reshape(np.array(plots.phase_diagrams(data, FULL).axes, dtype=object), (2, 2))
+    position, velocity, acceleration = DESIRED_TWINS[:3]
+    for row, across, up, factor in ((0, position, velocity, 1e3), (1, velocity, acceleration, 1.0)):
+        for axes, axis in zip(panels[row], "xy", strict=True):
+            for label, suffix in (("actual", ""), ("desired", "_desired")):
+                shown = curve(axes, label)
+                same(shown[:, 0], factor * data[across + suffix].sel(mode=FULL, axis=axis))
+                same(shown[:, 1], data[up + suffix].sel(mode=FULL, axis=axis))
+
+
+def test_tracking_errors_and_their_titles(data: xr.Dataset) -> None:
+    full, part = plots.tracking_errors(data).axes
+    errors = 1e3 * (data["end_effector"] - data["end_effector_desired"])
+    for axes, mode in ((full, FULL), (part, PARTIAL)):
+        for axis in "xy":
+            same(curve(axes, f"error in ${axis}$")[:, 1], errors.sel(mode=mode, axis=axis))
+    assert full.get_title() == "⊕⊕: RMS 0.325 mm"
+    assert part.get_title() == "⊕⊖: stopped at 0.24 s"
+
+
+@pytest.mark.parametrize("magnification", [1.0, 30.0])
+def test_deviation_is_magnified_as_asked(data: xr.Dataset, magnification: float) -> None:
+    (axes,) = plots.end_effector_path(data, FULL, magnification).axes
+    run = 1e3 * data.sel(mode=FULL)
+    desired, actual = run["end_effector_desired"].values, run["end_effector"].values
+    same(curve(axes, "desired"), desired)
+    # Differences of numbers of about 100 mm.
+    np.testing.assert_allclose(curve(axes, "actual") - desired, magnification * (actual - desired), atol=1e-11)
+    label = next(str(line.get_label()) for line in axes.lines)
+    assert label == ("actual, mode ⊕⊕" if magnification == 1.0 else "actual, mode ⊕⊕, deviation × 30")
+
+
+@pytest.mark.parametrize(("deviation", "factor"), [(1e-3, 10), (3.1e-4, 20), (2.9e-4, 50), (0.02, 1), (1e-15, 1)])
+def test_chosen_magnification_is_round_and_keeps_the_deviation_small(
+    data: xr.Dataset, deviation: float, factor: float
+) -> None:
+    # 15 mm of a path 100 mm wide are the most that is shown: 15, 48.4, 51.7 and 0.75 times these deviations; the last
+    # is rounding, which is not to be shown at all.
+    data["end_effector"] = data["end_effector_desired"].copy()
+    data["end_effector"][0, 20, 0] += deviation
+    (axes,) = plots.end_effector_path(data, FULL).axes
+    shown = curve(axes, "actual")[20, 0] - curve(axes, "desired")[20, 0]
+    assert shown == pytest.approx(factor * 1e3 * deviation, abs=1e-10)
+
+
+@pytest.mark.parametrize("magnification", [0.0, -2.0, np.nan, np.inf])
+def test_magnification_must_be_positive(data: xr.Dataset, magnification: float) -> None:
+    with pytest.raises(InputError, match="magnification"):
+        plots.end_effector_path(data, FULL, magnification)
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_a_partial_run_is_marked_where_it_stops(data: xr.Dataset, name: str) -> None:
+    assert stops(figure_of(name, data, FULL)) == []
+    figure = figure_of(name, data, PARTIAL)
+    marks = stops(figure)
+    assert len(marks) == len(figure.axes)
+    for mark, axes in zip(marks, figure.axes, strict=True):
+        line = points_of(axes.lines[0])
+        assert np.isnan(line[STOP:, 1]).all()
+        same(mark[0], line[STOP - 1])
+
+
+def test_a_run_without_samples_can_be_drawn(data: xr.Dataset) -> None:
+    for name in DESIRED_TWINS:
+        data[name][1] = np.nan
+    figure = plots.tracking_errors(data)
+    assert figure.axes[1].get_title() == "⊕⊖: no samples"
+    assert stops(plots.end_effector_motion(data, PARTIAL)) == []
+
+
+def test_the_rest_after_the_motion_is_shaded(data: xr.Dataset) -> None:
+    def shades(figure: Figure) -> list[tuple[float, float]]:
+        boxes = [patch.get_extents() for axes in figure.axes for patch in axes.patches]
+        inverse = figure.axes[0].transData.inverted()
+        return [(inverse.transform(box.min)[0], inverse.transform(box.max)[0]) for box in boxes[:1]]
+
+    same(shades(plots.motor_torques(data)), [(0.3, 0.4)])
+    legend = plots.motor_torques(data).legends[0]
+    assert "after the end of the desired motion" in [text.get_text() for text in legend.get_texts()]
+    data.attrs["motion_end"] = 0.4
+    assert shades(plots.motor_torques(data)) == []
+
+
+def test_rounding_errors_are_drawn_flat(data: xr.Dataset) -> None:
+    for name in ("end_effector", "end_effector_desired"):
+        data[name][:, :, 1] = 0.3 + 1e-13 * np.sin(200.0 * data["time"].values)
+    low, high = plots.end_effector_motion(data, FULL).axes[1].get_ylim()
+    # The path is 100 mm wide in x.
+    assert high - low == pytest.approx(10.0, rel=0.1)
+    assert 0.5 * (low + high) == pytest.approx(300.0)
+
+
+def test_settings_of_the_user_are_neither_used_nor_changed(data: xr.Dataset) -> None:
+    with matplotlib.rc_context({"lines.linewidth": 7.0, "font.size": 30.0}):
+        before = dict(matplotlib.rcParams)
+        axes = plots.tracking_errors(data).axes[0]
+        assert dict(matplotlib.rcParams) == before
+    assert {line.get_linewidth() for line in axes.lines} <= {0.5, 0.9}
+    assert axes.title.get_fontsize() == axes.yaxis.label.get_fontsize() == 7.0
+    assert axes.get_yticklabels()[0].get_fontsize() == 6.5
+
+
+def test_unknown_mode(data: xr.Dataset) -> None:
+    with pytest.raises(InputError, match=r"one of \+\+, \+-"):
+        plots.link_motions(data, "--")
+
+
+def test_files_are_named_and_the_same_each_time(data: xr.Dataset, tmp_path: Path) -> None:
+    written = plots.save_figures(data, tmp_path / "new" / "folder")
+    assert written == [tmp_path / "new" / "folder" / f"{name}.{suffix}" for name in NAMES for suffix in ("png", "svg")]
+    again = plots.save_figures(data, str(tmp_path / "again"), FULL)
+    other = plots.save_figures(data, tmp_path / "other", PARTIAL)
+    for first, second, third in zip(written, again, other, strict=True):
+        assert first.stat().st_size > 5000
+        assert first.read_bytes() == second.read_bytes()
+        single = first.stem[6:] in SINGLE
+        assert (first.read_bytes() != third.read_bytes()) == single
+
+
+def test_first_mode_is_drawn_where_names_are_not_signs(data: xr.Dataset, tmp_path: Path) -> None:
+    named = data.assign_coords(mode=["both", "one++"])
+    default = plots.save_figures(named, tmp_path / "default")
+    first = plots.save_figures(named, tmp_path / "first", "both")
+    assert [path.read_bytes() for path in default] == [path.read_bytes() for path in first]
+
+
+def test_unwritable_folder(data: xr.Dataset, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot be written") as caught:
+        plots.save_figures(data, tmp_path / "file" / "figures")
+    assert caught.value.field == str(tmp_path / "file" / "figures")
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "name", "factor"),
+    [
+        ("m", 0.0, "mm", 1e3),
+        ("m", 0.2, "mm", 1e3),
+        ("m", 1.1e-4, "mm", 1e3),
+        ("m", 0.9e-4, "µm", 1e6),
+        ("m", 1e-14, "nm", 1e9),
+        ("m", np.nan, "mm", 1e3),
+        ("rad", 0.11, "rad", 1.0),
+        ("rad", 0.09, "mrad", 1e3),
+    ],
+)
+def test_unit_suits_the_largest_value(unit: str, largest: float, name: str, factor: float) -> None:
+    assert display_unit(unit, [0.0, -largest]) == (name, factor)
+
+
+def test_names_as_symbols() -> None:
+    names = ("tau1", "A1", "C", "link1", "link", "crank_2b", "cost$")
+    assert [symbol(name) for name in names] == [
+        r"$\tau_{1}$",
+        "$A_{1}$",
+        "$C$",
+        "link 1",
+        "link",
+        "crank_2b",
+        r"cost\$",
+    ]
+    assert [mode_label(name) for name in ("+-", "both", "one-by-one")] == ["⊕⊖", "both", "one-by-one"]
+    assert [three_digits(value) for value in (48.0, 0.37712, 120.4, 0.0)] == ["48.0", "0.377", "120", "0"]
