@@ -1,5 +1,5 @@
 # The two commands: `make run` simulates the study, `make test` checks everything. Each sets up .venv by itself.
-PYTHON ?= python3.11
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 KERNELS := $(wildcard src/paraflex/kernel/*.py)
@@ -25,7 +25,7 @@ tests: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m pytest --cov --cov-report=term
 
 docs: $(VENV)/.dev
-	$(BIN)/mkdocs build --strict --quiet --site-dir site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir site
 
 # Set-up is skipped while these stamps are newer than what they depend on.
 $(VENV)/.run: pyproject.toml constraints.txt

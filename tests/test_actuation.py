@@ -330,6 +330,16 @@ def test_the_feed_forward_is_exact_between_its_points(raparm, square, tracking, 
     np.testing.assert_allclose(torques.evaluate(np.array([0.55, 0.6, 0.7])), 0.0, atol=1e-7 * peak)
 
 
+def test_the_feed_forward_is_refined_where_torques_are_steep(raparm):
+    # Stopping 0.1 mm short of the singularity of +-+-: the first grid alone leaves 2e-7 of the peak, 550 N m.
+    path = Line((0.0, 0.264), (0.0, 0.2001), 5.0)
+    torques = plan_tracking(raparm, path, samples=11).torques("+-+-")
+    times = np.sort(np.random.default_rng(63).uniform(0.0, path.duration, 400))
+    exact = allocate(required_effort(follow_path(raparm, path, times)), torques.mode)
+    # What the plan promises: 1e-8 of the peak.
+    np.testing.assert_allclose(torques.evaluate(times), exact, rtol=0, atol=1e-8 * np.max(np.abs(exact)))
+
+
 def test_work_of_the_feed_forward_is_the_kinetic_energy_gained(raparm, square, tracking):
     # Twenty Gauss points between neighbouring knots of the path.
     torques = tracking.torques("++++")

@@ -150,6 +150,31 @@ def test_power_of_all_forces_is_the_rate_of_energy(linkage, seed):
         np.testing.assert_allclose(v[b] @ soft[b], kinetic, rtol=0, atol=1e-12 * np.max(np.abs(v[b] * soft[b])))
 
 
+@pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (20.0, 50.0)])
+def test_residuals_are_those_of_the_index_1_equations(system, alpha, beta):
+    # M a + h + K q + Phi_q^T lambda - F and Phi'' + 2 alpha Phi' + beta^2 Phi (section 4), each put together by twins.
+    q, v, a = twins.random_state(system, 27)
+    q = twins.gentle_deflection(system, q, 28)
+    rng, t, ws = np.random.default_rng(29), 0.2, system.workspace()
+    lam, torques = rng.normal(size=system.m), rng.normal(size=len(system.mechanism.motors))
+    signals = twins.still_signals(system, torques)
+    equations(system.packed, signals, t, alpha, beta, q, v, a, lam, np.zeros(torques.size), ws)
+
+    J = twins.constraint_jacobian(system, q)
+    motors = [twins.joint_angle_row(system, motor.joint) for motor in system.mechanism.motors]
+    f = twins.system_mass_matrix(system, q) @ a + twins.system_forces(system, q, v) + J.T @ lam - torques @ motors
+    np.testing.assert_allclose(ws.f, f, rtol=0, atol=1e-11 * np.max(np.abs(f)))
+
+    law = np.zeros((3, system.m))
+    for prescribed in system.mechanism.prescribed:
+        row = system.rows.index(f"{prescribed.name} angle")
+        law[:, row] = [x[0] for x in prescribed.law.evaluate(np.array([t]))]
+    second = twins.along(lambda q: twins.constraint_jacobian(system, q) @ v, q, v) + J @ a - law[2]
+    rows = second + 2 * alpha * (J @ v - law[1]) + beta**2 * twins.constraints(system, t, q)
+    # A prescribed law's second derivative comes from quintic pieces: 1e-8, see test_joints.
+    np.testing.assert_allclose(ws.rows, rows, rtol=0, atol=1e-12 * np.max(np.abs(rows)) + 1e-8)
+
+
 # --- The linear system of an iteration -----------------------------------------------------------------------------
 
 

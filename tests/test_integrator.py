@@ -11,6 +11,7 @@ from paraflex.dynamics import (
     momentum,
     pack_signals,
     piecewise_quintic,
+    redundant_rows,
 )
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import TR_BDF2, IntegrationOptions, integrate
@@ -249,29 +250,37 @@ def test_redundant_joint_changes_nothing():
     assert solutions[1].q == pytest.approx(solutions[0].q, abs=1e-9)
 
 
-def test_singular_position_stops_the_run_with_what_there_is():
-    """A slack-free parallelogram-like chain stretched straight: the constraints lose rank on the way."""
-    # Two unit cranks pulled apart by their own spin: a rhombus 1-1 over a base of 2 - closes only when straight.
+def parallelogram(angle_law) -> Mechanism:
+    """Two unit cranks and a coupler over a unit base: its constraints lose rank where all links lie in line."""
     points = {"a": (0.0, 0.0), "b": (1.0, 0.0)}
-    left, right = (RigidBody(name, 1.0, 0.1, (0.5, 0.0), points) for name in ("left", "right"))
-    mechanism = Mechanism(
-        name="straight",
-        ground={"O": (0.0, 0.0), "E": (2.0, 0.0)},
-        bodies=(left, right),
+    left, coupler, right = (RigidBody(name, 1.0, 0.1, (0.5, 0.0), points) for name in ("left", "coupler", "right"))
+    return Mechanism(
+        name="parallelogram",
+        ground={"O": (0.0, 0.0), "E": (1.0, 0.0)},
+        bodies=(left, coupler, right),
         joints=(
             RevoluteJoint("O", PointRef("ground", "O"), PointRef("left", "a")),
-            RevoluteJoint("M", PointRef("left", "b"), PointRef("right", "a")),
-            RevoluteJoint("E", PointRef("right", "b"), PointRef("ground", "E")),
+            RevoluteJoint("M", PointRef("left", "b"), PointRef("coupler", "a")),
+            RevoluteJoint("N", PointRef("coupler", "b"), PointRef("right", "b")),
+            RevoluteJoint("E", PointRef("right", "a"), PointRef("ground", "E")),
         ),
-        assemblies=(Assembly("flat", {"left": 0.0, "right": 0.0}),),
+        prescribed=(PrescribedAngle("drive", "O", angle_law),),
+        assemblies=(Assembly("up", {"left": 1.0, "coupler": 0.0, "right": 1.0}),),
     )
-    system = build_system(mechanism)
-    state = consistent_state(system, mechanism.assembly())
-    bent = State(0.0, state.q.copy(), state.v.copy())
-    solution = run(system, bent, 0.1)
-    # Straight and at rest is consistent with one dependent row; it stays there.
-    assert solution.q[-1] == pytest.approx(state.q, abs=1e-12)
-    assert np.linalg.matrix_rank(system.jacobian(state.q)) == system.m - 1
+
+
+def test_singular_position_stops_the_run_with_what_there_is():
+    """The crank is driven into the straight position, where a step ends: named with time, kept until then."""
+    law = SampledAngle(lambda t: 1.0 - t, lambda t: -1.0 + 0.0 * t, lambda t: 0.0 * t, knots=(1.0,))
+    system = build_system(parallelogram(law))
+    state = consistent_state(system, system.mechanism.assembly())
+    assert redundant_rows(system, state.q) == []
+    with pytest.raises(IntegrationError, match="lose rank") as caught:
+        run(system, state, 1.5, tolerance=1e-9, alpha=50.0, beta=50.0)
+    assert caught.value.moment.time == pytest.approx(1.0, abs=1e-3)
+    partial = caught.value.partial
+    assert partial.t[-1] > 0.9
+    assert partial.q[:, 2] == pytest.approx(1.0 - partial.t, abs=1e-6)
 
 
 def test_too_many_steps_keep_the_partial_solution():

@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 from paraflex import plots
 from paraflex.errors import InputError, OutputError
 from paraflex.plots.labels import display_unit, mode_label, symbol, three_digits
+from paraflex.plots.runs import default_mode
 
 FULL, PARTIAL = "++", "+-"
 STOP = 25  # Samples of the partial run.
@@ -352,11 +353,9 @@ def test_files_are_named_and_the_same_each_time(data: xr.Dataset, tmp_path: Path
         assert (first.read_bytes() != third.read_bytes()) == single
 
 
-def test_first_mode_is_drawn_where_names_are_not_signs(data: xr.Dataset, tmp_path: Path) -> None:
-    named = data.assign_coords(mode=["both", "one++"])
-    default = plots.save_figures(named, tmp_path / "default")
-    first = plots.save_figures(named, tmp_path / "first", "both")
-    assert [path.read_bytes() for path in default] == [path.read_bytes() for path in first]
+def test_mode_drawn_where_none_is_named(data: xr.Dataset) -> None:
+    assert default_mode(data.assign_coords(mode=["+-", "++"])) == "++"
+    assert default_mode(data.assign_coords(mode=["both", "one++"])) == "both"
 
 
 def test_unwritable_folder(data: xr.Dataset, tmp_path: Path) -> None:

@@ -185,19 +185,12 @@ def system_mass_matrix(system, q):
     return M
 
 
-def system_stiffness(system):
-    K = np.zeros((system.n, system.n))
-    for body in system.bodies:
-        K[body.flexible, body.flexible] = body.integrals.K
-    return K
-
-
 def system_forces(system, q, v):
-    """h + K q."""
+    """h + K q, with K = diag(omega^2): V^T K V has the rounding of its stiffest mode everywhere."""
     f = np.zeros(system.n)
     for body in system.bodies:
         f[body.all] = velocity_forces(body.integrals, q[body.all], v[body.all])
-        f[body.all] += elastic_forces(body.integrals, q[body.all])
+        f[body.flexible] += body.modes.omega**2 * q[body.flexible]
     return f
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import ActuationError, Moment, SingularActuationError
-from paraflex.kernel.bodies import body_equations
+from paraflex.kernel.bodies import motion_forces
 from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode
 
@@ -47,9 +47,7 @@ def required_effort(motion: RigidMotion) -> Effort:
     """Effort and actuation matrix of a rigid motion."""
     system = motion.system
     forces = np.zeros_like(motion.q)
-    for k in range(motion.t.size):
-        for i in range(len(system.bodies)):
-            body_equations(system.packed, i, motion.q[k], motion.v[k], motion.a[k], forces[k])
+    motion_forces(system.packed, motion.q, motion.v, motion.a, forces)
     selection = np.zeros((system.n, len(system.mechanism.motors)))
     for column, motor in enumerate(system.mechanism.motors):
         joint = system.mechanism.joint(motor.joint)

@@ -12,7 +12,7 @@ from paraflex.actuation import actuation_condition
 from paraflex.actuation.allocation import check_mode
 from paraflex.cli.tables import plain_console
 from paraflex.dynamics import build_system, consistent_state
-from paraflex.dynamics.state import constraint_rank
+from paraflex.dynamics.state import redundant_rows
 from paraflex.errors import ActuationError, NumericalError
 from paraflex.files import load
 from paraflex.mechanism import FlexibleBeam
@@ -84,11 +84,11 @@ def describe(source: str) -> dict[str, Any]:
             }
         )
     rigid = build_system(mechanism.rigid())
-    rank, closed = rigid.m, None
+    redundant, closed = [], None
     if mechanism.assemblies:
         try:
-            pose = consistent_state(rigid, mechanism.assembly()).q
-            rank, closed = constraint_rank(rigid, pose), True
+            redundant = redundant_rows(rigid, consistent_state(rigid, mechanism.assembly()).q)
+            closed = True
         except NumericalError as error:
             closed = str(error)
     return {
@@ -102,8 +102,8 @@ def describe(source: str) -> dict[str, Any]:
         "rigid_coordinates": rigid.n,
         "flexible_coordinates": system.n_flexible,
         "constraints": system.m,
-        "redundant_constraints": rigid.m - rank,
-        "degrees_of_freedom": rigid.n - rank,
+        "redundant_constraints": redundant,
+        "degrees_of_freedom": rigid.n - rigid.m + len(redundant),
         "assembly_closes": closed,
         "total_mass": system.total_mass,
         "assemblies": [assembly.name for assembly in mechanism.assemblies],

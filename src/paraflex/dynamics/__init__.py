@@ -8,6 +8,7 @@ from paraflex.dynamics.state import (
     momentum,
     project_position,
     project_velocity,
+    redundant_rows,
     reference_pose,
 )
 from paraflex.dynamics.system import System, build_system
@@ -26,5 +27,6 @@ __all__ = [
     "piecewise_quintic",
     "project_position",
     "project_velocity",
+    "redundant_rows",
     "reference_pose",
 ]

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from paraflex.dynamics.signals import constant_signals, pack_signals
@@ -18,6 +19,8 @@ from paraflex.mechanism import Assembly
 _MAX_ITERATIONS = 50
 # Closure error that counts as closed [m, rad]: a few rounding errors of a metre-sized mechanism.
 CLOSED = 1e-12
+# A constraint row whose independent part is smaller than this fraction of the largest follows from the others.
+DEPENDENT = 1e-9
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
 _POSITION_STIFFNESS = 1.0
 
@@ -58,9 +61,17 @@ def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
     return linear, angular
 
 
-def constraint_rank(system: System, q: NDArray[np.float64]) -> int:
-    """Rank of Phi_q at q; rows beyond it are redundant."""
-    return int(np.linalg.matrix_rank(system.jacobian(q), tol=1e-9)) if system.m else 0
+def redundant_rows(system: System, q: NDArray[np.float64], threshold: float = DEPENDENT) -> list[str]:
+    """Names of constraint rows that follow from the others at q, by a pivoted QR factorisation of Phi_q^T.
+
+    A row counts as such when its independent part is smaller than the threshold, as a fraction of the largest.
+    """
+    if system.m == 0:
+        return []
+    _, R, order = scipy.linalg.qr(system.jacobian(q).T, mode="economic", pivoting=True)
+    size = np.abs(np.diag(R))
+    rank = int(np.sum(size > threshold * size.max(initial=0.0)))
+    return sorted(system.rows[i] for i in order[rank:])
 
 
 def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:

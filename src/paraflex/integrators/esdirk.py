@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import State, System
+from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.integrators.tableaux import TR_BDF2
 from paraflex.kernel.linear import factor_system
@@ -49,9 +49,11 @@ _FIRST_STEP = 1e-6
 _NEWTON_MEMORY = 0.002
 # A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average.
 _MEMORY = 0.25
+# Rows this close to depending on each other when a run breaks down are the cause.
+_NEARLY_DEPENDENT = 1e-4
 _CAUSES = {
     NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
-    SINGULAR: "the constraints lose rank (singular position)",
+    SINGULAR: "the constraints lose rank, a singular position",
     NOT_FINITE: "the solution is no longer finite",
     ERROR_TEST: "the error test asks for steps below the smallest one",
 }
@@ -232,6 +234,10 @@ def integrate(
     if code == FINISHED or status == "interrupted":
         return solution
     cause = f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code]
+    # Near a singular position it may be Newton or the error test that gives up first.
+    lost = redundant_rows(system, state.q, _NEARLY_DEPENDENT) if code != PAUSED else []
+    if len(lost) > controls.dependent_rows:
+        cause = f"the constraints lose rank, a singular position ({', '.join(lost)})"
     moment = Moment(float(state.clock[TIME]), int(state.counts[STEPS]))
     raise IntegrationError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
 

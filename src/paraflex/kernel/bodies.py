@@ -62,6 +62,14 @@ def body_equations(p, i, q, v, a, f):
     f[o + 2] = sx * ay - sy * ax + (body.I0 + 2.0 * i1u + uI2u) * dw + mpf_a + 2.0 * w * (i1v + uI2v)
 
 
+@kernel
+def motion_forces(p, q, v, a, f):
+    """M q'' + h + K u of the whole system at every instant of a motion, all (instants, n)."""
+    for k in range(q.shape[0]):
+        for i in range(p.bodies.size):
+            body_equations(p, i, q[k], v[k], a[k], f[k])
+
+
 @inlined
 def body_energy(p, i, q, v):
     """Kinetic and strain energy of body i."""

@@ -172,7 +172,7 @@ def first_stage(p, signals, t, controls, m, ws):
 def start(p, signals, tableau, controls, m, ws, out):
     """First stage and first sample of a run."""
     t = m.clock[TIME]
-    if first_stage(p, signals, t, controls, m, ws) != controls.dependent_rows:
+    if first_stage(p, signals, t, controls, m, ws) > controls.dependent_rows:
         return SINGULAR
     a, lam = m.stage_a[1, 0], m.stage_lam[0]
     m.stage_t[1, 0] = t
@@ -279,7 +279,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     fresh = m.clock[FACTOR_G] != g
     if fresh:
         renew_factor(p, g, m, ws)
-    if orient(p, m.q, ws) != controls.dependent_rows:
+    if orient(p, m.q, ws) > controls.dependent_rows:
         return SINGULAR, 0.0
     tolerance = controls.newton_fraction * controls.rate * h
     slowest = 0
@@ -309,7 +309,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
                 return NO_CONVERGENCE, 0.0
             # An old factor may be to blame: once more with a new one before the step is cut.
             renew_factor(p, g, m, ws)
-            if orient(p, m.q, ws) != controls.dependent_rows:
+            if orient(p, m.q, ws) > controls.dependent_rows:
                 return SINGULAR, 0.0
             fresh = True
             continue
