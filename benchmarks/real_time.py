@@ -24,7 +24,7 @@ def main() -> None:
     task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7)
 
     def run(tolerance: float):
-        return pf.simulate(task, MODE, options=IntegrationOptions(tolerance=tolerance))
+        return task.simulate(MODE, options=IntegrationOptions(tolerance=tolerance))
 
     reference = float(pf.tracking_dataset([run(CONVERGED)])["tracking_rms"][0])
     rows = []

@@ -8,7 +8,7 @@ import paraflex as pf
 def main() -> dict[str, float]:
     robot = pf.load("raparm_i")  # or your own TOML file
     task = pf.plan_tracking(robot.mechanism, robot.paths["square"], duration=0.7)
-    runs = [pf.simulate(task, mode) for mode in ("+-+-", "++++")]
+    runs = [task.simulate(mode) for mode in ("+-+-", "++++")]
     data = pf.tracking_dataset(runs)
     for mode in data["mode"].values:
         peak = float(data["peak_torque"].sel(mode=mode).max())

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
     from paraflex.mechanism import Mechanism, raparm_i
     from paraflex.results import load_results, save_results, summary, tracking_dataset
-    from paraflex.simulate import plan_tracking, simulate
+    from paraflex.simulate import plan_tracking
     from paraflex.studies import run_study
 
 _HOME = {
@@ -38,7 +38,6 @@ _HOME = {
     "raparm_i": "mechanism",
     "run_study": "studies",
     "save_results": "results",
-    "simulate": "simulate",
     "summary": "results",
     "tracking_dataset": "results",
 }
@@ -63,7 +62,6 @@ __all__ = [
     "raparm_i",
     "run_study",
     "save_results",
-    "simulate",
     "summary",
     "tracking_dataset",
 ]
@@ -73,7 +71,6 @@ def __getattr__(name: str) -> Any:
     if name == "plots":
         return import_module("paraflex.plots")
     if name in _HOME:
-        # paraflex.simulate is a module too; the function of that name is what users call.
         return getattr(import_module(f"paraflex.{_HOME[name]}"), name)
     raise AttributeError(f"module 'paraflex' has no attribute {name!r}")
 

@@ -51,6 +51,10 @@ class TrackingTask:
         """Feed-forward torques of a mode: minimum norm, smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
 
+    def simulate(self, mode: str | ActuationMode, *, options: IntegrationOptions | None = None) -> TrackingRun:
+        """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""
+        return simulate(self, mode, options=options)
+
 
 @dataclass(frozen=True)
 class TrackingRun:

@@ -68,8 +68,8 @@ def redundant_rows(system: System, q: NDArray[np.float64], threshold: float = DE
     """
     if system.m == 0:
         return []
-    _, R, order = scipy.linalg.qr(system.jacobian(q).T, mode="economic", pivoting=True)
-    size = np.abs(np.diag(R))
+    factors = scipy.linalg.qr(system.jacobian(q).T, mode="r", pivoting=True)
+    size, order = np.abs(np.diag(factors[0])), factors[-1]
     rank = int(np.sum(size > threshold * size.max(initial=0.0)))
     return sorted(system.rows[i] for i in order[rank:])
 
