@@ -7,7 +7,9 @@ carries what was computed until then.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 __all__ = [
@@ -20,6 +22,7 @@ __all__ = [
     "ParaflexError",
     "SingularActuationError",
     "UnreachablePathError",
+    "suggestion",
 ]
 
 
@@ -61,6 +64,15 @@ class InputError(ParaflexError, ValueError):
 
 class OutputError(InputError):
     """A place where results cannot be written."""
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """A remedy for an unknown name: the nearest known one, or all of them."""
+    known = list(known)
+    near = get_close_matches(name, known, n=1)
+    if near:
+        return f'did you mean "{near[0]}"?'
+    return f"choose from {', '.join(known)}" if known else "there is none to choose from"
 
 
 def _short(value: object, limit: int = 80) -> str:

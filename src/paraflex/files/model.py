@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.files.library import library_file, library_names
 from paraflex.files.read import read_toml, validate
@@ -121,7 +120,7 @@ class Model:
                 "unknown path",
                 field="path",
                 value=wanted,
-                remedy=_choices(wanted, list(self.paths)),
+                remedy=suggestion(wanted, list(self.paths)),
                 source=self.source,
             )
         return self.paths[wanted]
@@ -154,7 +153,7 @@ def load(name_or_file: str | FilePath) -> Model:
                 "neither a library mechanism nor a file",
                 field="mechanism",
                 value=text,
-                remedy=_choices(text, library_names()),
+                remedy=suggestion(text, library_names()),
             )
     data = read_toml(path, source)
     table = validate(ModelTable, data, source)
@@ -205,7 +204,9 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
 
 def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
     if study.path is not None and study.path not in paths:
-        raise InputError("unknown path", field="study.path", value=study.path, remedy=_choices(study.path, list(paths)))
+        raise InputError(
+            "unknown path", field="study.path", value=study.path, remedy=suggestion(study.path, list(paths))
+        )
     for mode in study.modes:
         try:
             parse_mode(mechanism, mode)
@@ -216,7 +217,7 @@ def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDe
             "unknown assembly",
             field="study.assembly",
             value=study.assembly,
-            remedy=_choices(study.assembly, [a.name for a in mechanism.assemblies]),
+            remedy=suggestion(study.assembly, [a.name for a in mechanism.assemblies]),
         )
     if study.duration is not None and not study.duration > 0.0:
         raise InputError("must be positive", field="study.duration", value=study.duration, remedy="give it in s")
@@ -289,7 +290,7 @@ def _check_sides(width: float, thickness: float, name: str) -> None:
 
 def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:
     if name not in tables:
-        raise InputError(f"unknown {kind}", field=where, value=name, remedy=_choices(name, list(tables)))
+        raise InputError(f"unknown {kind}", field=where, value=name, remedy=suggestion(name, list(tables)))
     return tables[name]
 
 
@@ -302,10 +303,3 @@ def _path(table: PolygonTable | LineTable | CircleTable | PointsTable) -> Path:
         centre = (table.centre[0], table.centre[1])
         return Circle(centre, table.radius, table.max_acceleration, table.start_angle, table.sweep)
     return PointPath(tuple((x, y) for x, y in table.points), table.motion_time)
-
-
-def _choices(name: str, known: list[str]) -> str:
-    near = get_close_matches(name, known, n=1)
-    if near:
-        return f'did you mean "{near[0]}"?'
-    return f"choose from {', '.join(known)}" if known else "there is none to choose from"

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
-from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, suggestion
 from paraflex.fem import mesh_beam
 from paraflex.mechanism.bodies import Body, RigidBody
 from paraflex.mechanism.joints import GROUND, PointRef
@@ -85,7 +84,7 @@ def check_body(body: Body) -> None:
                 "a lump on an unknown point",
                 field=f"{field}.lumps",
                 value=lump.point,
-                remedy=_choices(lump.point, body.points),
+                remedy=suggestion(lump.point, body.points),
             )
         _not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
         _not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
@@ -178,20 +177,12 @@ def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
     points = {GROUND: mechanism.ground} | {body.name: body.points for body in mechanism.bodies}
     _known(ref.body, list(points), field, "body")
     if ref.point not in points[ref.body]:
-        raise InputError("unknown point", field=field, value=str(ref), remedy=_choices(ref.point, points[ref.body]))
+        raise InputError("unknown point", field=field, value=str(ref), remedy=suggestion(ref.point, points[ref.body]))
 
 
 def _known(name: str, known: list[str], field: str, kind: str) -> None:
     if name not in known:
-        raise InputError(f"unknown {kind}", field=field, value=name, remedy=_choices(name, known))
-
-
-def _choices(name: str, known: Iterable[str]) -> str:
-    known = list(known)
-    near = get_close_matches(name, known, n=1)
-    if near:
-        return f'did you mean "{near[0]}"?'
-    return f"choose from {', '.join(known)}" if known else "there is none to choose from"
+        raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))
 
 
 def _finite(values: Iterable[float], field: str) -> None:
