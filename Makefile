@@ -37,9 +37,8 @@ $(VENV)/.dev: $(VENV)/.run
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
-# Numba looks at the file of a cached function only, not at those of the functions it calls: one kernel edited, all go.
 $(VENV)/.kernels: $(VENV)/.run $(KERNELS)
-	rm -f src/paraflex/kernel/__pycache__/*.nb?
+	$(BIN)/python -m paraflex.compilation
 	touch $@
 
 clean:

@@ -89,10 +89,6 @@ def test_the_assembly_stays_the_same_all_along_the_path(raparm, path, assembly):
                 np.testing.assert_allclose(B, twins.elbow(base, C, side), rtol=0, atol=1e-12)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="follow_path walks through a Type I singularity that lies on no sample and comes out in another assembly",
-)
 def test_a_path_through_a_type_i_singularity_is_refused(raparm):
     # C passes over A1, where arm 1 is folded and may leave with its elbow on either side.
     path = Line((-0.3, 0.0), (0.09, 0.0), 5.0)

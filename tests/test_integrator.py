@@ -200,6 +200,13 @@ def test_free_floating_mechanism_keeps_momentum():
     assert np.linalg.norm(linear) > 0.1
 
 
+def test_a_single_free_body_flies_straight():
+    system = build_system(Mechanism("free", ground={}, bodies=(RigidBody("body", mass=2.0, inertia=0.1),), joints=()))
+    state = State(0.0, np.array([1.0, 2.0, 0.3]), np.array([0.5, -0.25, 2.0]))
+    solution = run(system, state, 2.0)
+    np.testing.assert_allclose(solution.q[-1], state.q + 2.0 * state.v, rtol=0, atol=1e-12)
+
+
 def test_baumgarte_pulls_a_violated_constraint_back():
     system = build_system(pendulum(beam(flexible=False)))
     state = consistent_state(system, system.mechanism.assembly())

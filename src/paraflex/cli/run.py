@@ -11,11 +11,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from paraflex.cli.tables import failures, plain_console, study_table
+from paraflex.compilation import compile_kernels
 from paraflex.errors import AssemblyError, InputError, OutputError
 from paraflex.files import Model, load, load_path
 from paraflex.integrators import IntegrationOptions
-from paraflex.kernel.compiling import is_compiled
-from paraflex.kernel.march import march
 from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, parse_mode
 from paraflex.results import save_results, summary
@@ -53,8 +52,7 @@ def run_command(request: RunRequest) -> int:
     modes = _modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     folder = _folder(request.out)
-    if not is_compiled(march):
-        console.print("Compiling the kernels: once after an installation, about half a minute.")
+    compile_kernels(console.print)
     began = time.perf_counter()
     task = _plan(model, path, path_name, request)
     parameters = _parameters(model, path_name, modes, task, options, request.rigid)

@@ -41,6 +41,8 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
 def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
     """Constraints in an order that keeps the envelope of the Schur complement small (reverse Cuthill-McKee)."""
     constraints = _constraints(mechanism)
+    if not constraints:
+        return []
     touched = np.zeros((len(constraints), len(index)))
     for i, constraint in enumerate(constraints):
         for ref in (constraint.a, constraint.b):

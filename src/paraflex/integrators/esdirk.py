@@ -15,7 +15,7 @@ from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.integrators.tableaux import TR_BDF2
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
-from paraflex.kernel.packed import Signals
+from paraflex.kernel.packed import Signals, Workspace
 from paraflex.kernel.run_state import (
     BALANCE,
     DPHI_MAX,
@@ -79,7 +79,7 @@ class IntegrationOptions:
         The scheme.
     """
 
-    tolerance: float = 5e-5
+    tolerance: float = 1e-4
     alpha: float = 20.0
     beta: float = 20.0
     max_step: float = math.inf
@@ -194,18 +194,76 @@ def integrate(
     InputError
         Times that do not ascend from the start.
     """
+    began = time.perf_counter()
     options = options or IntegrationOptions()
+    run = prepare(system, signals, initial, times, knots, options)
+    status, message, state = "complete", "", run.state
+    code = run.start()
+    try:
+        while code == PAUSED:
+            attempts = int(state.counts[STEPS] + state.counts[REJECTED])
+            if attempts >= options.max_steps:
+                break
+            code = run.march(min(_SLICE, options.max_steps - attempts))
+            if on_progress is not None:
+                on_progress(float(state.clock[TIME]))
+    except KeyboardInterrupt:
+        status, message = "interrupted", f"interrupted at t = {state.clock[TIME]:.6g} s"
+    solution = _solution(run.samples, state, time.perf_counter() - began, status, message)
+    if code == FINISHED or status == "interrupted":
+        return solution
+    cause = f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code]
+    # Near a singular position it may be Newton or the error test that gives up first.
+    lost = redundant_rows(system, state.q, _NEARLY_DEPENDENT) if code != PAUSED else []
+    if len(lost) > run.controls.dependent_rows:
+        cause = f"the constraints lose rank, a singular position ({', '.join(lost)})"
+    moment = Moment(float(state.clock[TIME]), int(state.counts[STEPS]))
+    raise IntegrationError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
+
+
+@dataclass(frozen=True)
+class Run:
+    """Everything the kernel's time loop works on."""
+
+    system: System
+    signals: Signals
+    tableau: Tableau
+    controls: Controls
+    stops: NDArray[np.float64]
+    state: March
+    workspace: Workspace
+    slow: Workspace
+    samples: Samples
+
+    def start(self) -> int:
+        """First stage and first sample; a code of `kernel.run_state`."""
+        arguments = (self.system.packed, self.signals, self.tableau, self.controls)
+        return start(*arguments, self.state, self.workspace, self.samples)
+
+    def march(self, attempts: int) -> int:
+        """So many attempted steps; a code of `kernel.run_state`."""
+        arguments = (self.system.packed, self.signals, self.tableau, self.controls, self.stops, attempts)
+        return march(*arguments, self.state, self.workspace, self.slow, self.samples)
+
+
+def prepare(
+    system: System,
+    signals: Signals,
+    initial: State,
+    times: NDArray[np.float64],
+    knots: NDArray[np.float64] | None,
+    options: IntegrationOptions,
+) -> Run:
+    """Set up a run: see `integrate`."""
     times = np.ascontiguousarray(times, dtype=float)
     if times.size == 0 or np.any(np.diff(times) <= 0.0) or times[0] < initial.time or times[-1] <= initial.time:
         raise InputError("times must ascend from the start", field="times", remedy="give at least one later time")
-    began = time.perf_counter()
     span = times[-1] - initial.time
     inner = np.array([] if knots is None else knots, dtype=float)
-    stops = np.unique(np.append(inner[(inner > initial.time) & (inner < times[-1])], times[-1]))
     state = make_march(system.n, system.m, options.tableau.c.size, len(system.mechanism.motors))
     state.q[:], state.v[:] = initial.q, initial.v
     state.clock[TIME], state.clock[STEP] = initial.time, min(_FIRST_STEP * span, options.max_step)
-    samples = _samples(times, system)
+    workspace = system.workspace()
     controls = Controls(
         rate=options.tolerance / span,
         newton_fraction=options.newton_fraction,
@@ -214,37 +272,19 @@ def integrate(
         alpha=options.alpha,
         beta=options.beta,
         max_step=options.max_step,
-        dependent_rows=dependent_rows(system, initial.q),
+        dependent_rows=int(factor_system(system.packed, 0.0, initial.q, workspace)),
     )
-    workspace, slow = system.workspace(), system.workspace()
-    arguments = (system.packed, signals, options.tableau, controls)
-    status, message = "complete", ""
-    code = start(*arguments, state, workspace, samples)
-    try:
-        while code == PAUSED:
-            attempts = int(state.counts[STEPS] + state.counts[REJECTED])
-            if attempts >= options.max_steps:
-                break
-            code = march(*arguments, stops, min(_SLICE, options.max_steps - attempts), state, workspace, slow, samples)
-            if on_progress is not None:
-                on_progress(float(state.clock[TIME]))
-    except KeyboardInterrupt:
-        status, message = "interrupted", f"interrupted at t = {state.clock[TIME]:.6g} s"
-    solution = _solution(samples, state, time.perf_counter() - began, status, message)
-    if code == FINISHED or status == "interrupted":
-        return solution
-    cause = f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code]
-    # Near a singular position it may be Newton or the error test that gives up first.
-    lost = redundant_rows(system, state.q, _NEARLY_DEPENDENT) if code != PAUSED else []
-    if len(lost) > controls.dependent_rows:
-        cause = f"the constraints lose rank, a singular position ({', '.join(lost)})"
-    moment = Moment(float(state.clock[TIME]), int(state.counts[STEPS]))
-    raise IntegrationError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
-
-
-def dependent_rows(system: System, q: NDArray[np.float64]) -> int:
-    """Number of constraint rows that follow from the others at q: redundant constraints."""
-    return int(factor_system(system.packed, 0.0, q, system.workspace()))
+    return Run(
+        system=system,
+        signals=signals,
+        tableau=options.tableau,
+        controls=controls,
+        stops=np.unique(np.append(inner[(inner > initial.time) & (inner < times[-1])], times[-1])),
+        state=state,
+        workspace=workspace,
+        slow=system.workspace(),
+        samples=_samples(times, system),
+    )
 
 
 def _samples(times: NDArray[np.float64], system: System) -> Samples:

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from paraflex.kernel.compiling import kernel
+from paraflex.kernel.compiling import routine
 
 
-@kernel
+@routine
 def fill(x, value):
     """Set every entry of a vector."""
     for i in range(x.size):
         x[i] = value
 
 
-@kernel
+@routine
 def copy(x, to):
     """Copy a vector."""
     for i in range(x.size):
         to[i] = x[i]
 
 
-@kernel
+@routine
 def largest(x):
     """Largest magnitude in a vector; zero for an empty one."""
     size = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from paraflex.kernel.arrays import copy, fill, largest
-from paraflex.kernel.compiling import kernel
+from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.dense import solve_dense
 from paraflex.kernel.joints import (
     apply_force,
@@ -21,11 +21,11 @@ from paraflex.kernel.joints import (
 MAX_ITERATIONS = 20
 # Newton has converged when no coordinate moves by more than this [m, rad].
 SMALLEST_MOVE = 1e-13
-# A body that turns or shifts this much against its prediction has jumped to another assembly [rad, m].
+# A body that turns or shifts this much against its prediction may have jumped to another assembly [rad, m].
 LARGEST_JUMP = 0.3
 # A pivot below this fraction of the Jacobian's largest entry is a singular position.
 SINGULAR_PIVOT = 1e-11
-CLOSED, NO_CONVERGENCE, JUMPED, SINGULAR = range(4)
+CLOSED, NO_CONVERGENCE, TOO_COARSE, SINGULAR = range(4)
 
 
 @kernel
@@ -45,7 +45,7 @@ def task_values(p, marker, coordinates, q, v, a):
     return out
 
 
-@kernel
+@routine
 def closure_jacobian(p, marker, coordinates, q, jacobian):
     """[Phi_q; task_q] at q."""
     m = p.rows.size
@@ -59,6 +59,28 @@ def closure_jacobian(p, marker, coordinates, q, jacobian):
         else:
             unit = 1.0 if coordinates[i] == 0 else 0.0
             apply_force(p, marker, q, unit, 1.0 - unit, rx, ry, jacobian[m + i])
+
+
+@routine
+def relative_change(before, now, change):
+    """Norm of before^-1 (now - before): below one, no matrix between the two is singular. Destroys before.
+
+    Assemblies meet where the Jacobian is singular, and a step over that may end in another one; a step that is short
+    enough does not, and no step is short enough that passes a singularity. A determinant would not tell: two loops may
+    be singular at once, as are an arm and the parallelogram beside it.
+    """
+    n = now.shape[0]
+    for i in range(n):
+        for j in range(n):
+            change[i, j] = now[i, j] - before[i, j]
+    solve_dense(before, change)
+    norm = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += abs(change[i, j])
+        norm = max(norm, total)
+    return norm
 
 
 @kernel
@@ -77,7 +99,8 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
     Returns
     -------
     status, index, residual
-        Where it stopped and the residual left there, for a status other than CLOSED.
+        Where it stopped and the residual left there, for a status other than CLOSED: NO_CONVERGENCE, SINGULAR, or
+        TOO_COARSE where a singular position may lie between this instant and the one before.
     """
     n, m, tasks = q.shape[1], p.rows.size, coordinates.size
     marker = p.markers[marker_index]
@@ -86,6 +109,7 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
     phi, dphi, lam = np.zeros(m), np.zeros(m), np.zeros(m)
     unused = np.zeros(n)
     right = np.zeros((n, 1 + tasks))
+    before, change = np.zeros((n, n)), np.zeros((n, n))
     for k in range(times.size):
         t = times[k]
         if k > 0:
@@ -115,7 +139,7 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
             return NO_CONVERGENCE, k, size
         for j in range(n):
             if k > 0 and abs(q[k, j] - guess[j]) > LARGEST_JUMP:
-                return JUMPED, k, size
+                return TOO_COARSE, k, size
         # Velocities, and with them the basis: one right-hand side each.
         constraint_values(p, signals, t, q[k], zero, phi, dphi)
         for r in range(n):
@@ -126,6 +150,10 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
             right[m + i, 0] = target[1, k, i]
             right[m + i, 1 + i] = 1.0
         closure_jacobian(p, marker, coordinates, q[k], jacobian)
+        if k > 0 and relative_change(before, jacobian, change) >= 1.0:
+            return TOO_COARSE, k, size
+        for j in range(n):
+            copy(jacobian[j], before[j])
         solve_dense(jacobian, right)
         for j in range(n):
             v[k, j] = right[j, 0]

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 from numba import njit
 
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
 
-_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": FAST_MATH}
+_OPTIONS = {
+    "cache": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": FAST_MATH,
+    "no_cfunc_wrapper": True,
+}
 
+# Without the entry from Python, which takes as long to compile as the function itself.
+_INNER_OPTIONS = {**_OPTIONS, "no_cpython_wrapper": True}
+
+# Called from Python.
 kernel = njit(**_OPTIONS)
+# Called from kernels only: called from Python it would crash the process.
+routine = njit(**_INNER_OPTIONS)
 # For what is called once a body in a hot loop: passing the packed system, some seventy machine words, costs as much
 # as the arithmetic. Not for more, because every copy is compiled again.
 inlined = njit(forceinline=True, **_OPTIONS)
-
-
-def is_compiled(function: Any) -> bool:
-    """Whether a kernel has been compiled before and stands in the cache on disk."""
-    return any(Path(function.stats.cache_path).glob(f"*{function.py_func.__name__}-*.nbc"))

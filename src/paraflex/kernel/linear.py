@@ -13,7 +13,7 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from paraflex.kernel.arrays import fill
-from paraflex.kernel.compiling import inlined, kernel
+from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import marker_shape
 from paraflex.kernel.packed import ANGLE, DINV, GJ, I1, MPF, NX, NY, OMEGA2, POINT, S2X, S2Y, SLOPE, YP, YX, YY
 
@@ -160,7 +160,7 @@ def add_schur(p, i, ws):
                     ws.schur[p.rows[high].start + low - p.rows[high].first] += sign * value
 
 
-@kernel
+@routine
 def factor_schur(p, ws):
     """Cholesky factor of the Schur complement in place, row by row within the envelope.
 
@@ -189,7 +189,7 @@ def factor_schur(p, ws):
     return dependent
 
 
-@kernel
+@routine
 def solve_schur(p, ws, x):
     """Solve with the factored Schur complement, in place."""
     for i in range(p.rows.size):

@@ -12,7 +12,7 @@ from math import isfinite
 
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.bodies import system_energy
-from paraflex.kernel.compiling import inlined, kernel
+from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import constraint_values, marker_angle
 from paraflex.kernel.linear import (
     factor_bodies,
@@ -65,7 +65,7 @@ SLOW_AGE = 25
 MIN_STEP = 1e-12
 
 
-@kernel
+@routine
 def input_power(p, signals, t, q, v, lam, torques):
     """Power of the motors and of prescribed motion."""
     total = 0.0
@@ -91,7 +91,7 @@ def interpolate(q0, v0, a0, q1, v1, a1, h, x):
     return q, v, a
 
 
-@kernel
+@routine
 def write_samples(p, tableau, t, h, m, out):
     """Fill every sample time within the accepted step from t to t + h."""
     piece = 0
@@ -120,7 +120,7 @@ def write_samples(p, tableau, t, h, m, out):
     m.counts[SAMPLE] = i
 
 
-@kernel
+@routine
 def predict(tableau, i, t, h, m):
     """Starting guess for stage i: the accelerations of the last three stages, extrapolated."""
     stages = tableau.c.size
@@ -147,7 +147,7 @@ def predict(tableau, i, t, h, m):
             a[j] += weight * source[j]
 
 
-@kernel
+@routine
 def first_stage(p, signals, t, controls, m, ws):
     """Accelerations and multipliers at (t, q, v), solved exactly, as the first stage; number of dependent rows."""
     a, lam = m.stage_a[1, 0], m.stage_lam[0]
@@ -192,7 +192,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     return PAUSED
 
 
-@kernel
+@routine
 def note_constraints(p, signals, t, m, ws):
     """Keep the largest constraint violation seen at accepted steps."""
     constraint_values(p, signals, t, m.q, m.v, ws.rows, ws.mu)
@@ -201,7 +201,7 @@ def note_constraints(p, signals, t, m, ws):
         m.clock[DPHI_MAX] = max(m.clock[DPHI_MAX], abs(ws.mu[r]))
 
 
-@kernel
+@routine
 def filtered_error(p, tableau, h, controls, m, ws, slow):
     """Error of the step in the mass norm, in position and by what its velocity error does later: (metres, metres).
 
@@ -234,7 +234,7 @@ def filtered_error(p, tableau, h, controls, m, ws, slow):
     return position, controls.memory * mass_norm(p, slow, slow.x)
 
 
-@kernel
+@routine
 def filter_error(p, g, controls, eq, ev, ws):
     """eps_v of (1 - g J) eps = (e_q, e_v) into ws.x, with the factor in ws made for b = g^2."""
     scale = 1.0 + 2.0 * controls.alpha * g + controls.beta * controls.beta * g * g
@@ -256,7 +256,7 @@ def filter_error(p, g, controls, eq, ev, ws):
     solve_system(p, ws, ws.x, ws.mu)
 
 
-@kernel
+@routine
 def renew_factor(p, g, m, ws):
     """Factor the bodies for stages of this g at the present deformation."""
     factor_bodies(p, g * g, m.q, ws)
@@ -264,7 +264,7 @@ def renew_factor(p, g, m, ws):
     m.clock[FACTOR_G], m.clock[RATE], m.counts[AGE] = g, WORST_RATE, 0
 
 
-@kernel
+@routine
 def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     """One step from t: all stages and the error estimate, relative to what is allowed.
 
@@ -327,7 +327,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     return PAUSED, error
 
 
-@kernel
+@routine
 def accept(p, signals, tableau, t, h, m, ws, out):
     """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1

@@ -15,7 +15,7 @@ from __future__ import annotations
 from math import isfinite
 
 from paraflex.kernel.bodies import body_equations
-from paraflex.kernel.compiling import kernel
+from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.joints import body_efforts, body_joints, start_rows
 from paraflex.kernel.linear import mass_norm, solve_system
 from paraflex.kernel.signals import evaluate_signal
@@ -41,7 +41,7 @@ def equations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
         body_efforts(p, i, torques, ws.f)
 
 
-@kernel
+@routine
 def solve_stage(p, signals, t, g, b, alpha, beta, qs, vs, a, lam, torques, tolerance, time_scale, rate, ws):
     """Newton iteration for one stage; a and lam are starting guesses and then the solution.
 

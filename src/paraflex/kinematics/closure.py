@@ -17,7 +17,7 @@ from paraflex.dynamics import (
     reference_pose,
 )
 from paraflex.errors import InputError, Moment, UnreachablePathError
-from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, close_path, task_values
+from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, SINGULAR, close_path, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.mechanism import Assembly, Mechanism
@@ -25,6 +25,8 @@ from paraflex.mechanism.mechanism import TASK_COORDINATES
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
 _LONGEST_STEP = 1e-3
+# Where such a step is too long it is cut into pieces, and these again; a step shorter than this is short enough [s].
+_PIECES, _SHORTEST_STEP = 16, 1e-6
 # Steps from the assembly's pose to the start of the path; more where these fail.
 _APPROACHES = (25, 250, 2500)
 
@@ -188,24 +190,31 @@ class _Closure:
         )
 
     def walk(self, path: Path, pose: NDArray[np.float64], grid: NDArray[np.float64], keep: NDArray[np.bool_]):
-        target = self.target(path.evaluate(grid))
-        status, index, residual, (q, v, a, basis) = self.run(grid, target, pose)
-        done = keep[:index]
-        motion = RigidMotion(
-            self.system,
-            path,
-            grid[:index][done],
-            q[:index][done],
-            v[:index][done],
-            a[:index][done],
-            basis[:index][done],
-        )
+        """The motion at the instants of the grid to keep, with more instants between where steps prove too long."""
+        stretches, gap = [], 0.0
+        while True:
+            target = self.target(path.evaluate(grid))
+            status, index, residual, found = self.run(grid, target, pose)
+            last = index - 1
+            # Where the path leaves the workspace the Jacobian is singular as well, but beyond nothing closes.
+            gap = residual if status == NO_CONVERGENCE else gap
+            if status in (CLOSED, SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
+                break
+            # From the last instant reached, in shorter steps.
+            stretches.append([x[:last][keep[:last]] for x in (grid, *found)])
+            pose = found[0][last]
+            between = np.linspace(grid[last], grid[index], _PIECES + 1)[1:-1]
+            grid = np.concatenate([grid[last:index], between, grid[index:]])
+            keep = np.concatenate([keep[last:index], np.zeros(between.size, bool), keep[index:]])
+        stretches.append([x[:index][keep[:index]] for x in (grid, *found)])
+        motion = RigidMotion(self.system, path, *(np.concatenate(parts) for parts in zip(*stretches, strict=True)))
         if status == CLOSED:
             return motion
-        away = status == NO_CONVERGENCE
-        what = "the path is out of reach" if away else "the path passes a Type I singularity"
-        gap = f" (a gap of {residual:.3g} remains)" if away else ""
-        raise UnreachablePathError(f"{what}{gap}", Moment(grid[index], index, tuple(target[0, index])), partial=motion)
+        what = (
+            f"the path is out of reach (a gap of {gap:.3g} remains)" if gap else "the path passes a Type I singularity"
+        )
+        moment = Moment(float(grid[index]), motion.t.size, tuple(target[0, index]))
+        raise UnreachablePathError(what, moment, partial=motion)
 
 
 def _with_marker(system: System, ref) -> tuple[PackedSystem, int]:
