@@ -1,0 +1,49 @@
+"""Does the tolerance mean what it says? All six modes of the RAParM-I study against a converged run.
+
+    python benchmarks/convergence.py
+
+For each tolerance and mode: the tracking error's relative error, and the end-effector's largest distance from the
+converged path in units of the tolerance, which should not exceed one by much. Takes a minute.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+import paraflex as pf
+from paraflex.integrators import IntegrationOptions
+
+CONVERGED = 2e-6
+TOLERANCES = (2e-4, 1e-4, 5e-5, 2e-5)
+
+
+def main() -> None:
+    model = pf.load("raparm_i")
+    task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7)
+
+    def study(tolerance: float) -> xr.Dataset:
+        result = pf.run_study(task, model.study.modes, options=IntegrationOptions(tolerance=tolerance))
+        assert result.data is not None
+        return result.data
+
+    reference = study(CONVERGED)
+    print(f"converged (tolerance {CONVERGED:g} m):")
+    for mode in reference["mode"].values:
+        print(f"  {mode}  tracking error {float(reference['tracking_rms'].sel(mode=mode)):.4e} m")
+    print(
+        f"{'tolerance':>10}  mode  {'error of the tracking error':>28}  {'largest distance/tolerance':>27}  {'steps':>7}"
+    )
+    for tolerance in TOLERANCES:
+        data = study(tolerance)
+        distance = np.linalg.norm(data["end_effector"] - reference["end_effector"], axis=-1).max(axis=1)
+        change = np.abs(data["tracking_rms"] / reference["tracking_rms"] - 1.0)
+        for i, mode in enumerate(data["mode"].values):
+            print(
+                f"{tolerance:10.0e}  {mode}  {float(change[i]):28.2%}  {distance[i] / tolerance:27.2f}  "
+                f"{int(data['steps'][i]):7d}"
+            )
+
+
+if __name__ == "__main__":
+    main()
