@@ -31,16 +31,14 @@ def main() -> None:
     print(f"converged (tolerance {CONVERGED:g} m):")
     for mode in reference["mode"].values:
         print(f"  {mode}  tracking error {float(reference['tracking_rms'].sel(mode=mode)):.4e} m")
-    print(
-        f"{'tolerance':>10}  mode  {'error of the tracking error':>28}  {'largest distance/tolerance':>27}  {'steps':>7}"
-    )
+    print(f"{'tolerance':>10}  mode  {'error':>7}  {'distance':>9}  {'steps':>7}")
     for tolerance in TOLERANCES:
         data = study(tolerance)
         distance = np.linalg.norm(data["end_effector"] - reference["end_effector"], axis=-1).max(axis=1)
         change = np.abs(data["tracking_rms"] / reference["tracking_rms"] - 1.0)
         for i, mode in enumerate(data["mode"].values):
             print(
-                f"{tolerance:10.0e}  {mode}  {float(change[i]):28.2%}  {distance[i] / tolerance:27.2f}  "
+                f"{tolerance:10.0e}  {mode}  {float(change[i]):7.2%}  {distance[i] / tolerance:9.2f}  "
                 f"{int(data['steps'][i]):7d}"
             )
 

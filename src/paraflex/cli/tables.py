@@ -21,9 +21,13 @@ def study_table(figures: dict[str, Any], task: TrackingTask) -> Table:
     """Tracking error and peak torques of every mode, and what the solver did."""
     motors = [motor.name for motor in task.mechanism.motors]
     table = Table(
-        title=f"{figures['mechanism']}: tracking error and peak torques", title_justify="left", box=box.SIMPLE
+        title=f"{figures['mechanism']}: tracking error and peak torques",
+        title_justify="left",
+        box=box.SIMPLE,
+        collapse_padding=True,
+        pad_edge=False,
     )
-    table.add_column("mode")
+    table.add_column("mode", no_wrap=True)
     for heading in ("error\n[m]", *(f"{motor}\n[N m]" for motor in motors), "vibration\n[m]", "steps\n", "wall\n[s]"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name, mode in figures["modes"].items():
