@@ -46,6 +46,10 @@ def kernel_forces(packed, system, q, v, a):
     return f
 
 
+def energy(system, q, v):
+    return system_energy(system.packed, q, v, system.workspace().points)
+
+
 # --- M, h, K, T and V of a body ------------------------------------------------------------------------------------
 
 
@@ -84,7 +88,7 @@ def test_energies_are_those_of_the_formulation(system, seed):
         # The twin's K is V^T K V, see above.
         np.testing.assert_allclose(strain, twins.strain_energy(body.integrals, q[body.all]), rtol=1e-9)
         total += kinetic, strain
-    np.testing.assert_allclose(system_energy(system.packed, q, v), total, rtol=1e-14)
+    np.testing.assert_allclose(energy(system, q, v), total, rtol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["link1", "link4"])
@@ -321,9 +325,7 @@ def test_a_change_of_the_ground_frame_is_followed(condition):
     assert systems[1].rows == rows
     np.testing.assert_allclose(a2, expected, rtol=0, atol=1e-10 * np.max(np.abs(a)))
     np.testing.assert_allclose(lam2, forces, rtol=0, atol=1e-10 * np.max(np.abs(lam)))
-    np.testing.assert_allclose(
-        system_energy(systems[1].packed, q2, v2), system_energy(systems[0].packed, q, v), rtol=1e-12
-    )
+    np.testing.assert_allclose(energy(systems[1], q2, v2), energy(systems[0], q, v), rtol=1e-12)
 
 
 def test_accelerations_do_not_depend_on_the_number_of_the_bodies():
@@ -375,7 +377,7 @@ def test_a_beam_without_flexibility_is_a_rigid_body():
     for x, y in zip(accelerations(one, q, v, [1.0, 2.0]), accelerations(two, q, v, [1.0, 2.0]), strict=True):
         # Some of them vanish: the pin does not move.
         np.testing.assert_allclose(x, y, rtol=0, atol=1e-12 * np.max(np.abs(y)))
-    np.testing.assert_allclose(system_energy(one.packed, q, v), system_energy(two.packed, q, v), rtol=1e-13)
+    np.testing.assert_allclose(energy(one, q, v), energy(two, q, v), rtol=1e-13)
 
 
 def test_the_rigid_mechanism_is_the_flexible_one_held_straight(condition):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import ActuationError, Moment, SingularActuationError
 from paraflex.kernel.bodies import motion_forces
+from paraflex.kernel.packed import make_point_scratch
 from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode
 
@@ -47,7 +48,7 @@ def required_effort(motion: RigidMotion) -> Effort:
     """Effort and actuation matrix of a rigid motion."""
     system = motion.system
     forces = np.zeros_like(motion.q)
-    motion_forces(system.packed, motion.q, motion.v, motion.a, forces)
+    motion_forces(system.packed, motion.q, motion.v, motion.a, forces, make_point_scratch(system.packed))
     selection = np.zeros((system.n, len(system.mechanism.motors)))
     for column, motor in enumerate(system.mechanism.motors):
         joint = system.mechanism.joint(motor.joint)

@@ -11,15 +11,18 @@ from paraflex.errors import InputError
 from paraflex.fem import (
     BeamMesh,
     Lump,
+    MassPoints,
     ModalBasis,
     ShapeIntegrals,
     SpanProperties,
     beam_integrals,
+    mass_points,
     mesh_beam,
     modal_basis,
+    node_weights,
     rigid_integrals,
 )
-from paraflex.mechanism import Body, Mechanism, PointRef, RigidBody
+from paraflex.mechanism import Body, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
 
@@ -38,6 +41,8 @@ class BodyCoordinates:
     modes : ModalBasis
     mesh : BeamMesh or None
         None for a rigid body.
+    points : MassPoints or None
+        In modal coordinates, of a flexible beam of second-order geometry.
     """
 
     name: str
@@ -45,6 +50,7 @@ class BodyCoordinates:
     integrals: ShapeIntegrals
     modes: ModalBasis
     mesh: BeamMesh | None
+    points: MassPoints | None = None
 
     @property
     def nf(self) -> int:
@@ -86,15 +92,25 @@ class Marker:
         Displacement per modal coordinate.
     slope : (nf,) array
         Turn of the beam there per modal coordinate.
+    bending : (nf, nf) array or None
+        Of the quadratic form that moves the point by -1/2 of it along x; None where it is zero.
     """
 
     body: int
     x0: NDArray[np.float64]
     N: NDArray[np.float64]
     slope: NDArray[np.float64]
+    bending: NDArray[np.float64] | None = None
+
+    def place(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Place in the body frame (2,) for flexible coordinates u (nf,)."""
+        s = self.x0 + self.N @ u
+        if self.bending is not None:
+            s[0] -= 0.5 * (u @ self.bending @ u)
+        return s
 
 
-def body_coordinates(body: Body, offset: int) -> BodyCoordinates:
+def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordinates:
     """Coordinates of a body that start at an offset in q.
 
     Raises
@@ -124,7 +140,11 @@ def body_coordinates(body: Body, offset: int) -> BodyCoordinates:
             field=f"body.{body.name}",
             remedy="check section, material and lumped masses for values many orders of magnitude apart",
         ) from error
-    return BodyCoordinates(body.name, offset, integrals.in_basis(modes.vectors), modes, mesh)
+    integrals = integrals.in_basis(modes.vectors)
+    points = None
+    if geometry is Geometry.SECOND_ORDER and integrals.nf:
+        points = mass_points(mesh, spans, lumps, integrals.D)
+    return BodyCoordinates(body.name, offset, integrals, modes, mesh, points)
 
 
 def make_marker(
@@ -139,7 +159,8 @@ def make_marker(
         return Marker(i, np.array(body.points[ref.point], dtype=float), np.zeros((2, 0)), np.zeros(0))
     mesh = bodies[i].mesh
     assert mesh is not None
-    x = float(mesh.nodes[mesh.points[ref.point]])
+    node, D, points = mesh.points[ref.point], bodies[i].integrals.D, bodies[i].points
+    x = float(mesh.nodes[node])
     N, slope = mesh.shape_at(x)
-    D = bodies[i].integrals.D
-    return Marker(i, np.array([x, 0.0]), N @ D, slope @ D)
+    bending = points.bending(node_weights(mesh, node)) if points is not None and node > 0 else None
+    return Marker(i, np.array([x, 0.0]), N @ D, slope @ D, bending)

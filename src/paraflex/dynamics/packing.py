@@ -9,7 +9,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
-from paraflex.kernel.packed import ANGLE, BODY, EFFORT, MARKER, POINT, PORT, ROW, PackedSystem
+from paraflex.kernel.packed import ANGLE, BODY, EFFORT, MARKER, MASS, POINT, PORT, ROW, PackedSystem
 from paraflex.mechanism import Mechanism, PointRef
 
 
@@ -99,6 +99,10 @@ def pack_system(
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
         G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
         shape=np.concatenate([np.zeros((3, 0)), *(np.vstack([m.N, m.slope]) for m in markers)], axis=1),
+        bending=_bending(bodies, markers),
+        masses=_mass_records(bodies),
+        mass_shape=np.concatenate([np.zeros((3, 0)), *(_mass_rows(body) for body in bodies)], axis=1),
+        mass_weights=np.concatenate([np.zeros(0), *(w for body in bodies for w in _mass_weights(body))]),
         total_mass=float(sum(body.integrals.m for body in bodies)),
     )
     return packed, tuple(labels)
@@ -107,6 +111,48 @@ def pack_system(
 def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
     s = body.integrals
     return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2])
+
+
+def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> NDArray[np.float64] | None:
+    if all(body.points is None for body in bodies):
+        return None
+    return np.concatenate([np.zeros(0), *(m.bending.ravel() for m in markers if m.bending is not None)])
+
+
+def _mass_weights(body: BodyCoordinates) -> list[NDArray[np.float64]]:
+    """Weights of each mass point, as far as they are not zero."""
+    if body.points is None:
+        return []
+    return [row[: 1 + int(np.max(np.nonzero(row)[0], initial=-1))] for row in body.points.weights]
+
+
+def _mass_rows(body: BodyCoordinates) -> NDArray[np.float64]:
+    if body.points is None:
+        return np.zeros((3, 0))
+    rows = np.concatenate([body.points.N, body.points.slope[:, None]], axis=1)
+    return rows.transpose(1, 0, 2).reshape(3, -1)
+
+
+def _mass_records(bodies: tuple[BodyCoordinates, ...]) -> NDArray[np.void]:
+    values = []
+    shape = start = 0
+    for body in bodies:
+        for k, weights in enumerate(_mass_weights(body)):
+            points = body.points
+            assert points is not None
+            values.append(
+                {
+                    "shape": shape,
+                    "weights": start,
+                    "reach": weights.size,
+                    "x": points.x[k],
+                    "mass": points.mass[k],
+                    "inertia": points.inertia[k],
+                }
+            )
+            shape += body.nf
+            start += weights.size
+    return _records(MASS, values)
 
 
 def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
@@ -119,10 +165,11 @@ def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
 
 def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
     values = []
-    flex = square = port = effort = block = 0
+    flex = square = port = effort = block = mass = dense = 0
     for body, body_ports, body_efforts in zip(bodies, ports, efforts, strict=True):
         s = body.integrals
         rows = sum(port["rows"] for port in body_ports)
+        masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
         values.append(
             {
                 "offset": body.offset,
@@ -135,6 +182,10 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
                 "effort_end": effort + len(body_efforts),
                 "block": block,
                 "rows": rows,
+                "mass": mass,
+                "mass_end": mass + masses,
+                "slopes": slopes,
+                "dense": dense,
                 "m": s.m,
                 "S1x": s.S1[0],
                 "S1y": s.S1[1],
@@ -146,14 +197,26 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
         port += len(body_ports)
         effort += len(body_efforts)
         block += rows**2
+        mass += masses
+        dense += (3 + body.nf) ** 2 if slopes else 0
     return _records(BODY, values)
 
 
 def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
-    values, shape = [], 0
+    values, shape, bending = [], 0, 0
     for marker in markers:
-        values.append({"body": marker.body, "shape": shape, "x": marker.x0[0], "y": marker.x0[1]})
+        bends = marker.bending is not None
+        values.append(
+            {
+                "body": marker.body,
+                "shape": shape,
+                "bending": bending if bends else -1,
+                "x": marker.x0[0],
+                "y": marker.x0[1],
+            }
+        )
         shape += marker.slope.size
+        bending += marker.slope.size**2 if bends else 0
     return _records(MARKER, values)
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from paraflex.dynamics.signals import constant_signals, pack_signals
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.bodies import body_equations
-from paraflex.kernel.packed import Signals
+from paraflex.kernel.bodies import body_terms
+from paraflex.kernel.packed import Signals, make_point_scratch
 from paraflex.mechanism import Assembly
 
 _MAX_ITERATIONS = 50
@@ -38,13 +38,13 @@ def mass_matrix(system: System, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Dense mass matrix (n, n) at q: the equations of motion are linear in the accelerations."""
     M = np.zeros((system.n, system.n))
     base, column = np.zeros(system.n), np.zeros(system.n)
-    still = np.zeros(system.n)
+    still, points = np.zeros(system.n), make_point_scratch(system.packed)
     for i, body in enumerate(system.bodies):
-        body_equations(system.packed, i, q, still, still, base)
+        body_terms(system.packed, i, q, still, still, base, points)
         for j in range(body.all.start, body.all.stop):
             unit = np.zeros(system.n)
             unit[j] = 1.0
-            body_equations(system.packed, i, q, still, unit, column)
+            body_terms(system.packed, i, q, still, unit, column, points)
             M[body.all, j] = column[body.all] - base[body.all]
     return M
 
@@ -109,7 +109,7 @@ def point_position(system: System, q: NDArray[np.float64], ref) -> NDArray[np.fl
         return marker.x0
     body = system.bodies[marker.body]
     c, s = np.cos(q[body.angle]), np.sin(q[body.angle])
-    local = marker.x0 + marker.N @ q[body.flexible]
+    local = marker.place(q[body.flexible])
     return q[body.position] + np.array([c * local[0] - s * local[1], s * local[0] + c * local[1]])
 
 

@@ -102,7 +102,7 @@ def build_system(mechanism: Mechanism) -> System:
     """
     bodies, offset = [], 0
     for body in mechanism.bodies:
-        coordinates = body_coordinates(body, offset)
+        coordinates = body_coordinates(body, offset, mechanism.geometry)
         bodies.append(coordinates)
         offset += 3 + coordinates.nf
     index = {body.name: i for i, body in enumerate(bodies)}

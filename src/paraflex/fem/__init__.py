@@ -1,5 +1,6 @@
 """Flexible beams: element, mesh, reference conditions, inertia shape integrals, eigenmodes. Knows no mechanisms."""
 
+from paraflex.fem.foreshortening import MassPoints, mass_points, node_weights
 from paraflex.fem.integrals import Lump, ShapeIntegrals, SpanProperties, beam_integrals, rigid_integrals
 from paraflex.fem.mesh import BeamMesh, mesh_beam
 from paraflex.fem.modes import ModalBasis, modal_basis, natural_frequencies
@@ -8,14 +9,17 @@ from paraflex.fem.reference import ReferenceCondition, reference_basis
 __all__ = [
     "BeamMesh",
     "Lump",
+    "MassPoints",
     "ModalBasis",
     "ReferenceCondition",
     "ShapeIntegrals",
     "SpanProperties",
     "beam_integrals",
+    "mass_points",
     "mesh_beam",
     "modal_basis",
     "natural_frequencies",
+    "node_weights",
     "reference_basis",
     "rigid_integrals",
 ]

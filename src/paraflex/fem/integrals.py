@@ -13,7 +13,7 @@ from paraflex.fem.mesh import BeamMesh
 from paraflex.fem.reference import ReferenceCondition, reference_basis
 
 # N^T N is of degree 10 in x, exact with six Gauss points.
-_GAUSS_POINTS = 6
+GAUSS_POINTS = 6
 
 # E^T of dR/dphi = R E: the paper's K~ below Eq. 25.
 _ET = np.array([[0.0, 1.0], [-1.0, 0.0]])
@@ -216,7 +216,7 @@ def beam_integrals(
 
 def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
     """Mass points (x, N, N2', dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
-    z, w = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+    z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     points = []
     stiffness = np.zeros((mesh.n_nodal, mesh.n_nodal))
     for e in range(mesh.n_elements):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
+from paraflex.kernel.bending import bent_energy, bent_equations
 from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.packed import GJ, I1, OMEGA2, S2X, S2Y
 
@@ -62,12 +63,23 @@ def body_equations(p, i, q, v, a, f):
     f[o + 2] = sx * ay - sy * ax + (body.I0 + 2.0 * i1u + uI2u) * dw + mpf_a + 2.0 * w * (i1v + uI2v)
 
 
+@inlined
+def body_terms(p, i, q, v, a, f, points):
+    """M q'' + h + K u of body i into f; `points` is scratch of second-order geometry (Workspace.points), or None."""
+    if points is None:
+        body_equations(p, i, q, v, a, f)
+    elif p.bodies[i].slopes > 0:
+        bent_equations(p, i, q, v, a, f, points)
+    else:
+        body_equations(p, i, q, v, a, f)
+
+
 @kernel
-def motion_forces(p, q, v, a, f):
+def motion_forces(p, q, v, a, f, points):
     """M q'' + h + K u of the whole system at every instant of a motion, all (instants, n)."""
     for k in range(q.shape[0]):
         for i in range(p.bodies.size):
-            body_equations(p, i, q[k], v[k], a[k], f[k])
+            body_terms(p, i, q[k], v[k], a[k], f[k], points)
 
 
 @inlined
@@ -102,11 +114,16 @@ def body_energy(p, i, q, v):
 
 
 @kernel
-def system_energy(p, q, v):
-    """Kinetic and strain energy of the system."""
+def system_energy(p, q, v, points):
+    """Kinetic and strain energy of the system; `points` as for `body_terms`."""
     kinetic, strain = 0.0, 0.0
     for i in range(p.bodies.size):
-        t, u = body_energy(p, i, q, v)
+        if points is None:
+            t, u = body_energy(p, i, q, v)
+        elif p.bodies[i].slopes > 0:
+            t, u = bent_energy(p, i, q, v, points)
+        else:
+            t, u = body_energy(p, i, q, v)
         kinetic += t
         strain += u
     return kinetic, strain

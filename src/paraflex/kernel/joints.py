@@ -2,7 +2,8 @@
 
 A marker stands at p = r + R s with s = x0 + N u, and
 p'' = r'' + R (phi'' E s - phi'^2 s + 2 phi' E N u' + N u''): the velocity-dependent part of the constraint on
-accelerations is not a formula of its own. A marker's angle is phi + N2' u.
+accelerations is not a formula of its own. A marker's angle is phi + N2' u. With second-order geometry s, N u' and N u''
+lose f/2, f'/2 and f''/2 along x.
 """
 
 from __future__ import annotations
@@ -28,6 +29,30 @@ def marker_shape(p, marker, vector):
 
 
 @inlined
+def marker_shortening(p, bending, marker, q, v, a):
+    """Half of f, f' and f'' of a marker: how far bending moves it towards the beam's first end.
+
+    `bending` is p.bending, None for linear geometry.
+    """
+    f0, f1, f2 = 0.0, 0.0, 0.0
+    if bending is None:
+        return f0, f1, f2
+    body = p.bodies[marker.body]
+    e, n = body.offset + 3, body.nf
+    if marker.bending >= 0:
+        for j in range(n):
+            row = marker.bending + j * n
+            bq, bv = 0.0, 0.0
+            for l in range(n):
+                bq += bending[row + l] * q[e + l]
+                bv += bending[row + l] * v[e + l]
+            f0 += 0.5 * q[e + j] * bq
+            f1 += v[e + j] * bq
+            f2 += a[e + j] * bq + v[e + j] * bv
+    return f0, f1, f2
+
+
+@inlined
 def marker_angle(p, marker, vector):
     """The angle phi + N2' u of a marker, or its rate or acceleration, by the system vector given."""
     body = p.bodies[marker.body]
@@ -47,8 +72,11 @@ def marker_motion(p, marker, q, v, a):
     sx, sy = marker_shape(p, marker, q)
     ux, uy = marker_shape(p, marker, v)
     bx, by = marker_shape(p, marker, a)
-    sx += marker.x
+    f0, f1, f2 = marker_shortening(p, p.bending, marker, q, v, a)
+    sx += marker.x - f0
     sy += marker.y
+    ux -= f1
+    bx -= f2
     # Body-frame velocity and acceleration relative to the origin.
     vx, vy = ux - w * sy, uy + w * sx
     ax = bx - dw * sy - w * w * sx - 2.0 * w * uy
@@ -78,6 +106,24 @@ def apply_force(p, marker, q, fx, fy, rx, ry, f):
     bx, by = c * fx + s * fy, c * fy - s * fx
     for j in range(body.nf):
         f[e + j] += p.shape[NX, k + j] * bx + p.shape[NY, k + j] * by
+    shorten(p, p.bending, marker, q, -bx, f, e)
+
+
+@inlined
+def shorten(p, bending, marker, q, scale, x, at):
+    """Add scale times the derivative of a marker's f/2 to x[at:]; `bending` as for `marker_shortening`."""
+    if bending is None:
+        return
+    if marker.bending < 0:
+        return
+    body = p.bodies[marker.body]
+    e, n = body.offset + 3, body.nf
+    for j in range(n):
+        row = marker.bending + j * n
+        total = 0.0
+        for l in range(n):
+            total += bending[row + l] * q[e + l]
+        x[at + j] += scale * total
 
 
 @inlined

@@ -13,8 +13,9 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from paraflex.kernel.arrays import fill
+from paraflex.kernel.bending import bent_mass_square, bent_mass_times, factor_bent, solve_bent
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import marker_shape
+from paraflex.kernel.joints import marker_shape, marker_shortening, shorten
 from paraflex.kernel.packed import ANGLE, DINV, GJ, I1, MPF, NX, NY, OMEGA2, POINT, S2X, S2Y, SLOPE, YP, YX, YY
 
 # A pivot smaller than this fraction of its diagonal entry marks a constraint row that depends on those before it.
@@ -68,9 +69,16 @@ def factor_body(p, i, b, q, ws):
 
 
 @inlined
-def solve_body(p, i, ws, y, x, at):
-    """X = (M + b K)^-1 y of body i in its body frame; y and x hold 3 + nf entries from `at` on, and may be one."""
+def solve_body(p, i, ws, dense, y, x, at):
+    """X = (M + b K)^-1 y of body i in its body frame; y and x hold 3 + nf entries from `at` on, and may be one.
+
+    `dense` is ws.dense, None for linear geometry.
+    """
     body = p.bodies[i]
+    if dense is not None:
+        if body.slopes > 0:
+            solve_bent(p, i, dense, y, x, at)
+            return
     n, k = body.nf, body.flex
     fr = ws.frame[i]
     e = at + 3
@@ -110,16 +118,18 @@ def body_jacobian(p, i, q, ws):
         else:
             y = x + width
             ux, uy = marker_shape(p, marker, q)
+            ux -= marker_shortening(p, p.bending, marker, q, q, q)[0]
             ws.jac[x], ws.jac[x + 1], ws.jac[x + 2] = 1.0, 0.0, -(marker.y + uy)
             ws.jac[y], ws.jac[y + 1], ws.jac[y + 2] = 0.0, 1.0, marker.x + ux
             for j in range(n):
                 ws.jac[x + 3 + j] = p.shape[NX, h + j]
                 ws.jac[y + 3 + j] = p.shape[NY, h + j]
+            shorten(p, p.bending, marker, q, -1.0, ws.jac, x + 3)
     # The rows of a body lie one after the other, from its first port's on.
     first = p.ports[body.port].jac if body.port < body.port_end else 0
     for r in range(body.rows):
         at = first + r * width
-        solve_body(p, i, ws, ws.jac, ws.inv, at)
+        solve_body(p, i, ws, ws.dense, ws.jac, ws.inv, at)
         for s in range(r + 1):
             other = first + s * width
             dot = 0.0
@@ -209,7 +219,8 @@ def solve_schur(p, ws, x):
 def factor_bodies(p, b, q, ws):
     """Factor every body's M + b K at its deformation in q, in its own frame."""
     for i in range(p.bodies.size):
-        factor_body(p, i, b, q, ws)
+        if not factor_bent(p, i, b, q, ws, ws.dense):
+            factor_body(p, i, b, q, ws)
         body_jacobian(p, i, q, ws)
 
 
@@ -294,7 +305,7 @@ def solve_system(p, ws, x, mu):
         mu[r] = -mu[r]
     for i in range(p.bodies.size):
         to_body_frame(p, i, ws, x)
-        solve_body(p, i, ws, x, x, p.bodies[i].offset)
+        solve_body(p, i, ws, ws.dense, x, x, p.bodies[i].offset)
         jacobian_times(p, i, ws, x, 1.0, mu)
     solve_schur(p, ws, mu)
     for i in range(p.bodies.size):
@@ -303,9 +314,16 @@ def solve_system(p, ws, x, mu):
 
 
 @inlined
-def mass_times(p, i, ws, x):
-    """M x of body i in place, with the mass matrix of the factor; x in the body frame."""
+def mass_times(p, i, ws, mass, x):
+    """M x of body i in place, with the mass matrix of the factor; x in the body frame.
+
+    `mass` is ws.mass, None for linear geometry.
+    """
     body = p.bodies[i]
+    if mass is not None:
+        if body.slopes > 0:
+            bent_mass_times(p, i, mass, ws.nf, x)
+            return
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
     sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
@@ -323,23 +341,32 @@ def mass_times(p, i, ws, x):
     x[o], x[o + 1], x[o + 2] = y0, y1, y2
 
 
+@inlined
+def mass_square(p, i, ws, mass, x):
+    """x^T M x of body i for a ground-frame vector; `mass` as for `mass_times`."""
+    body = p.bodies[i]
+    o, k = body.offset, body.flex
+    c, s = ws.frame[i, 0], ws.frame[i, 1]
+    x0, x1, x2 = c * x[o] + s * x[o + 1], c * x[o + 1] - s * x[o], x[o + 2]
+    if mass is not None:
+        if body.slopes > 0:
+            return bent_mass_square(p, i, mass, x, x0, x1)
+    sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
+    fx, fy, fp, ff = 0.0, 0.0, 0.0, 0.0
+    for j in range(body.nf):
+        z = x[o + 3 + j]
+        fx += p.modal[S2X, k + j] * z
+        fy += p.modal[S2Y, k + j] * z
+        fp += ws.flex[MPF, k + j] * z
+        ff += z * z
+    square = body.m * (x0 * x0 + x1 * x1) + inertia * x2 * x2 + ff
+    return square + 2.0 * (x0 * (fx - sy * x2) + x1 * (fy + sx * x2) + x2 * fp)
+
+
 @kernel
 def mass_norm(p, ws, x):
     """sqrt(x^T M x / m_total) of a ground-frame vector: metres for a displacement, whatever the coordinates."""
     total = 0.0
     for i in range(p.bodies.size):
-        body = p.bodies[i]
-        o, k = body.offset, body.flex
-        c, s = ws.frame[i, 0], ws.frame[i, 1]
-        sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
-        x0, x1, x2 = c * x[o] + s * x[o + 1], c * x[o + 1] - s * x[o], x[o + 2]
-        fx, fy, fp, ff = 0.0, 0.0, 0.0, 0.0
-        for j in range(body.nf):
-            z = x[o + 3 + j]
-            fx += p.modal[S2X, k + j] * z
-            fy += p.modal[S2Y, k + j] * z
-            fp += ws.flex[MPF, k + j] * z
-            ff += z * z
-        total += body.m * (x0 * x0 + x1 * x1) + inertia * x2 * x2 + ff
-        total += 2.0 * (x0 * (fx - sy * x2) + x1 * (fy + sx * x2) + x2 * fp)
+        total += mass_square(p, i, ws, ws.mass, x)
     return sqrt(max(total, 0.0) / p.total_mass)

@@ -50,7 +50,7 @@ def interpolate(q0, v0, a0, q1, v1, a1, h, x):
 
 
 @routine
-def write_samples(p, tableau, t, h, m, out):
+def write_samples(p, tableau, t, h, m, ws, out):
     """Fill every sample time within the accepted step from t to t + h."""
     piece = 0
     i = m.counts[SAMPLE]
@@ -68,7 +68,7 @@ def write_samples(p, tableau, t, h, m, out):
             )  # fmt: skip
         for r in range(m.stage_lam.shape[1]):
             out.lam[i, r] = (1.0 - x) * m.stage_lam[s0, r] + x * m.stage_lam[s1, r]
-        out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i])
+        out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i], ws.points)
         # Work by the trapezoidal rule within the step: the sum over whole steps is the scheme's own quadrature.
         done = (time - t) / h
         out.energy[i, 2] = m.clock[WORK] + h * done * (
@@ -110,7 +110,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     copy(m.q, m.stage_q[0])
     copy(m.v, m.stage_v[0])
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques)
-    kinetic, strain = system_energy(p, m.q, m.v)
+    kinetic, strain = system_energy(p, m.q, m.v, ws.points)
     m.clock[ENERGY_0] = kinetic + strain
     note_constraints(p, signals, t, m, ws)
     if out.times.size > 0 and out.times[0] <= t:
@@ -136,7 +136,7 @@ def note_constraints(p, signals, t, m, ws):
 def accept(p, signals, tableau, t, h, m, ws, out):
     """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1
-    write_samples(p, tableau, t, h, m, out)
+    write_samples(p, tableau, t, h, m, ws, out)
     copy(m.stage_q[last], m.q)
     copy(m.stage_v[last], m.v)
     for s in range(last + 1):
@@ -153,7 +153,7 @@ def accept(p, signals, tableau, t, h, m, ws, out):
     m.counts[STEPS] += 1
     m.counts[AGE] += 1
     m.counts[FAILURES] = 0
-    kinetic, strain = system_energy(p, m.q, m.v)
+    kinetic, strain = system_energy(p, m.q, m.v, ws.points)
     balance = abs(kinetic + strain - m.clock[ENERGY_0] - m.clock[WORK])
     m.clock[BALANCE] = max(m.clock[BALANCE], balance)
     note_constraints(p, signals, t + h, m, ws)

@@ -33,6 +33,10 @@ BODY = np.dtype(
         ("effort_end", np.int64),
         ("block", np.int64),  # first entry of its rows x rows block J M^-1 J^T in Workspace.blocks
         ("rows", np.int64),  # constraint rows that touch it
+        ("mass", np.int64),  # its mass points, of second-order geometry: mass .. mass_end, none of linear
+        ("mass_end", np.int64),
+        ("slopes", np.int64),  # the first so many of them are Gauss points
+        ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace
         ("m", np.float64),
         ("S1x", np.float64),
         ("S1y", np.float64),
@@ -44,8 +48,20 @@ MARKER = np.dtype(
     [
         ("body", np.int64),
         ("shape", np.int64),  # first column of its rows in `shape`
+        ("bending", np.int64),  # first entry of its matrix in `bending`, -1 for none
         ("x", np.float64),
         ("y", np.float64),
+    ],
+    align=True,
+)
+MASS = np.dtype(
+    [
+        ("shape", np.int64),  # first column of its rows in `mass_shape`
+        ("weights", np.int64),  # first of its weights in `mass_weights`
+        ("reach", np.int64),  # and how many: the Gauss points up to it
+        ("x", np.float64),
+        ("mass", np.float64),
+        ("inertia", np.float64),
     ],
     align=True,
 )
@@ -85,6 +101,11 @@ class PackedSystem(NamedTuple):
     I2: NDArray[np.float64]  # nf x nf of every body, row by row
     G2: NDArray[np.float64]
     shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every marker
+    # Of second-order geometry; without it there is no `bending`, and kernels are compiled without all that needs it.
+    bending: NDArray[np.float64] | None  # nf x nf of every marker that bending moves: f = u . bending u
+    masses: NDArray[np.void]
+    mass_shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every mass point
+    mass_weights: NDArray[np.float64]
     total_mass: float
 
 
@@ -111,7 +132,12 @@ class Workspace(NamedTuple):
     inv: NDArray[np.float64]  # the same rows times the inverse of the body's iteration matrix
     blocks: NDArray[np.float64]  # J M^-1 J^T of every body, in its frame
     schur: NDArray[np.float64]  # envelope of the Schur complement, then its Cholesky factor
-    nf: NDArray[np.float64]  # (2, max nf) scratch
+    nf: NDArray[np.float64]  # (3 + max nf,) scratch
+    # Of second-order geometry, else None:
+    points: NDArray[np.float64] | None  # (4, max mass points of a body) scratch
+    mass: NDArray[np.float64] | None  # M of every body, (3 + nf)^2
+    dense: NDArray[np.float64] | None  # the factor of M + b (K + K_g)
+    geometric: NDArray[np.float64] | None  # K_g, nf^2
 
 
 def make_workspace(p: PackedSystem) -> Workspace:
@@ -119,6 +145,7 @@ def make_workspace(p: PackedSystem) -> Workspace:
     n = int(sum(3 + body["nf"] for body in p.bodies))
     m = p.rows.size
     widths = [(3 + p.bodies[p.markers[port["marker"]]["body"]]["nf"]) * port["rows"] for port in p.ports]
+    dense = int(sum((3 + body["nf"]) ** 2 for body in p.bodies if body["slopes"]))
     envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(p.rows)))
     return Workspace(
         f=np.zeros(n),
@@ -133,5 +160,16 @@ def make_workspace(p: PackedSystem) -> Workspace:
         inv=np.zeros(int(sum(widths))),
         blocks=np.zeros(int(np.sum(p.bodies["rows"] ** 2))),
         schur=np.zeros(envelope),
-        nf=np.zeros((2, max(1, int(p.bodies["nf"].max(initial=0))))),
+        nf=np.zeros(3 + int(p.bodies["nf"].max(initial=0))),
+        points=make_point_scratch(p),
+        mass=None if p.bending is None else np.zeros(dense),
+        dense=None if p.bending is None else np.zeros(dense),
+        geometric=None if p.bending is None else np.zeros(p.I2.size),
     )
+
+
+def make_point_scratch(p: PackedSystem) -> NDArray[np.float64] | None:
+    """Slopes of a body's Gauss points, their derivatives, and forces: what `kernel.bending` writes."""
+    if p.bending is None:
+        return None
+    return np.zeros((4, int((p.bodies["mass_end"] - p.bodies["mass"]).max(initial=0))))

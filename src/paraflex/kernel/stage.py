@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from paraflex.kernel.bodies import body_equations
+from paraflex.kernel.bodies import body_terms
 from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.joints import body_efforts, body_joints, start_rows
 from paraflex.kernel.linear import mass_norm, solve_system
@@ -36,7 +36,7 @@ def equations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
         torques[k] = evaluate_signal(signals, k, t)[0]
     start_rows(p, signals, t, weight_v, weight_q, ws.rows)
     for i in range(p.bodies.size):
-        body_equations(p, i, q, v, a, ws.f)
+        body_terms(p, i, q, v, a, ws.f, ws.points)
         body_joints(p, i, q, v, a, lam, weight_v, weight_q, ws.f, ws.rows)
         body_efforts(p, i, torques, ws.f)
 

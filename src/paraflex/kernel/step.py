@@ -11,6 +11,7 @@ from __future__ import annotations
 from math import isfinite
 
 from paraflex.kernel.arrays import copy, fill
+from paraflex.kernel.bending import note_all_axial_forces, subtract_geometric
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.joints import marker_angle
 from paraflex.kernel.linear import (
@@ -134,10 +135,11 @@ def filter_error(p, g, controls, eq, ev, ws):
         to_body_frame(p, i, ws, ws.f)
         jacobian_times(p, i, ws, ws.x, 1.0 / scale, ws.mu)
         jacobian_times(p, i, ws, ws.f, -controls.beta * controls.beta * g / scale, ws.mu)
-        mass_times(p, i, ws, ws.x)
+        mass_times(p, i, ws, ws.mass, ws.x)
         e = body.offset + 3
         for j in range(body.nf):
             ws.x[e + j] -= g * p.modal[OMEGA2, body.flex + j] * eq[e + j]
+        subtract_geometric(p, i, ws.geometric, g, eq, ws.x)
         to_ground_frame(p, i, ws, ws.x)
     solve_system(p, ws, ws.x, ws.mu)
 
@@ -145,6 +147,7 @@ def filter_error(p, g, controls, eq, ev, ws):
 @routine
 def renew_factor(p, g, m, ws):
     """Factor the bodies for stages of this g at the present deformation."""
+    note_all_axial_forces(p, m.q, m.v, m.stage_a[1, 0], m.stage_lam[0], ws, ws.geometric)
     factor_bodies(p, g * g, m.q, ws)
     m.counts[FACTORS] += 1
     m.clock[FACTOR_G], m.clock[RATE], m.counts[AGE] = g, WORST_RATE, 0

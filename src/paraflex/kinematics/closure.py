@@ -221,6 +221,6 @@ def _with_marker(system: System, ref) -> tuple[PackedSystem, int]:
     """The packed system with one more marker, for a point that is not at a joint; rigid, so no shape rows."""
     marker = system.marker(ref)
     record = np.zeros(1, dtype=MARKER)
-    record["body"], record["x"], record["y"] = marker.body, *marker.x0
+    record["body"], record["bending"], record["x"], record["y"] = marker.body, -1, *marker.x0
     markers = np.concatenate([system.packed.markers, record])
     return system.packed._replace(markers=markers), markers.size - 1

@@ -7,9 +7,11 @@ from paraflex.mechanism.mechanism import (
     ActuationMode,
     Assembly,
     EndEffector,
+    Geometry,
     Mechanism,
     mode_of_motors,
     mode_of_signs,
+    parse_geometry,
     parse_mode,
 )
 from paraflex.mechanism.raparm import raparm_i
@@ -22,6 +24,7 @@ __all__ = [
     "Body",
     "EndEffector",
     "FlexibleBeam",
+    "Geometry",
     "LumpedMass",
     "Material",
     "Mechanism",
@@ -35,6 +38,7 @@ __all__ = [
     "check_mechanism",
     "mode_of_motors",
     "mode_of_signs",
+    "parse_geometry",
     "parse_mode",
     "raparm_i",
 ]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, FlexibleBeam
 from paraflex.mechanism.checks import check_mechanism
@@ -43,6 +44,20 @@ class ActuationMode:
     motors: tuple[str, ...]
 
 
+class Geometry(Enum):
+    """How the shape of a beam follows from its flexible coordinates.
+
+    LINEAR
+        As in the paper: displacements linear in the coordinates. A bent beam does not get shorter.
+    SECOND_ORDER
+        With the shortening by bending, kept through inertia, joints and their Jacobians: right where axial forces are
+        large.
+    """
+
+    LINEAR = "linear"
+    SECOND_ORDER = "second-order"
+
+
 @dataclass(frozen=True)
 class Mechanism:
     """A planar mechanism of rigid bodies and flexible beams. Checked when it is made.
@@ -63,6 +78,8 @@ class Mechanism:
         The first is the default.
     modes : tuple of ActuationMode
         The modes to choose from by default; any other set of motors may be asked for.
+    geometry : Geometry
+        Of its flexible beams.
     description : str
 
     Raises
@@ -80,6 +97,7 @@ class Mechanism:
     end_effector: EndEffector | None = None
     assemblies: tuple[Assembly, ...] = ()
     modes: tuple[ActuationMode, ...] = ()
+    geometry: Geometry = Geometry.LINEAR
     description: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -143,6 +161,33 @@ class Mechanism:
         if reference is not None:
             beams = [replace(beam, reference=reference) for beam in beams]
         return self.with_bodies(beams)
+
+    def with_geometry(self, geometry: Geometry | str) -> Mechanism:
+        """The mechanism with linear or second-order geometry of its flexible beams.
+
+        Raises
+        ------
+        InputError
+            Neither of the two.
+        """
+        return replace(self, geometry=parse_geometry(geometry))
+
+
+def parse_geometry(geometry: Geometry | str) -> Geometry:
+    """A geometry by its name, "linear" or "second-order".
+
+    Raises
+    ------
+    InputError
+        Neither of the two.
+    """
+    try:
+        return Geometry(geometry)
+    except ValueError:
+        names = [known.value for known in Geometry]
+        raise InputError(
+            "unknown geometry", field="geometry", value=geometry, remedy=suggestion(str(geometry), names)
+        ) from None
 
 
 def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:

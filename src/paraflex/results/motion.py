@@ -37,8 +37,13 @@ def point_motion(
     def quarter(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.column_stack([-x[:, 1], x[:, 0]])
 
-    local = marker.x0 + q[:, body.flexible] @ marker.N.T
-    rate, second = v[:, body.flexible] @ marker.N.T, a[:, body.flexible] @ marker.N.T
+    u, du, ddu = q[:, body.flexible], v[:, body.flexible], a[:, body.flexible]
+    local, rate, second = marker.x0 + u @ marker.N.T, du @ marker.N.T, ddu @ marker.N.T
+    if marker.bending is not None:
+        bu, bdu = u @ marker.bending, du @ marker.bending
+        local[:, 0] -= 0.5 * np.sum(u * bu, axis=1)
+        rate[:, 0] -= np.sum(du * bu, axis=1)
+        second[:, 0] -= np.sum(ddu * bu + du * bdu, axis=1)
     return PointMotion(
         q[:, body.position] + turned(local),
         v[:, body.position] + turned(w * quarter(local) + rate),

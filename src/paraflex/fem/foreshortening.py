@@ -1,0 +1,110 @@
+"""Second-order geometry of a beam: as it bends, its points move towards its first end.
+
+With the axial coordinates taken as the stretch of the centre line, a point stands at
+s(x) = x0 + N u - 1/2 e_x f(x), f(x) = int_0^x (N2' u)^2 dx. Everything that moves is a mass point: Gauss points along
+the beam, where slopes are taken too, then the lumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.fem.element import axial_shape, transverse_shape
+from paraflex.fem.integrals import GAUSS_POINTS, Lump, SpanProperties
+from paraflex.fem.mesh import BeamMesh
+
+
+@dataclass(frozen=True)
+class MassPoints:
+    """A beam as k mass points, the first g of them its Gauss points.
+
+    Attributes
+    ----------
+    x : (k,) array
+        Place along the undeformed beam [m].
+    mass, inertia : (k,) arrays
+        [kg], [kg m^2]; Gauss points have no moment of inertia.
+    N : (k, 2, nf) array
+        Displacement per flexible coordinate.
+    slope : (k, nf) array
+        N2'.
+    weights : (k, g) array
+        f of each point is weights @ (slope of the Gauss points @ u)^2.
+    """
+
+    x: NDArray[np.float64]
+    mass: NDArray[np.float64]
+    inertia: NDArray[np.float64]
+    N: NDArray[np.float64]
+    slope: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+    def bending(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The matrix (nf, nf) of the quadratic form f at a point of these weights (g,)."""
+        slopes = self.slope[: weights.size]
+        return slopes.T @ (weights[:, None] * slopes)
+
+
+def mass_points(
+    mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence[Lump], basis: NDArray[np.float64]
+) -> MassPoints:
+    """Mass points of a beam, the same quadrature as its shape integrals.
+
+    Parameters
+    ----------
+    mesh, spans, lumps
+        As for `beam_integrals`.
+    basis : (n_nodal, nf) array
+        Nodal coordinates per flexible coordinate.
+    """
+    z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    n, g = mesh.n_elements, GAUSS_POINTS
+    lengths = np.diff(mesh.nodes)
+    x, mass, rows, slopes = [], [], [], []
+    for e, length in enumerate(lengths):
+        local = 0.5 * length * (z + 1.0)
+        axial = mesh.scatter(e, axial_shape(local, length)) @ basis
+        transverse = mesh.scatter(e, transverse_shape(local, length)) @ basis
+        rows.append(np.stack([axial, transverse], axis=1))
+        slopes.append(mesh.scatter(e, transverse_shape(local, length, derivative=1)) @ basis)
+        x.append(mesh.nodes[e] + local)
+        mass.append(0.5 * length * w * spans[mesh.spans[e]].mass_per_length)
+    weights = np.zeros((n * g + len(lumps), n * g))
+    for e, length in enumerate(lengths):
+        own = slice(e * g, (e + 1) * g)
+        weights[own, : e * g] = node_weights(mesh, e)[: e * g]
+        weights[own, own] = 0.5 * length * _cumulative(z)
+    for k, lump in enumerate(lumps):
+        weights[n * g + k] = node_weights(mesh, lump.node)
+        shape, slope = mesh.shape_at(mesh.nodes[lump.node])
+        rows.append((shape @ basis)[None])
+        slopes.append((slope @ basis)[None])
+    return MassPoints(
+        x=np.concatenate([*x, [mesh.nodes[lump.node] for lump in lumps]]),
+        mass=np.concatenate([*mass, [lump.mass for lump in lumps]]),
+        inertia=np.concatenate([np.zeros(n * g), [lump.inertia for lump in lumps]]),
+        N=np.concatenate(rows),
+        slope=np.concatenate(slopes),
+        weights=weights,
+    )
+
+
+def node_weights(mesh: BeamMesh, node: int) -> NDArray[np.float64]:
+    """Weights (g,) of the Gauss points in f at a node: all of the elements before it, exactly."""
+    _, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    weights = np.zeros((mesh.n_elements, GAUSS_POINTS))
+    weights[:node] = 0.5 * np.diff(mesh.nodes)[:node, None] * w
+    return weights.ravel()
+
+
+def _cumulative(z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Integrals from -1 to z_i of the Lagrange polynomials on the nodes z: (g, g)."""
+    # Columns of the inverse Vandermonde matrix are the polynomials' coefficients in Legendre form.
+    legendre = np.polynomial.legendre
+    coefficients = np.linalg.inv(legendre.legvander(z, z.size - 1))
+    integrals = legendre.legint(coefficients, lbnd=-1, axis=0)
+    return np.asarray(legendre.legval(z, integrals).T, dtype=float)
