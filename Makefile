@@ -6,7 +6,7 @@ KERNELS := $(wildcard src/paraflex/kernel/*.py)
 
 .PHONY: run test lint types imports tests docs clean
 
-run: $(VENV)/.kernels
+run: $(VENV)/.run
 	$(BIN)/paraflex run --out results
 
 test: lint types imports tests docs

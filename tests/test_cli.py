@@ -106,6 +106,10 @@ def test_json_is_all_that_is_on_stdout(tmp_path):
     [
         (["--mode", "+-+"], "--mode: not an actuation mode (got '+-+'); write one + or - for each of the 4 motors"),
         (["--mode", "tau1,tau9"], "--mode: not an actuation mode (got 'tau1,tau9')"),
+        (
+            ["--geometry", "second"],
+            "--geometry: unknown geometry (got 'second'); did you mean \"second-order\"?",
+        ),
         (["--tol", "0"], "--tol: must be positive (got 0.0); give a length in metres"),
         (["--tol", "nan"], "--tol: must be positive"),
         (["--duration", "-1"], "--duration: must be positive (got -1.0); give it in seconds"),

@@ -4,12 +4,13 @@ import os
 import subprocess
 import sys
 
-from paraflex.compilation import are_compiled
+from paraflex.compilation import are_compiled, compile_kernels
 
 # Calls what is compiled beforehand, then a study; prints what the study had to compile besides.
 STUDY = """
 import paraflex as pf
 from paraflex.compilation import _PARTS
+from paraflex.mechanism import Geometry
 from paraflex.kernel import bodies, closure, joints, linear, march, signals
 
 def compiled():
@@ -18,7 +19,7 @@ def compiled():
     return {(f.__name__, signature) for f in kernels for signature in f.signatures}
 
 for call in _PARTS.values():
-    call()
+    call(Geometry.LINEAR)
 before = compiled()
 model = pf.load("raparm_i")
 task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.01, samples=5)
@@ -43,6 +44,5 @@ def test_a_study_calls_nothing_that_was_not_compiled_beforehand():
 def test_an_empty_cache_is_noticed(tmp_path):
     look = "from paraflex.compilation import are_compiled; print(are_compiled())"
     assert python("-c", look, NUMBA_CACHE_DIR=str(tmp_path)) == "False"
-    # The tests run after `python -m paraflex.compilation`, or have called every kernel by themselves.
-    python("-c", STUDY)
+    compile_kernels()
     assert are_compiled()

@@ -30,6 +30,12 @@ def test_edited_copy_is_read(tmp_path):
 
 # What is replaced, by what, and what the message must name: the field, and the remedy or value.
 BROKEN = [
+    (
+        'name = "RAParM-I"\n',
+        'name = "RAParM-I"\ngeometry = "second-oder"\n',
+        "geometry: should be 'linear' or 'second-order'",
+        "the shape of beams",
+    ),
     ("length = 0.250 # m", "lenght = 0.250", "body.link1.lenght: unknown field", 'did you mean "length"?'),
     ("length = 0.250 # m\n", "", "body.link1.length: is missing", "give the length in m"),
     ("length = 0.250 # m", "length = -0.25", "body.link1.length: must be positive (got -0.25)", "in m"),

@@ -65,6 +65,26 @@ def test_tracking_error_of_the_reference_set(task, mode, known):
     assert error_of(run) == pytest.approx(known, rel=2e-3)
 
 
+@pytest.mark.parametrize(
+    ("mode", "exact", "within"),
+    # Geometrically exact beams in another engine (ANCF cables), same mesh: the linear shape is off by 4 % to 465 %.
+    [("++++", 6.545e-4, 0.01), ("+++-", 4.620e-4, 0.01), ("+-+-", 8.490e-3, 0.015)],
+)
+def test_second_order_geometry_meets_geometrically_exact_beams(mode, exact, within):
+    task = plan_tracking(raparm_i().with_geometry("second-order"), SQUARE, duration=0.7)
+    run = simulate(task, mode, options=IntegrationOptions(tolerance=2e-5))
+    assert error_of(run) == pytest.approx(exact, rel=within)
+
+
+@pytest.mark.parametrize("mode", TABLE_1)
+def test_second_order_geometry_runs_in_every_mode(mode):
+    task = plan_tracking(raparm_i().with_geometry("second-order"), SQUARE, duration=0.1, samples=21)
+    run = simulate(task, mode, options=IntegrationOptions(tolerance=1e-4))
+    assert run.solution.newton_iterations < 3.5 * 2 * run.solution.steps
+    energy = run.solution.kinetic_energy + run.solution.strain_energy
+    assert run.solution.energy_balance_max < 0.02 * energy.max()
+
+
 def test_halving_the_tolerance_changes_less_than_it_says(task):
     errors = {}
     for tolerance in (2e-4, 1e-4, 5e-5):

@@ -17,64 +17,75 @@ import numpy as np
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.esdirk import Run, prepare
-from paraflex.kernel.closure import close_path
 from paraflex.kernel.march import march
 from paraflex.kinematics import Line
-from paraflex.mechanism import Mechanism, RigidBody, raparm_i
+from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
 from paraflex.simulate import plan_tracking
 
 NOTICE = "Compiling the kernels: once after an installation, about half a minute."
 
 
-def are_compiled() -> bool:
-    """Whether the kernels stand in the cache on disk and are newer than their source."""
-    newest = max(source.stat().st_mtime for source in Path(march.py_func.__code__.co_filename).parent.glob("*.py"))
-    entries = [*_cached(march, "march"), *_cached(close_path, "close_path")]
-    return len(entries) >= 2 and all(entry.stat().st_mtime > newest for entry in entries)
+def are_compiled(geometry: Geometry = Geometry.LINEAR) -> bool:
+    """Whether the kernels for beams of this geometry stand in the cache on disk and are newer than their source."""
+    stamp = _stamp(geometry)
+    return stamp.exists() and stamp.stat().st_mtime > _newest_source()
 
 
-def compile_kernels(announce: Callable[[str], None] = print) -> None:
-    """Compile the kernels unless that has been done.
+def compile_kernels(geometry: Geometry = Geometry.LINEAR, announce: Callable[[str], None] = print) -> None:
+    """Compile the kernels for beams of a geometry unless that has been done.
 
     Parameters
     ----------
+    geometry : Geometry
+        Kernels for linear geometry are compiled without all that second-order geometry needs.
     announce : callable
         Told that it takes a while, where it does.
     """
-    if are_compiled():
+    if are_compiled(geometry):
         return
     announce(NOTICE)
     # Numba looks at the file of a cached kernel, not at those of the kernels it calls: one edited, all go.
-    for entry in _cached(march, ""):
-        entry.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "paraflex.compilation"]
+    for entry in [*_folder().glob("*.nb?"), *_folder().glob("compiled-*")]:
+        if entry.stat().st_mtime < _newest_source():
+            entry.unlink(missing_ok=True)
+    command = [sys.executable, "-m", "paraflex.compilation", geometry.value]
     processes = [subprocess.Popen([*command, part], stdout=subprocess.DEVNULL) for part in _PARTS]
     try:
         # What a process fails to leave in the cache is compiled when it is first called.
-        for process in processes:
-            process.wait()
+        codes = [process.wait() for process in processes]
+        if not any(codes):
+            _stamp(geometry).touch()
     finally:
         for process in processes:
             process.terminate()
 
 
-def _cached(function, name: str) -> list[Path]:
-    return [*Path(function.stats.cache_path).glob(f"*{name}-*.nb?")]
+def _folder() -> Path:
+    return Path(str(march.stats.cache_path))
 
 
-def _free_body() -> Run:
-    mechanism = Mechanism("free body", ground={}, bodies=(RigidBody("body", mass=1.0, inertia=1.0),), joints=())
-    signals, _ = pack_signals(mechanism, constant_signals([], 1.0), 1.0)
-    still = State(0.0, np.zeros(3), np.zeros(3))
-    return prepare(build_system(mechanism), signals, still, np.array([0.0, 1.0]), None, IntegrationOptions())
+def _stamp(geometry: Geometry) -> Path:
+    return _folder() / f"compiled-{geometry.value}"
 
 
-def _call_time_loop() -> None:
-    _free_body().march(0)
+def _newest_source() -> float:
+    return max(source.stat().st_mtime for source in Path(march.py_func.__code__.co_filename).parent.glob("*.py"))
 
 
-def _call_the_rest() -> None:
-    _free_body().start()
+def _free_beam(geometry: Geometry) -> Run:
+    beam = FlexibleBeam("beam", 1.0, Section(1e-4, 1e-9), Material(70e9, 2700.0))
+    system = build_system(Mechanism("free beam", ground={}, bodies=(beam,), joints=(), geometry=geometry))
+    signals, _ = pack_signals(system.mechanism, constant_signals([], 1.0), 1.0)
+    still = State(0.0, np.zeros(system.n), np.zeros(system.n))
+    return prepare(system, signals, still, np.array([0.0, 1.0]), None, IntegrationOptions())
+
+
+def _call_time_loop(geometry: Geometry) -> None:
+    _free_beam(geometry).march(0)
+
+
+def _call_the_rest(geometry: Geometry) -> None:
+    _free_beam(geometry).start()
     path = Line((0.05, 0.31), (0.05, 0.30), max_acceleration=10.0)
     plan_tracking(raparm_i(), path, samples=2).torques("++++")
 
@@ -83,7 +94,8 @@ def _call_the_rest() -> None:
 _PARTS = {"time-loop": _call_time_loop, "rest": _call_the_rest}
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        _PARTS[sys.argv[1]]()
+    if len(sys.argv) == 3:
+        _PARTS[sys.argv[2]](Geometry(sys.argv[1]))
     else:
-        compile_kernels()
+        for each in Geometry:
+            compile_kernels(each)

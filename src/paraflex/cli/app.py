@@ -69,6 +69,9 @@ def run(
     beta: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient beta.")] = None,
     max_steps: Annotated[int | None, typer.Option(metavar="N", help="Steps before a run is given up.")] = None,
     rigid: Annotated[bool, typer.Option("--rigid", help="Take all bodies as rigid.")] = False,
+    geometry: Annotated[
+        str | None, typer.Option(metavar="linear|second-order", help="Shape of the beams. Default: the model's.")
+    ] = None,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder for results and figures.")] = "results",
     json: Json = False,
 ) -> None:
@@ -76,7 +79,20 @@ def run(
     from paraflex.cli.run import RunRequest, run_command
 
     request = RunRequest(
-        mechanism, path, mode or [], tol, duration, samples, assembly, alpha, beta, max_steps, rigid, out, json
+        mechanism,
+        path,
+        mode or [],
+        tol,
+        duration,
+        samples,
+        assembly,
+        alpha,
+        beta,
+        max_steps,
+        rigid,
+        geometry,
+        out,
+        json,
     )
     raise typer.Exit(run_command(request))
 

@@ -16,7 +16,7 @@ from paraflex.errors import AssemblyError, InputError, OutputError
 from paraflex.files import Model, load, load_path
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path as EndEffectorPath
-from paraflex.mechanism import ActuationMode, parse_mode
+from paraflex.mechanism import ActuationMode, Geometry, Mechanism, parse_mode
 from paraflex.results import save_results, summary
 from paraflex.simulate import TrackingTask, plan_tracking
 from paraflex.studies import StudyResult, run_study
@@ -39,6 +39,7 @@ class RunRequest:
     beta: float | None
     max_steps: int | None
     rigid: bool
+    geometry: str | None
     out: str
     json: bool
 
@@ -52,9 +53,10 @@ def run_command(request: RunRequest) -> int:
     modes = _modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     folder = _folder(request.out)
-    compile_kernels(console.print)
+    mechanism = _mechanism(model, request)
+    compile_kernels(Geometry.LINEAR if request.rigid else mechanism.geometry, console.print)
     began = time.perf_counter()
-    task = _plan(model, path, path_name, request)
+    task = _plan(model, mechanism, path, path_name, request)
     parameters = _parameters(model, path_name, modes, task, options, request.rigid)
     result = _simulate(console, task, modes, options, parameters)
     if result.data is None:
@@ -106,8 +108,19 @@ def _modes(model: Model, names: list[str]) -> list[ActuationMode]:
         raise InputError(error.problem, field="--mode", value=error.value, remedy=error.remedy) from None
 
 
-def _plan(model: Model, path: EndEffectorPath, path_name: str, request: RunRequest) -> TrackingTask:
+def _mechanism(model: Model, request: RunRequest) -> Mechanism:
     mechanism = model.mechanism.rigid() if request.rigid else model.mechanism
+    if request.geometry is None:
+        return mechanism
+    try:
+        return mechanism.with_geometry(request.geometry)
+    except InputError as error:
+        raise InputError(error.problem, field="--geometry", value=error.value, remedy=error.remedy) from None
+
+
+def _plan(
+    model: Model, mechanism: Mechanism, path: EndEffectorPath, path_name: str, request: RunRequest
+) -> TrackingTask:
     # Another path than the study's has another length: its own duration, with the study's share of dwell.
     duration, samples = request.duration, request.samples
     if duration is None:
@@ -159,6 +172,7 @@ def _parameters(
             "alpha": options.alpha,
             "beta": options.beta,
             "rigid": rigid,
+            "geometry": task.mechanism.geometry.value,
         },
     }
 

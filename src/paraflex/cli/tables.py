@@ -21,7 +21,7 @@ def study_table(figures: dict[str, Any], task: TrackingTask) -> Table:
     """Tracking error and peak torques of every mode, and what the solver did."""
     motors = [motor.name for motor in task.mechanism.motors]
     table = Table(
-        title=f"{figures['mechanism']}: tracking error and peak torques",
+        title=f"{figures['mechanism']}, {task.mechanism.geometry.value} geometry: tracking error and peak torques",
         title_justify="left",
         box=box.SIMPLE,
         collapse_padding=True,

@@ -22,6 +22,7 @@ from paraflex.fem import (
     node_weights,
     rigid_integrals,
 )
+from paraflex.fem.element import COORDINATES_PER_NODE, SLOPE
 from paraflex.mechanism import Body, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
@@ -76,6 +77,10 @@ class BodyCoordinates:
     def all(self) -> slice:
         """Of every coordinate of the body in q."""
         return slice(self.offset, self.offset + 3 + self.nf)
+
+    def slopes(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Slopes of the beam at its nodes [rad]; none for a rigid body."""
+        return self.integrals.D[SLOPE::COORDINATES_PER_NODE] @ q[self.flexible]
 
 
 @dataclass(frozen=True)

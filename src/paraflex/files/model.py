@@ -32,6 +32,7 @@ from paraflex.mechanism import (
     Body,
     EndEffector,
     FlexibleBeam,
+    Geometry,
     LumpedMass,
     Material,
     Mechanism,
@@ -230,6 +231,7 @@ def _mechanism(table: ModelTable) -> Mechanism:
     return Mechanism(
         name=table.name,
         description=table.description,
+        geometry=Geometry(table.geometry),
         ground={name: (point[0], point[1]) for name, point in table.ground.items()},
         bodies=tuple(_body(name, body, table) for name, body in table.body.items()),
         joints=tuple(

@@ -144,6 +144,9 @@ class ModelTable(_Table):
 
     name: Text = Field(description="a name for the mechanism")
     description: Text = Field(default="", description="a sentence or two")
+    geometry: Literal["linear", "second-order"] = Field(
+        default="linear", description='the shape of beams: "linear" or "second-order"'
+    )
     section: dict[str, SectionTable | GeneralSectionTable] = {}
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}

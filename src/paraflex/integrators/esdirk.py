@@ -51,6 +51,8 @@ _NEWTON_MEMORY = 0.002
 _MEMORY = 0.25
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
+# Slopes of a beam this large are beyond any theory of small slopes [rad]: what computes them diverges.
+_LARGEST_SLOPE = 2.0
 _CAUSES = {
     NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
     SINGULAR: "the constraints lose rank, a singular position",
@@ -197,7 +199,7 @@ def integrate(
     began = time.perf_counter()
     options = options or IntegrationOptions()
     run = prepare(system, signals, initial, times, knots, options)
-    status, message, state = "complete", "", run.state
+    status, message, bent, state = "complete", "", "", run.state
     code = run.start()
     try:
         while code == PAUSED:
@@ -205,20 +207,33 @@ def integrate(
             if attempts >= options.max_steps:
                 break
             code = run.march(min(_SLICE, options.max_steps - attempts))
+            bent = _bent_too_far(system, state.q)
+            if bent:
+                break
             if on_progress is not None:
                 on_progress(float(state.clock[TIME]))
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {state.clock[TIME]:.6g} s"
     solution = _solution(run.samples, state, time.perf_counter() - began, status, message)
-    if code == FINISHED or status == "interrupted":
+    if (code == FINISHED and not bent) or status == "interrupted":
         return solution
-    cause = f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code]
+    cause = bent or (f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code])
     # Near a singular position it may be Newton or the error test that gives up first.
-    lost = redundant_rows(system, state.q, _NEARLY_DEPENDENT) if code != PAUSED else []
+    lost = redundant_rows(system, state.q, _NEARLY_DEPENDENT) if code != PAUSED and not bent else []
     if len(lost) > run.controls.dependent_rows:
         cause = f"the constraints lose rank, a singular position ({', '.join(lost)})"
     moment = Moment(float(state.clock[TIME]), int(state.counts[STEPS]))
     raise IntegrationError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
+
+
+def _bent_too_far(system: System, q: NDArray[np.float64]) -> str:
+    """Which beam is bent beyond what the theory can describe, and how far; empty for none."""
+    for body in system.bodies:
+        slope = float(np.max(np.abs(body.slopes(q)), initial=0.0))
+        if slope > _LARGEST_SLOPE:
+            geometry = system.mechanism.geometry.value
+            return f"{body.name} bends by {slope:.1f} rad, too far for {geometry} geometry: the motion diverges"
+    return ""
 
 
 @dataclass(frozen=True)

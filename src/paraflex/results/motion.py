@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import System
+from paraflex.fem import node_weights
 from paraflex.mechanism import PointRef
 
 
@@ -54,10 +55,16 @@ def point_motion(
 def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Axial [m] and transverse [m] displacement and slope [rad] of a beam's last node in its body frame: (k, 3).
 
-    Zero for a body without flexible coordinates.
+    Zero for a body without flexible coordinates. The axial displacement is the stretch, less the shortening by bending
+    where the geometry is of second order.
     """
     body = system.body(name)
     if body.nf == 0:
         return np.zeros((q.shape[0], 3))
+    u = q[:, body.flexible]
     # The last node's axial, transverse and slope rows of D; its curvature is the fourth.
-    return q[:, body.flexible] @ body.integrals.D[-4:-1].T
+    tip = u @ body.integrals.D[-4:-1].T
+    if body.points is not None and body.mesh is not None:
+        bending = body.points.bending(node_weights(body.mesh, body.mesh.n_elements))
+        tip[:, 0] -= 0.5 * np.sum(u * (u @ bending), axis=1)
+    return tip
