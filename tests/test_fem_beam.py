@@ -37,9 +37,10 @@ FREE_FREE = [4.730040744862704, 7.853204624095838, 10.995607838001671]  # textbo
 TIP_MASS = [1.24791740960647, 4.03113943671496, 7.13413223994]  # textbook: tip mass equal to the beam's
 
 
-def unit_beam(elements, lumps=(), condition=ReferenceCondition.CANTILEVER):
+def unit_beam(elements, lumps=(), condition=ReferenceCondition.CANTILEVER, separate=()):
     """Lumps as (node, mass, inertia)."""
-    return beam_integrals(mesh_beam(1.0, {}, elements), [UNIT], [Lump(*lump) for lump in lumps], condition)
+    mesh = mesh_beam(1.0, {}, elements).with_separate_curvature(separate)
+    return beam_integrals(mesh, [UNIT], [Lump(*lump) for lump in lumps], condition)
 
 
 # --- Statics -------------------------------------------------------------------------------------------------------
@@ -121,9 +122,14 @@ def test_free_free_frequencies_published_by_exudyn():
     np.testing.assert_allclose(omega * (1 + theirs), published, rtol=1.5e-7)
 
 
-def relative_errors(elements, lumps_of, exact):
+def relative_errors(elements, lumps_of, exact, separate=False):
     """Of omega_1^2, for each number of elements."""
-    return np.array([first_square(unit_beam(n, lumps_of(n))) / exact**2 - 1 for n in elements])
+
+    def beam(n):
+        lumps = lumps_of(n)
+        return unit_beam(n, lumps, separate=[node for node, _, _ in lumps] if separate else ())
+
+    return np.array([first_square(beam(n)) / exact**2 - 1 for n in elements])
 
 
 @pytest.mark.parametrize(
@@ -190,6 +196,42 @@ def test_a_lumped_moment_of_inertia_at_midspan_converges_with_the_first_power_on
     np.testing.assert_allclose(errors, [9.7e-5, 4.9e-5, 2.5e-5], rtol=0, atol=5e-7)
     orders = np.log2(errors[:-1] / errors[1:])
     np.testing.assert_allclose(orders, 1.0, atol=0.05)
+
+
+def test_separate_curvatures_restore_the_eighth_power_at_midspan():
+    errors = relative_errors((2, 4), lambda n: ((n // 2, 0.0, 0.01),), exact_midspan_inertia(0.01), separate=True)
+    assert 0.0 < errors[0] < 1e-7
+    # The next mesh is at the rounding of the eigenvalues, 1e-12.
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(8.0, abs=0.6)
+
+
+def exact_tip_inertia(J):
+    """omega_1 of a clamped-free unit beam with a moment of inertia J at its tip (computed, from the wave equation)."""
+
+    def determinant(k):
+        # Clamped: w = A (cosh - cos) + B (sinh - sin). At the tip its second derivative is J omega^2 times its first,
+        # its third vanishes.
+        ch, sh, co, si = np.cosh(k), np.sinh(k), np.cos(k), np.sin(k)
+        slope, bend, shear = (sh + si, ch - co), (ch + co, sh + si), (sh - si, ch + co)
+        return np.linalg.det([[bend[i] - J * k**3 * slope[i] for i in range(2)], shear])
+
+    return scipy.optimize.brentq(determinant, 1.0, 1.95, xtol=1e-15) ** 2
+
+
+def test_a_tip_moment_of_inertia_needs_a_free_curvature():
+    assert exact_tip_inertia(0.0) == pytest.approx(CLAMPED_FREE[0] ** 2, rel=1e-12)
+    exact = exact_tip_inertia(0.1)
+    shared = relative_errors((1, 2, 4), lambda n: ((n, 0.0, 0.1),), exact)
+    np.testing.assert_allclose(np.log2(shared[:-1] / shared[1:]), 1.0, atol=0.1)
+    separate = relative_errors((1, 2), lambda n: ((n, 0.0, 0.1),), exact, separate=True)
+    assert separate[0] < 1e-5 < shared[0]
+    assert np.log2(separate[0] / separate[1]) > 7.0
+
+
+def test_separate_curvatures_are_one_coordinate_more_each():
+    assert unit_beam(4).nf == 16
+    assert unit_beam(4, [(0, 0.0, 0.1), (2, 0.0, 0.1)], separate=(0, 2)).nf == 17
+    assert unit_beam(4, [(2, 0.0, 0.1), (4, 0.0, 0.1)], separate=(2, 4)).nf == 18
 
 
 # --- Shape integrals -----------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from paraflex.errors import ActuationError, IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Circle, Line, PointPath, Polygon
-from paraflex.mechanism import FlexibleBeam, Material, raparm_i
+from paraflex.mechanism import Curvature, FlexibleBeam, Material, raparm_i
 from paraflex.mechanism.raparm import TABLE_1
 from paraflex.results import tracking_dataset
 from paraflex.simulate import plan_tracking, simulate
@@ -138,6 +138,19 @@ def test_mesh_refinement_converges(task):
     assert error_of(simulate(fine, "++++", options=options)) == pytest.approx(
         error_of(simulate(coarse, "++++", options=options)), rel=0.01
     )
+
+
+@pytest.mark.parametrize("geometry", ["linear", "second-order"])
+def test_separate_curvatures_change_little_here(geometry):
+    """RAParM-I's lumped moments of inertia are small; ten of them are not at a link's first end."""
+    errors = []
+    for curvature in Curvature:
+        mechanism = raparm_i().with_geometry(geometry).with_beams(curvature=curvature)
+        task = plan_tracking(mechanism, SQUARE, duration=0.2, samples=101)
+        errors.append(error_of(simulate(task, "++++", options=IntegrationOptions(tolerance=1e-5))))
+    assert task.system.n == 114
+    assert errors[1] == pytest.approx(errors[0], rel=0.01)
+    assert errors[1] != pytest.approx(errors[0], rel=1e-5)
 
 
 def test_one_rigid_link_among_flexible_ones():

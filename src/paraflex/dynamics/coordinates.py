@@ -22,8 +22,8 @@ from paraflex.fem import (
     node_weights,
     rigid_integrals,
 )
-from paraflex.fem.element import COORDINATES_PER_NODE, SLOPE
-from paraflex.mechanism import Body, Geometry, Mechanism, PointRef, RigidBody
+from paraflex.fem.element import SLOPE
+from paraflex.mechanism import Body, Curvature, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
 
@@ -80,7 +80,9 @@ class BodyCoordinates:
 
     def slopes(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
         """Slopes of the beam at its nodes [rad]; none for a rigid body."""
-        return self.integrals.D[SLOPE::COORDINATES_PER_NODE] @ q[self.flexible]
+        if self.mesh is None:
+            return np.zeros(0)
+        return self.integrals.D[self.mesh.rows_of(SLOPE)] @ q[self.flexible]
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,8 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordin
         integrals = rigid_integrals(body.mass, body.centre_of_mass, body.inertia)
         return BodyCoordinates(body.name, offset, integrals, modal_basis(integrals), None)
     mesh = mesh_beam(body.length, body.points, body.elements)
+    if body.curvature is Curvature.SEPARATE:
+        mesh = mesh.with_separate_curvature(mesh.points[lump.point] for lump in body.lumps if lump.inertia > 0.0)
     span = SpanProperties(
         mass_per_length=body.material.density * body.section.area,
         axial_stiffness=body.material.youngs_modulus * body.section.area,

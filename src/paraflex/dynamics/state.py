@@ -172,7 +172,8 @@ def consistent_state(
     system : System
     assembly : Assembly
     deflection : mapping of str to (n_nodal,) array, optional
-        Nodal coordinates of a body (4 a node); what its mesh's reference condition allows of them is kept.
+        Nodal coordinates of a body (4 a node, then separate curvatures if any); what its mesh's reference condition
+        allows of them is kept.
     velocity : (n,) array, optional
         Projected on the constraints; zero by default.
     time : float

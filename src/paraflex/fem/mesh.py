@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.fem.element import COORDINATES_PER_NODE, SLOPE, axial_shape, transverse_shape
+from paraflex.fem.element import COORDINATES_PER_NODE, CURVATURE, SLOPE, axial_shape, transverse_shape
 
 # Two points closer than this fraction of the beam are one node: an element that short is a typing slip.
 COINCIDENT_POINTS = 1e-9
@@ -27,11 +27,15 @@ class BeamMesh:
         The span each element belongs to; spans lie between neighbouring named points and the ends.
     points : mapping
         Node index of each named point.
+    separate : tuple of int
+        Nodes where curvature may jump, because of a lumped moment of inertia: between elements it has a coordinate of
+        its own on either side, and at the last node it is free.
     """
 
     nodes: NDArray[np.float64]
     spans: NDArray[np.int64]
     points: Mapping[str, int]
+    separate: tuple[int, ...] = ()
 
     @property
     def n_elements(self) -> int:
@@ -40,8 +44,15 @@ class BeamMesh:
 
     @property
     def n_nodal(self) -> int:
-        """Number of nodal coordinates before any reference condition, 4 a node."""
-        return COORDINATES_PER_NODE * self.nodes.size
+        """Number of nodal coordinates before any reference condition.
+
+        4 a node, then one for each node between elements that has a second curvature.
+        """
+        return COORDINATES_PER_NODE * self.nodes.size + len(self._split)
+
+    @property
+    def _split(self) -> list[int]:
+        return [node for node in self.separate if 0 < node < self.n_elements]
 
     @property
     def length(self) -> float:
@@ -56,8 +67,20 @@ class BeamMesh:
         """Rows per element coordinate (n, 8) as rows per nodal coordinate (n, n_nodal): the Boolean B of Eq. 8."""
         wide = np.zeros((rows.shape[0], self.n_nodal))
         start = COORDINATES_PER_NODE * element
-        wide[:, start : start + 2 * COORDINATES_PER_NODE] = rows
+        columns = np.arange(start, start + 2 * COORDINATES_PER_NODE)
+        if element in self._split:
+            # Its first node's own curvature is that of the element before; this side's stands at the end.
+            columns[CURVATURE] = COORDINATES_PER_NODE * self.nodes.size + self._split.index(element)
+        wide[:, columns] = rows
         return wide
+
+    def rows_of(self, coordinate: int) -> NDArray[np.int64]:
+        """Index of one of the four coordinates at every node."""
+        return np.arange(coordinate, COORDINATES_PER_NODE * self.nodes.size, COORDINATES_PER_NODE)
+
+    def with_separate_curvature(self, nodes: Iterable[int]) -> BeamMesh:
+        """The same mesh with curvature separate on either side of these nodes, and free at the last if it is one."""
+        return replace(self, separate=tuple(sorted(set(nodes))))
 
     def shape_at(self, x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Shape matrix N (2, n_nodal) and slope row N2' (n_nodal,) of the point at x [m]."""

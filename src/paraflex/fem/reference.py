@@ -1,8 +1,8 @@
 """Reference conditions: how the floating frame is fixed to the deforming beam.
 
 Each is a basis of the same space, the nodal coordinates without the three rigid-body motions and without the
-curvature of the last node (zero in the paper's Eq. 9). A beam of n elements has 4n flexible coordinates under
-any of them.
+curvature of the last node (zero in the paper's Eq. 9, and in truth unless a moment of inertia sits there). A beam of
+n elements has 4n flexible coordinates under any of them, and one more for each separate curvature.
 """
 
 from __future__ import annotations
@@ -50,10 +50,11 @@ def reference_basis(
 
     Returns
     -------
-    (n_nodal, 4 n) array
+    (n_nodal, nf) array
+        nf is 4 a element, and one more for each separate curvature.
     """
     kept = np.ones(mesh.n_nodal, dtype=bool)
-    kept[mesh.column(-1, CURVATURE)] = False
+    kept[mesh.column(-1, CURVATURE)] = mesh.n_elements in mesh.separate
     if condition is ReferenceCondition.CANTILEVER:
         kept[[mesh.column(0, AXIAL), mesh.column(0, TRANSVERSE), mesh.column(0, SLOPE)]] = False
     elif condition is ReferenceCondition.PINNED:

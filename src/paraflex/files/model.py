@@ -30,6 +30,7 @@ from paraflex.mechanism import (
     ActuationMode,
     Assembly,
     Body,
+    Curvature,
     EndEffector,
     FlexibleBeam,
     Geometry,
@@ -280,6 +281,7 @@ def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:
         elements=tuple(body.elements) if isinstance(body.elements, list) else body.elements,
         lumps=tuple(lumps),
         reference=ReferenceCondition(body.reference),
+        curvature=Curvature(body.curvature),
         flexible=body.flexible,
     )
 

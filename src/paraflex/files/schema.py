@@ -61,6 +61,9 @@ class BeamTable(_Table):
     reference: Literal["cantilever", "pinned", "free"] = Field(
         default="cantilever", description='how the body frame is fixed to the beam: "cantilever", "pinned" or "free"'
     )
+    curvature: Literal["shared", "separate"] = Field(
+        default="shared", description='curvature at lumped moments of inertia: "shared" or "separate"'
+    )
     flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid beam")
 
 

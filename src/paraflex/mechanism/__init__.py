@@ -1,6 +1,6 @@
 """What the user means: frozen descriptions of bodies, joints, motors and the mechanism they form."""
 
-from paraflex.mechanism.bodies import Body, FlexibleBeam, LumpedMass, Material, RigidBody, Section
+from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, LumpedMass, Material, RigidBody, Section
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.joints import GROUND, AngleLaw, Motor, PointRef, PrescribedAngle, RevoluteJoint, SampledAngle
 from paraflex.mechanism.mechanism import (
@@ -22,6 +22,7 @@ __all__ = [
     "AngleLaw",
     "Assembly",
     "Body",
+    "Curvature",
     "EndEffector",
     "FlexibleBeam",
     "Geometry",

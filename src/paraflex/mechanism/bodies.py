@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 from paraflex.fem import ReferenceCondition
 
@@ -35,6 +36,21 @@ class Material:
 
     youngs_modulus: float
     density: float
+
+
+class Curvature(Enum):
+    """What becomes of a beam's curvature at a node with a lumped moment of inertia, where the true one jumps.
+
+    SHARED
+        The paper's element: one value for both sides, zero at the tip. Converges with the first power of the element
+        there.
+    SEPARATE
+        A value on either side, and a free one at the tip. Converges with the eighth power; one coordinate more for
+        each such node.
+    """
+
+    SHARED = "shared"
+    SEPARATE = "separate"
 
 
 @dataclass(frozen=True)
@@ -88,6 +104,8 @@ class FlexibleBeam:
     lumps : tuple of LumpedMass
     reference : ReferenceCondition
         How the floating frame is fixed to the beam; the paper's is the cantilever.
+    curvature : Curvature
+        At nodes with a lumped moment of inertia; the paper's is shared.
     flexible : bool
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
@@ -100,6 +118,7 @@ class FlexibleBeam:
     elements: int | tuple[int, ...] = 1
     lumps: tuple[LumpedMass, ...] = ()
     reference: ReferenceCondition = ReferenceCondition.CANTILEVER
+    curvature: Curvature = Curvature.SHARED
     flexible: bool = True
 
     def as_rigid(self) -> FlexibleBeam:

@@ -8,7 +8,7 @@ from enum import Enum
 
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
-from paraflex.mechanism.bodies import Body, FlexibleBeam
+from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint
 
@@ -146,20 +146,29 @@ class Mechanism:
         beams = [self.body(name) for name in names]
         return self.with_bodies(beam.as_rigid() for beam in beams if isinstance(beam, FlexibleBeam))
 
-    def with_beams(self, *, elements: int | None = None, reference: ReferenceCondition | None = None) -> Mechanism:
-        """The mechanism with another mesh or reference condition on every flexible beam.
+    def with_beams(
+        self,
+        *,
+        elements: int | None = None,
+        reference: ReferenceCondition | None = None,
+        curvature: Curvature | None = None,
+    ) -> Mechanism:
+        """The mechanism with another mesh, reference condition or element variant on every flexible beam.
 
         Parameters
         ----------
         elements : int, optional
             Elements per span, the same for all.
         reference : ReferenceCondition, optional
+        curvature : Curvature, optional
         """
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
         if elements is not None:
             beams = [replace(beam, elements=elements) for beam in beams]
         if reference is not None:
             beams = [replace(beam, reference=reference) for beam in beams]
+        if curvature is not None:
+            beams = [replace(beam, curvature=curvature) for beam in beams]
         return self.with_bodies(beams)
 
     def with_geometry(self, geometry: Geometry | str) -> Mechanism:

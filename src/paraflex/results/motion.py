@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System
 from paraflex.fem import node_weights
+from paraflex.fem.element import AXIAL, SLOPE, TRANSVERSE
 from paraflex.mechanism import PointRef
 
 
@@ -62,9 +63,9 @@ def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray
     if body.nf == 0:
         return np.zeros((q.shape[0], 3))
     u = q[:, body.flexible]
-    # The last node's axial, transverse and slope rows of D; its curvature is the fourth.
-    tip = u @ body.integrals.D[-4:-1].T
-    if body.points is not None and body.mesh is not None:
+    assert body.mesh is not None
+    tip = u @ body.integrals.D[[body.mesh.column(-1, k) for k in (AXIAL, TRANSVERSE, SLOPE)]].T
+    if body.points is not None:
         bending = body.points.bending(node_weights(body.mesh, body.mesh.n_elements))
         tip[:, 0] -= 0.5 * np.sum(u * (u @ bending), axis=1)
     return tip
