@@ -87,12 +87,13 @@ def test_second_order_geometry_runs_in_every_mode(mode):
 
 def test_halving_the_tolerance_changes_less_than_it_says(task):
     errors = {}
-    for tolerance in (2e-4, 1e-4, 5e-5):
+    for tolerance in (2e-4, 1e-4, 5e-5, 2.5e-5):
         run = simulate(task, "++++", options=IntegrationOptions(tolerance=tolerance))
         errors[tolerance] = error_of(run)
         assert run.solution.constraint_position_max < tolerance
-    assert abs(errors[2e-4] - errors[1e-4]) < 2e-4
-    assert abs(errors[1e-4] - errors[5e-5]) < abs(errors[2e-4] - errors[1e-4])
+    # The tolerance is for the path, of which the tracking error is a mean: a twentieth of it, at every level.
+    for tolerance in (2e-4, 1e-4, 5e-5):
+        assert abs(errors[tolerance] - errors[0.5 * tolerance]) < 0.05 * tolerance
 
 
 def stiffened(factor: float):

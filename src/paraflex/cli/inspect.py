@@ -101,7 +101,7 @@ def describe(source: str) -> dict[str, Any]:
         "coordinates": system.n,
         "rigid_coordinates": rigid.n,
         "flexible_coordinates": system.n_flexible,
-        "constraints": system.m,
+        "constraints": system.n_constraints,
         "redundant_constraints": redundant,
         "degrees_of_freedom": rigid.n - rigid.m + len(redundant),
         "assembly_closes": closed,

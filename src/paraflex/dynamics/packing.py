@@ -15,13 +15,18 @@ from paraflex.mechanism import Mechanism, PointRef
 
 @dataclass(frozen=True)
 class Constraint:
-    """A joint or a prescribed angle before packing: two points, and a signal where it is driven in time."""
+    """A joint, a prescribed angle or a spring before packing: two points, and a signal where it is driven in time.
+
+    A spring is a compliant constraint: angle - rest = compliance * multiplier.
+    """
 
     name: str
     kind: int
     a: PointRef
     b: PointRef
     signal: int
+    compliance: float = 0.0
+    rest: float = 0.0
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -35,6 +40,9 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
     for k, prescribed in enumerate(mechanism.prescribed):
         joint = mechanism.joint(prescribed.joint)
         constraints.append(Constraint(prescribed.name, ANGLE, joint.a, joint.b, len(mechanism.motors) + k))
+    for spring in mechanism.springs:
+        joint = mechanism.joint(spring.joint)
+        constraints.append(Constraint(spring.name, ANGLE, joint.a, joint.b, -1, 1.0 / spring.stiffness, spring.rest))
     return constraints
 
 
@@ -64,6 +72,7 @@ def pack_system(
     labels: list[str] = []
     ground: list[float] = []
     signals: list[int] = []
+    compliance: list[float] = []
 
     def add_marker(ref: PointRef) -> int:
         markers.append(make_marker(mechanism, bodies, index, ref))
@@ -73,7 +82,8 @@ def pack_system(
         row, n_rows = len(labels), len(constraint.labels)
         labels += constraint.labels
         signals += [constraint.signal] * n_rows
-        ground += [0.0] * n_rows
+        compliance += [constraint.compliance] * n_rows
+        ground += [-constraint.rest] * n_rows
         for ref, sign in ((constraint.a, -1.0), (constraint.b, 1.0)):
             if ref.on_ground:
                 if constraint.kind == POINT:
@@ -94,7 +104,7 @@ def pack_system(
         markers=_marker_records(markers),
         ports=_port_records(bodies, ports),
         efforts=_records(EFFORT, [effort for group in efforts for effort in group]),
-        rows=_row_records(signals, ground, ports),
+        rows=_row_records(signals, ground, compliance, ports),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
         G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
@@ -231,7 +241,9 @@ def _port_records(bodies, ports) -> NDArray[np.void]:
     return _records(PORT, values)
 
 
-def _row_records(signals: list[int], ground: list[float], ports: list[list[dict]]) -> NDArray[np.void]:
+def _row_records(
+    signals: list[int], ground: list[float], compliance: list[float], ports: list[list[dict]]
+) -> NDArray[np.void]:
     """Constraint rows with the envelope of the Schur complement: rows of one body are coupled."""
     first = list(range(len(signals)))
     for body_ports in ports:
@@ -241,6 +253,14 @@ def _row_records(signals: list[int], ground: list[float], ports: list[list[dict]
                 first[row] = min(first[row], low)
     values, start = [], 0
     for row, (signal, value) in enumerate(zip(signals, ground, strict=True)):
-        values.append({"signal": signal, "ground": value, "first": first[row], "start": start})
+        values.append(
+            {
+                "signal": signal,
+                "ground": value,
+                "compliance": compliance[row],
+                "first": first[row],
+                "start": start,
+            }
+        )
         start += row + 1 - first[row]
     return _records(ROW, values)

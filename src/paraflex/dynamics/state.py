@@ -66,12 +66,13 @@ def redundant_rows(system: System, q: NDArray[np.float64], threshold: float = DE
 
     A row counts as such when its independent part is smaller than the threshold, as a fraction of the largest.
     """
-    if system.m == 0:
+    if system.n_constraints == 0:
         return []
-    factors = scipy.linalg.qr(system.jacobian(q).T, mode="r", pivoting=True)
+    rigid = np.nonzero(system.packed.rows["compliance"] == 0.0)[0]
+    factors = scipy.linalg.qr(system.jacobian(q)[rigid].T, mode="r", pivoting=True)
     size, order = np.abs(np.diag(factors[0])), factors[-1]
     rank = int(np.sum(size > threshold * size.max(initial=0.0)))
-    return sorted(system.rows[i] for i in order[rank:])
+    return sorted(system.rows[i] for i in rigid[order[rank:]])
 
 
 def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:

@@ -41,8 +41,13 @@ class System:
 
     @property
     def m(self) -> int:
-        """Number of constraint rows."""
+        """Number of multipliers: constraint rows and springs."""
         return len(self.rows)
+
+    @property
+    def n_constraints(self) -> int:
+        """Number of rows that are constraints: those of springs are not."""
+        return int(np.sum(self.packed.rows["compliance"] == 0.0))
 
     @property
     def n_flexible(self) -> int:
@@ -72,13 +77,13 @@ class System:
         return make_workspace(self.packed)
 
     def constraints(self, signals: Signals, t: float, q: NDArray, v: NDArray) -> tuple[NDArray, NDArray]:
-        """Phi and Phi' at (t, q, v), each (m,)."""
+        """Phi and Phi' at (t, q, v), each (m,); zero in the rows of springs."""
         phi, rate = np.zeros(self.m), np.zeros(self.m)
         constraint_values(self.packed, signals, t, q, v, phi, rate)
         return phi, rate
 
     def jacobian(self, q: NDArray) -> NDArray[np.float64]:
-        """Phi_q at q, dense (m, n)."""
+        """Phi_q at q, dense (m, n); zero in the rows of springs."""
         jacobian = np.zeros((self.m, self.n))
         fill_jacobian(self.packed, q, jacobian)
         return jacobian

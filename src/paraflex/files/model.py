@@ -43,6 +43,7 @@ from paraflex.mechanism import (
     RevoluteJoint,
     RigidBody,
     Section,
+    TorsionalSpring,
     parse_mode,
 )
 
@@ -243,6 +244,9 @@ def _mechanism(table: ModelTable) -> Mechanism:
         prescribed=tuple(
             PrescribedAngle(name, entry.joint, ConstantSpeed(entry.angle, entry.speed))
             for name, entry in table.prescribed.items()
+        ),
+        springs=tuple(
+            TorsionalSpring(name, entry.joint, entry.stiffness, entry.rest) for name, entry in table.spring.items()
         ),
         end_effector=None
         if effector is None

@@ -85,6 +85,14 @@ class PrescribedTable(_Table):
     speed: Number = Field(default=0.0, description="the speed in rad/s")
 
 
+class SpringTable(_Table):
+    """A torsional spring at a joint."""
+
+    joint: Text = Field(description="the name of a joint")
+    stiffness: Number = Field(description="the stiffness in N m/rad")
+    rest: Number = Field(default=0.0, description="the joint's angle at which the spring is free in rad")
+
+
 class EndEffectorTable(_Table):
     """The point that is to follow a path."""
 
@@ -162,6 +170,7 @@ class ModelTable(_Table):
     )
     motor: dict[str, Text] = Field(default={}, description="the joint of each motor")
     prescribed: dict[str, PrescribedTable] = {}
+    spring: dict[str, SpringTable] = {}
     end_effector: EndEffectorTable | None = None
     assembly: dict[str, dict[str, Number]] = Field(
         default={}, description="approximate angles of all bodies in rad for each assembly"

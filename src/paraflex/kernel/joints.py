@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from paraflex.kernel.arrays import fill
-from paraflex.kernel.compiling import inlined, kernel
+from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.packed import ANGLE, NX, NY, SLOPE
 from paraflex.kernel.signals import evaluate_signal
 
@@ -147,6 +147,23 @@ def start_rows(p, signals, t, weight_v, weight_q, rows):
             rows[r] -= acceleration + weight_v * rate + weight_q * value
 
 
+@routine
+def add_springs(p, lam, rows):
+    """Rows of springs before any body: less the rest angle, less compliance times the torque."""
+    for r in range(p.rows.size):
+        if p.rows[r].compliance > 0.0:
+            rows[r] = p.rows[r].ground - p.rows[r].compliance * lam[r]
+
+
+@routine
+def spring_energy(p, lam):
+    """Energy of the springs by their torques."""
+    energy = 0.0
+    for r in range(p.rows.size):
+        energy += 0.5 * p.rows[r].compliance * lam[r] * lam[r]
+    return energy
+
+
 @inlined
 def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
     """Add body i's part of Phi'' + weight_v Phi' + weight_q Phi to rows, and Phi_q^T lambda to f."""
@@ -156,11 +173,14 @@ def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
         marker = p.markers[port.marker]
         r, sign = port.row, port.sign
         if port.kind == ANGLE:
-            rows[r] += sign * (
-                marker_angle(p, marker, a)
-                + weight_v * marker_angle(p, marker, v)
-                + weight_q * marker_angle(p, marker, q)
-            )
+            if p.rows[r].compliance > 0.0:
+                rows[r] += sign * marker_angle(p, marker, q)
+            else:
+                rows[r] += sign * (
+                    marker_angle(p, marker, a)
+                    + weight_v * marker_angle(p, marker, v)
+                    + weight_q * marker_angle(p, marker, q)
+                )
             apply_torque(p, marker, sign * lam[r], f)
         else:
             px, py, vx, vy, ax, ay, rx, ry = marker_motion(p, marker, q, v, a)
@@ -180,10 +200,10 @@ def body_efforts(p, i, torques, f):
 
 @kernel
 def constraint_values(p, signals, t, q, v, phi, dphi):
-    """Phi and Phi' at (t, q, v), into phi and dphi."""
+    """Phi and Phi' at (t, q, v), into phi and dphi; zero for springs."""
     for r in range(p.rows.size):
         row = p.rows[r]
-        phi[r], dphi[r] = row.ground, 0.0
+        phi[r], dphi[r] = row.ground if row.compliance == 0.0 else 0.0, 0.0
         if row.signal >= 0:
             value, rate, _ = evaluate_signal(signals, row.signal, t)
             phi[r] -= value
@@ -192,6 +212,8 @@ def constraint_values(p, signals, t, q, v, phi, dphi):
         port = p.ports[k]
         marker = p.markers[port.marker]
         r, sign = port.row, port.sign
+        if p.rows[r].compliance > 0.0:
+            continue
         if port.kind == ANGLE:
             phi[r] += sign * marker_angle(p, marker, q)
             dphi[r] += sign * marker_angle(p, marker, v)
@@ -206,12 +228,14 @@ def constraint_values(p, signals, t, q, v, phi, dphi):
 
 @kernel
 def fill_jacobian(p, q, jacobian):
-    """Phi_q into a dense (rows, n) array; for closure and checks, not for the time loop."""
+    """Phi_q into a dense (rows, n) array, zero for springs; for closure and checks, not for the time loop."""
     for r in range(p.rows.size):
         fill(jacobian[r], 0.0)
     for k in range(p.ports.size):
         port = p.ports[k]
         marker = p.markers[port.marker]
+        if p.rows[port.row].compliance > 0.0:
+            continue
         if port.kind == ANGLE:
             apply_torque(p, marker, port.sign, jacobian[port.row])
         else:

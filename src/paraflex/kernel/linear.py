@@ -20,6 +20,8 @@ from paraflex.kernel.packed import ANGLE, DINV, GJ, I1, MPF, NX, NY, OMEGA2, POI
 
 # A pivot smaller than this fraction of its diagonal entry marks a constraint row that depends on those before it.
 DEPENDENT_ROW = 1e-12
+# Springs divide by b: where it is zero (accelerations at an instant), by this instead.
+SMALLEST_B = 1e-18
 
 
 @inlined
@@ -218,6 +220,7 @@ def solve_schur(p, ws, x):
 @kernel
 def factor_bodies(p, b, q, ws):
     """Factor every body's M + b K at its deformation in q, in its own frame."""
+    ws.step[0] = max(b, SMALLEST_B)
     for i in range(p.bodies.size):
         if not factor_bent(p, i, b, q, ws, ws.dense):
             factor_body(p, i, b, q, ws)
@@ -232,6 +235,9 @@ def orient(p, q, ws):
         phi = q[p.bodies[i].offset + 2]
         ws.frame[i, 0], ws.frame[i, 1] = cos(phi), sin(phi)
         add_schur(p, i, ws)
+    for r in range(p.rows.size):
+        if p.rows[r].compliance > 0.0:
+            ws.schur[p.rows[r].start + r - p.rows[r].first] += p.rows[r].compliance / ws.step[0]
     return factor_schur(p, ws)
 
 
@@ -259,14 +265,14 @@ def to_ground_frame(p, i, ws, x):
 
 
 @inlined
-def jacobian_times(p, i, ws, x, scale, rows):
-    """Add scale * J x of body i to rows; x in the body frame, rows in the ground frame."""
+def jacobian_times(p, i, ws, x, scale, spring_scale, rows):
+    """Add scale * J x of body i to rows, or spring_scale * J x to those of springs; x in the body frame."""
     body = p.bodies[i]
     o, width = body.offset, 3 + body.nf
     c, s = ws.frame[i, 0], ws.frame[i, 1]
     for k in range(body.port, body.port_end):
         port = p.ports[k]
-        factor = scale * port.sign
+        factor = port.sign * (scale if p.rows[port.row].compliance == 0.0 else spring_scale)
         d0, d1 = 0.0, 0.0
         for j in range(width):
             d0 += ws.jac[port.jac + j] * x[o + j]
@@ -300,17 +306,29 @@ def subtract_reactions(p, i, ws, mu, x):
 
 @kernel
 def solve_system(p, ws, x, mu):
-    """Solve [M + b K, Phi_q^T; Phi_q, 0] [x; mu] = [x; mu] in place; x in the ground frame."""
+    """Solve [M + b K, Phi_q^T; Phi_q, -C/b] [x; mu] = [x; mu] in place; x in the ground frame.
+
+    C holds the compliance of springs, zero for constraints.
+    """
     for r in range(mu.size):
         mu[r] = -mu[r]
     for i in range(p.bodies.size):
         to_body_frame(p, i, ws, x)
         solve_body(p, i, ws, ws.dense, x, x, p.bodies[i].offset)
-        jacobian_times(p, i, ws, x, 1.0, mu)
+        jacobian_times(p, i, ws, x, 1.0, 1.0, mu)
     solve_schur(p, ws, mu)
     for i in range(p.bodies.size):
         subtract_reactions(p, i, ws, mu, x)
         to_ground_frame(p, i, ws, x)
+
+
+@routine
+def right_hand_side(p, ws, scale):
+    """-f and -rows as the right-hand side of `solve_system`; constraint rows times scale, those of springs over b."""
+    for j in range(ws.f.size):
+        ws.x[j] = -ws.f[j]
+    for r in range(ws.rows.size):
+        ws.mu[r] = -ws.rows[r] * (scale if p.rows[r].compliance == 0.0 else 1.0 / ws.step[0])
 
 
 @inlined

@@ -5,8 +5,8 @@ from __future__ import annotations
 from paraflex.kernel.arrays import copy
 from paraflex.kernel.bodies import system_energy
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import constraint_values
-from paraflex.kernel.linear import factor_system, solve_system
+from paraflex.kernel.joints import constraint_values, spring_energy
+from paraflex.kernel.linear import factor_system, right_hand_side, solve_system
 from paraflex.kernel.run_state import (
     AGE,
     BALANCE,
@@ -69,6 +69,7 @@ def write_samples(p, tableau, t, h, m, ws, out):
         for r in range(m.stage_lam.shape[1]):
             out.lam[i, r] = (1.0 - x) * m.stage_lam[s0, r] + x * m.stage_lam[s1, r]
         out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i], ws.points)
+        out.energy[i, 1] += spring_energy(p, out.lam[i])
         # Work by the trapezoidal rule within the step: the sum over whole steps is the scheme's own quadrature.
         done = (time - t) / h
         out.energy[i, 2] = m.clock[WORK] + h * done * (
@@ -87,10 +88,7 @@ def first_stage(p, signals, t, controls, m, ws):
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
     for _ in range(2):
         equations(p, signals, t, controls.alpha, controls.beta, m.q, m.v, a, lam, m.torques, ws)
-        for j in range(a.size):
-            ws.x[j] = -ws.f[j]
-        for r in range(lam.size):
-            ws.mu[r] = -ws.rows[r]
+        right_hand_side(p, ws, 1.0)
         solve_system(p, ws, ws.x, ws.mu)
         for j in range(a.size):
             a[j] += ws.x[j]
@@ -111,6 +109,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     copy(m.v, m.stage_v[0])
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques)
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
+    strain += spring_energy(p, lam)
     m.clock[ENERGY_0] = kinetic + strain
     note_constraints(p, signals, t, m, ws)
     if out.times.size > 0 and out.times[0] <= t:
@@ -154,6 +153,7 @@ def accept(p, signals, tableau, t, h, m, ws, out):
     m.counts[AGE] += 1
     m.counts[FAILURES] = 0
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
+    strain += spring_energy(p, m.stage_lam[0])
     balance = abs(kinetic + strain - m.clock[ENERGY_0] - m.clock[WORK])
     m.clock[BALANCE] = max(m.clock[BALANCE], balance)
     note_constraints(p, signals, t + h, m, ws)

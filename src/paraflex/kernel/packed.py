@@ -81,7 +81,8 @@ EFFORT = np.dtype([("marker", np.int64), ("signal", np.int64), ("sign", np.float
 ROW = np.dtype(
     [
         ("signal", np.int64),  # prescribed value in time, -1 for none
-        ("ground", np.float64),  # what points on the ground contribute to Phi
+        ("ground", np.float64),  # what points on the ground contribute to Phi, less the rest angle of a spring
+        ("compliance", np.float64),  # of a spring: its row is angle - rest = compliance * lambda; else zero
         ("first", np.int64),  # first column of the row in the envelope of the Schur complement
         ("start", np.int64),  # and where that column is stored
     ],
@@ -126,6 +127,7 @@ class Workspace(NamedTuple):
     mu: NDArray[np.float64]  # (m,) solution for the multipliers
     q: NDArray[np.float64]
     v: NDArray[np.float64]
+    step: NDArray[np.float64]  # (1,) b of the factor
     frame: NDArray[np.float64]  # (bodies, 12): cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
     flex: NDArray[np.float64]  # (5, total nf)
     jac: NDArray[np.float64]  # Jacobian rows of every port, wholly in the body frame
@@ -154,6 +156,7 @@ def make_workspace(p: PackedSystem) -> Workspace:
         mu=np.zeros(m),
         q=np.zeros(n),
         v=np.zeros(n),
+        step=np.zeros(1),
         frame=np.zeros((p.bodies.size, 12)),
         flex=np.zeros((5, p.modal.shape[1])),
         jac=np.zeros(int(sum(widths))),

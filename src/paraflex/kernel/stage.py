@@ -16,8 +16,8 @@ from math import isfinite
 
 from paraflex.kernel.bodies import body_terms
 from paraflex.kernel.compiling import kernel, routine
-from paraflex.kernel.joints import body_efforts, body_joints, start_rows
-from paraflex.kernel.linear import mass_norm, solve_system
+from paraflex.kernel.joints import add_springs, body_efforts, body_joints, start_rows
+from paraflex.kernel.linear import mass_norm, right_hand_side, solve_system
 from paraflex.kernel.signals import evaluate_signal
 
 MAX_ITERATIONS = 8
@@ -35,6 +35,7 @@ def equations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
     for k in range(torques.size):
         torques[k] = evaluate_signal(signals, k, t)[0]
     start_rows(p, signals, t, weight_v, weight_q, ws.rows)
+    add_springs(p, lam, ws.rows)
     for i in range(p.bodies.size):
         body_terms(p, i, q, v, a, ws.f, ws.points)
         body_joints(p, i, q, v, a, lam, weight_v, weight_q, ws.f, ws.rows)
@@ -66,10 +67,7 @@ def solve_stage(p, signals, t, g, b, alpha, beta, qs, vs, a, lam, torques, toler
             ws.q[j] = qs[j] + b * a[j]
             ws.v[j] = vs[j] + g * a[j]
         equations(p, signals, t, alpha, beta, ws.q, ws.v, a, lam, torques, ws)
-        for j in range(a.size):
-            ws.x[j] = -ws.f[j]
-        for r in range(lam.size):
-            ws.mu[r] = -ws.rows[r] * scale
+        right_hand_side(p, ws, scale)
         solve_system(p, ws, ws.x, ws.mu)
         for j in range(a.size):
             a[j] += ws.x[j]

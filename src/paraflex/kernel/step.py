@@ -96,7 +96,8 @@ def filtered_error(p, tableau, h, controls, m, ws, slow):
     no elastic force turns round, and that moves the mechanism by memory times its size before the run ends.
 
     With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
-    (M + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale.
+    (M + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
+    and for springs J eps_v - C mu / b = -J e_q / g, with b = g^2.
     """
     stages = tableau.c.size
     g = tableau.A[stages - 1, stages - 1] * h
@@ -133,8 +134,8 @@ def filter_error(p, g, controls, eq, ev, ws):
         body = p.bodies[i]
         to_body_frame(p, i, ws, ws.x)
         to_body_frame(p, i, ws, ws.f)
-        jacobian_times(p, i, ws, ws.x, 1.0 / scale, ws.mu)
-        jacobian_times(p, i, ws, ws.f, -controls.beta * controls.beta * g / scale, ws.mu)
+        jacobian_times(p, i, ws, ws.x, 1.0 / scale, 0.0, ws.mu)
+        jacobian_times(p, i, ws, ws.f, -controls.beta * controls.beta * g / scale, -1.0 / g, ws.mu)
         mass_times(p, i, ws, ws.mass, ws.x)
         e = body.offset + 3
         for j in range(body.nf):

@@ -103,6 +103,13 @@ def follow_path(
     UnreachablePathError
         The path leaves the workspace or passes a Type I singularity: it names time and position.
     """
+    if mechanism.springs:
+        raise InputError(
+            "torques along a path do not account for springs yet",
+            field="spring",
+            value=mechanism.springs[0].name,
+            remedy="plan the motion of the mechanism without its springs",
+        )
     system = build_system(mechanism.rigid())
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
@@ -132,7 +139,7 @@ class _Closure:
         self.packed, self.marker = _with_marker(system, effector.point)
 
     def check_degrees_of_freedom(self) -> None:
-        free, tasks = self.system.n - self.system.m, self.coordinates.size
+        free, tasks = self.system.n - self.system.n_constraints, self.coordinates.size
         if free != tasks:
             raise InputError(
                 f"the mechanism has {free} degrees of freedom, its task {tasks} coordinate(s)",

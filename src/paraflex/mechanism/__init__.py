@@ -2,7 +2,16 @@
 
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, LumpedMass, Material, RigidBody, Section
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.joints import GROUND, AngleLaw, Motor, PointRef, PrescribedAngle, RevoluteJoint, SampledAngle
+from paraflex.mechanism.joints import (
+    GROUND,
+    AngleLaw,
+    Motor,
+    PointRef,
+    PrescribedAngle,
+    RevoluteJoint,
+    SampledAngle,
+    TorsionalSpring,
+)
 from paraflex.mechanism.mechanism import (
     ActuationMode,
     Assembly,
@@ -36,6 +45,7 @@ __all__ = [
     "RigidBody",
     "SampledAngle",
     "Section",
+    "TorsionalSpring",
     "check_mechanism",
     "mode_of_motors",
     "mode_of_signs",

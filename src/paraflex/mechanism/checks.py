@@ -40,6 +40,7 @@ def check_names(mechanism: Mechanism) -> None:
         "joint": mechanism.joints,
         "motor": mechanism.motors,
         "prescribed": mechanism.prescribed,
+        "spring": mechanism.springs,
         "assembly": mechanism.assemblies,
         "mode": mechanism.modes,
     }
@@ -115,6 +116,11 @@ def check_references(mechanism: Mechanism) -> None:
         _known(motor.joint, joints, f"motor.{motor.name}.joint", "joint")
     for prescribed in mechanism.prescribed:
         _known(prescribed.joint, joints, f"prescribed.{prescribed.name}.joint", "joint")
+    for spring in mechanism.springs:
+        field = f"spring.{spring.name}"
+        _known(spring.joint, joints, f"{field}.joint", "joint")
+        _positive(spring.stiffness, f"{field}.stiffness", "N m/rad")
+        _finite([spring.rest], f"{field}.rest")
     for mode in mechanism.modes:
         for name in mode.motors:
             _known(name, motors, f"mode.{mode.name}", "motor")

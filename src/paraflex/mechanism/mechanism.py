@@ -10,7 +10,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint
+from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint, TorsionalSpring
 
 TASK_COORDINATES = ("x", "y", "angle")
 # The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
@@ -73,6 +73,7 @@ class Mechanism:
         Their order is that of the signs in a mode such as "+-+-".
     prescribed : tuple of PrescribedAngle
         Joint angles given in time.
+    springs : tuple of TorsionalSpring
     end_effector : EndEffector, optional
     assemblies : tuple of Assembly
         The first is the default.
@@ -97,6 +98,7 @@ class Mechanism:
     end_effector: EndEffector | None = None
     assemblies: tuple[Assembly, ...] = ()
     modes: tuple[ActuationMode, ...] = ()
+    springs: tuple[TorsionalSpring, ...] = ()
     geometry: Geometry = Geometry.LINEAR
     description: str = field(default="", compare=False)
 
