@@ -39,8 +39,9 @@ def test_python_of_the_pages_runs(page, tmp_path, monkeypatch, capsys):
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL)
     assert blocks
     monkeypatch.chdir(tmp_path)
+    names: dict = {}
     for block in blocks:
-        exec(compile(block, page, "exec"), {})
+        exec(compile(block, page, "exec"), names)
     assert (tmp_path / "path.png").stat().st_size > 10_000
     # The block prints the tracking error in ++++; converged 6.288e-4 m, the default tolerance gives it to 1 %.
     assert float(capsys.readouterr().out) == pytest.approx(6.288e-4, rel=0.01)

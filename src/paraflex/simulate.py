@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from paraflex.dynamics import State, System, build_system, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution, integrate
 from paraflex.kinematics import Path, RigidMotion, follow_path
-from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
+from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 
 # Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
 _SAME_TIME = 1e-9
@@ -34,6 +34,11 @@ class TrackingTask:
     effort : Effort
         Of that motion.
     plan : TorquePlan
+    start : State
+        Undeformed, at the start of the path, moving as the path does.
+    carriers : mapping
+        For each body of the mechanism the body of the planned motion that it lies on: itself, or for a finite segment
+        the beam it is a part of.
     """
 
     mechanism: Mechanism
@@ -42,6 +47,8 @@ class TrackingTask:
     motion: RigidMotion
     effort: Effort
     plan: TorquePlan
+    start: State
+    carriers: Mapping[str, str]
 
     def mode(self, mode: str | ActuationMode) -> ActuationMode:
         """An actuation mode by name, signs or motor names."""
@@ -50,6 +57,24 @@ class TrackingTask:
     def torques(self, mode: str | ActuationMode) -> FeedForward:
         """Feed-forward torques of a mode: minimum norm, smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
+
+    def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
+        """The same task for the virtual prototype of finite segments, driven by the same torques.
+
+        Parameters
+        ----------
+        segments : int or mapping of str to int
+            See `mechanism.finite_segments`.
+        """
+        segmented = finite_segments(self.mechanism, segments)
+        system = build_system(segmented.mechanism)
+        return replace(
+            self,
+            mechanism=segmented.mechanism,
+            system=system,
+            start=_start(system, self.motion, segmented.carriers),
+            carriers={name: carrier for name, (carrier, _) in segmented.carriers.items()},
+        )
 
     def simulate(self, mode: str | ActuationMode, *, options: IntegrationOptions | None = None) -> TrackingRun:
         """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""
@@ -120,13 +145,16 @@ def plan_tracking(
         return follow_path(mechanism, path, t, assembly=assembly, orientation=orientation)
 
     motion = follow(times)
+    system = build_system(mechanism)
     return TrackingTask(
         mechanism=mechanism,
-        system=build_system(mechanism),
+        system=system,
         path=path,
         motion=motion,
         effort=required_effort(motion),
         plan=plan_torques(follow, _knots(path, end)),
+        start=_start(system, motion, {body.name: (body.name, 0.0) for body in system.bodies}),
+        carriers={body.name: body.name for body in system.bodies},
     )
 
 
@@ -166,7 +194,7 @@ def simulate(
     stops = np.sort(np.concatenate([torques.knots, knots]))
     try:
         solution = integrate(
-            task.system, signals, start_state(task), times, knots=stops, options=options, on_progress=on_progress
+            task.system, signals, task.start, times, knots=stops, options=options, on_progress=on_progress
         )
     except IntegrationError as error:
         error.partial = TrackingRun(task, torques, condition, error.partial)
@@ -174,13 +202,17 @@ def simulate(
     return TrackingRun(task, torques, condition, solution)
 
 
-def start_state(task: TrackingTask) -> State:
-    """The undeformed mechanism at the start of the path, moving as the path does."""
-    system, motion = task.system, task.motion
+def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str, float]]) -> State:
+    """Bodies where the planned motion has them at its start; each at its distance along its carrier."""
     q, v = np.zeros(system.n), np.zeros(system.n)
-    for body, rigid in zip(system.bodies, motion.system.bodies, strict=True):
-        q[body.offset : body.offset + 3] = motion.q[0, rigid.all]
-        v[body.offset : body.offset + 3] = motion.v[0, rigid.all]
+    for body in system.bodies:
+        name, along = carriers[body.name]
+        rigid = motion.system.body(name)
+        x, y, phi = motion.q[0, rigid.all]
+        vx, vy, w = motion.v[0, rigid.all]
+        c, s = along * np.cos(phi), along * np.sin(phi)
+        q[body.offset : body.offset + 3] = x + c, y + s, phi
+        v[body.offset : body.offset + 3] = vx - w * s, vy + w * c, w
     return State(float(motion.t[0]), q, v)
 
 

@@ -24,6 +24,7 @@ from paraflex.mechanism.mechanism import (
     parse_mode,
 )
 from paraflex.mechanism.raparm import raparm_i
+from paraflex.mechanism.segments import Segmented, finite_segments
 
 __all__ = [
     "GROUND",
@@ -45,8 +46,10 @@ __all__ = [
     "RigidBody",
     "SampledAngle",
     "Section",
+    "Segmented",
     "TorsionalSpring",
     "check_mechanism",
+    "finite_segments",
     "mode_of_motors",
     "mode_of_signs",
     "parse_geometry",

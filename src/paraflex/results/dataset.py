@@ -92,7 +92,7 @@ def tracking_dataset(
         for name in frames[0]
     }
     desired = motion.desired
-    rigid_angles = [body.angle for body in motion.system.bodies]
+    rigid_angles = [motion.system.body(task.carriers[body.name]).angle for body in system.bodies]
     twins = {
         "end_effector": ("axis", desired.position),
         "end_effector_velocity": ("axis", desired.velocity),
