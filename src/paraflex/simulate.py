@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +36,11 @@ class TrackingTask:
     plan : TorquePlan
     start : State
         Undeformed, at the start of the path, moving as the path does.
+    whole : TrackingTask or None
+        The task of the uncut mechanism, where this one is of its finite segments.
     carriers : mapping
-        For each body of the mechanism the body of the planned motion that it lies on: itself, or for a finite segment
-        the beam it is a part of.
+        For each finite segment the beam it was cut from, and how far along that it starts [m]; empty where nothing
+        was cut.
     """
 
     mechanism: Mechanism
@@ -48,7 +50,8 @@ class TrackingTask:
     effort: Effort
     plan: TorquePlan
     start: State
-    carriers: Mapping[str, str]
+    whole: TrackingTask | None = None
+    carriers: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
     def mode(self, mode: str | ActuationMode) -> ActuationMode:
         """An actuation mode by name, signs or motor names."""
@@ -65,7 +68,14 @@ class TrackingTask:
         ----------
         segments : int or mapping of str to int
             See `mechanism.finite_segments`.
+
+        Raises
+        ------
+        InputError
+            See there; or the task is of finite segments already.
         """
+        if self.whole is not None:
+            raise InputError("cut into segments already", field="segments", remedy="cut the task it was made from")
         segmented = finite_segments(self.mechanism, segments)
         system = build_system(segmented.mechanism)
         return replace(
@@ -73,7 +83,8 @@ class TrackingTask:
             mechanism=segmented.mechanism,
             system=system,
             start=_start(system, self.motion, segmented.carriers),
-            carriers={name: carrier for name, (carrier, _) in segmented.carriers.items()},
+            whole=self,
+            carriers=segmented.carriers,
         )
 
     def simulate(self, mode: str | ActuationMode, *, options: IntegrationOptions | None = None) -> TrackingRun:
@@ -92,12 +103,15 @@ class TrackingRun:
     condition : (k,) array
         Condition number of the actuation matrix at the sample times.
     solution : Solution
+    method : str
+        How it was integrated.
     """
 
     task: TrackingTask
     torques: FeedForward
     condition: NDArray[np.float64]
     solution: Solution
+    method: str = "TR-BDF2"
 
     @property
     def mode(self) -> ActuationMode:
@@ -154,7 +168,6 @@ def plan_tracking(
         effort=required_effort(motion),
         plan=plan_torques(follow, _knots(path, end)),
         start=_start(system, motion, {body.name: (body.name, 0.0) for body in system.bodies}),
-        carriers={body.name: body.name for body in system.bodies},
     )
 
 

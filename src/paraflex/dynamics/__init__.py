@@ -1,6 +1,6 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
 from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.state import (
     State,
@@ -23,6 +23,7 @@ __all__ = [
     "consistent_state",
     "constant_signals",
     "momentum",
+    "node_marker",
     "pack_signals",
     "piecewise_quintic",
     "project_position",

@@ -168,8 +168,14 @@ def make_marker(
         return Marker(i, np.array(body.points[ref.point], dtype=float), np.zeros((2, 0)), np.zeros(0))
     mesh = bodies[i].mesh
     assert mesh is not None
-    node, D, points = mesh.points[ref.point], bodies[i].integrals.D, bodies[i].points
+    return node_marker(i, bodies[i], mesh.points[ref.point])
+
+
+def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
+    """The material point at a node of a beam, counted from its first end."""
+    mesh, points = body.mesh, body.points
+    assert mesh is not None
     x = float(mesh.nodes[node])
     N, slope = mesh.shape_at(x)
     bending = points.bending(node_weights(mesh, node)) if points is not None and node > 0 else None
-    return Marker(i, np.array([x, 0.0]), N @ D, slope @ D, bending)
+    return Marker(index, np.array([x, 0.0]), N @ body.integrals.D, slope @ body.integrals.D, bending)

@@ -24,10 +24,12 @@ from paraflex.mechanism.mechanism import (
     parse_mode,
 )
 from paraflex.mechanism.raparm import raparm_i
-from paraflex.mechanism.segments import Segmented, finite_segments
+from paraflex.mechanism.segments import FIRST_END, LAST_END, Segmented, finite_segments
 
 __all__ = [
+    "FIRST_END",
     "GROUND",
+    "LAST_END",
     "ActuationMode",
     "AngleLaw",
     "Assembly",

@@ -12,7 +12,7 @@ from paraflex.mechanism.joints import PointRef, RevoluteJoint, TorsionalSpring
 from paraflex.mechanism.mechanism import Mechanism
 
 # Points at which segments hang together.
-_FIRST, _LAST = "_first", "_last"
+FIRST_END, LAST_END = "_first", "_last"
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
             carriers[name] = (body.name, i * length)
         for a, b in pairwise(names):
             hinge = f"{a}-{b}"
-            joints.append(RevoluteJoint(hinge, PointRef(a, _LAST), PointRef(b, _FIRST)))
+            joints.append(RevoluteJoint(hinge, PointRef(a, LAST_END), PointRef(b, FIRST_END)))
             springs.append(TorsionalSpring(hinge, hinge, stiffness))
         places |= {(body.name, point): names[i] for point, i in owners.items()}
 
@@ -126,5 +126,5 @@ def _segment(beam: FlexibleBeam, name: str, i: int, length: float, owners: Mappi
         mass=mass,
         inertia=sum(J + m * (x - centre) ** 2 for m, x, J in parts),
         centre_of_mass=(centre, 0.0),
-        points={_FIRST: (0.0, 0.0), _LAST: (length, 0.0), **points},
+        points={FIRST_END: (0.0, 0.0), LAST_END: (length, 0.0), **points},
     )

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError, OutputError
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import PointRef
 from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
-from paraflex.results.motion import point_motion, tip_deflection
+from paraflex.results.record import FIGURES, Record, record
 from paraflex.simulate import TrackingRun
 
 SCHEMA = 1
@@ -28,6 +27,8 @@ _UNITS = {
     "angle": ("link angle", "rad"),
     "angular_velocity": ("link angular velocity", "rad/s"),
     "angular_acceleration": ("link angular acceleration", "rad/s^2"),
+    "chord_angle": ("angle from a link's first end to its last", "rad"),
+    "chord_velocity": ("rate of the angle from a link's first end to its last", "rad/s"),
     "tip_axial": ("axial tip displacement", "m"),
     "tip_transverse": ("transverse tip displacement", "m"),
     "tip_slope": ("tip slope", "rad"),
@@ -48,29 +49,21 @@ _UNITS = {
     "constraint_velocity_max": ("largest constraint violation in velocity", "m/s"),
     "energy_balance_max": ("largest imbalance of energy and work", "J"),
 }
-_FIGURES = (
-    "status",
-    "message",
-    "steps",
-    "rejected",
-    "newton_iterations",
-    "factorisations",
-    "wall_time",
-    "constraint_position_max",
-    "constraint_velocity_max",
-    "energy_balance_max",
-)
 
 
 def tracking_dataset(
-    runs: Sequence[TrackingRun], *, options: IntegrationOptions | None = None, parameters: dict | None = None
+    runs: Sequence[TrackingRun | Record],
+    *,
+    options: IntegrationOptions | None = None,
+    parameters: dict | None = None,
 ) -> xr.Dataset:
     """One dataset of the runs of several modes of a task.
 
     Parameters
     ----------
-    runs : sequence of TrackingRun
-        Of one task; runs that did not finish hold NaN after their last sample and say so in `status`.
+    runs : sequence of TrackingRun or Record
+        Of one task; runs that did not finish hold NaN after their last sample and say so in `status`. Runs of finite
+        segments are told as the links they were cut from.
     options : IntegrationOptions, optional
         Kept as provenance.
     parameters : dict, optional
@@ -83,38 +76,39 @@ def tracking_dataset(
     """
     if not runs:
         raise InputError("no run to keep", field="runs", remedy="simulate at least one mode")
-    task = runs[0].task
-    system, motion = task.system, task.motion
-    points = [PointRef(body.name, point) for body in task.mechanism.bodies for point in body.points]
-    frames = [_frame(run, points) for run in runs]
+    records = [run if isinstance(run, Record) else record(run) for run in runs]
+    task = records[0].task
+    motion, mechanism = task.motion, task.mechanism
+    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+    frames = [_frame(one) for one in records]
     data: dict[str, tuple] = {
         name: (("mode", "time", *frames[0][name][0]), np.stack([frame[name][1] for frame in frames]))
         for name in frames[0]
     }
     desired = motion.desired
-    rigid_angles = [motion.system.body(task.carriers[body.name]).angle for body in system.bodies]
+    angles = [motion.system.body(body.name).angle for body in mechanism.bodies]
     twins = {
         "end_effector": ("axis", desired.position),
         "end_effector_velocity": ("axis", desired.velocity),
         "end_effector_acceleration": ("axis", desired.acceleration),
-        "angle": ("body", motion.q[:, rigid_angles]),
-        "angular_velocity": ("body", motion.v[:, rigid_angles]),
-        "angular_acceleration": ("body", motion.a[:, rigid_angles]),
+        "angle": ("body", motion.q[:, angles]),
+        "angular_velocity": ("body", motion.v[:, angles]),
+        "angular_acceleration": ("body", motion.a[:, angles]),
     }
     for name, (dim, values) in twins.items():
         data[f"{name}_desired"] = (("mode", "time", dim), np.broadcast_to(values, (len(runs), *values.shape)).copy())
-    for name in _FIGURES:
-        data[name] = (("mode",), np.array([getattr(run.solution, name) for run in runs]))
+    for name in FIGURES:
+        data[name] = (("mode",), np.array([one.figures[name] for one in records]))
     out = xr.Dataset(
         data,
         coords={
-            "mode": [run.mode.name for run in runs],
+            "mode": [one.mode for one in records],
             "time": motion.t,
             "axis": ["x", "y"],
-            "body": [body.name for body in system.bodies],
-            "motor": [motor.name for motor in task.mechanism.motors],
-            "joint": [joint.name for joint in task.mechanism.joints],
-            "point": [str(point) for point in points],
+            "body": [body.name for body in mechanism.bodies],
+            "motor": [motor.name for motor in mechanism.motors],
+            "joint": [joint.name for joint in mechanism.joints],
+            "point": points,
         },
     )
     out["tracking_rms"] = tracking_error(out)
@@ -126,60 +120,49 @@ def tracking_dataset(
         if label is not None:
             twin = "desired " if str(name).endswith("_desired") else ""
             out[name].attrs = {"long_name": twin + label, "units": unit}
-    out.attrs = _provenance(task.mechanism.name, task.path.duration, options or IntegrationOptions(), parameters or {})
+    out.attrs = _provenance(records[0], options or IntegrationOptions(), parameters or {})
     return out
 
 
-def _frame(run: TrackingRun, points: list[PointRef]) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
+def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
     """A run's variables over all sample times: extra dimensions and values, NaN where it did not get to."""
-    task, solution = run.task, run.solution
-    system = task.system
-    total = task.motion.t.size
+    total = one.task.motion.t.size
 
     def full(values: NDArray[np.float64]) -> NDArray[np.float64]:
         out = np.full((total, *values.shape[1:]), np.nan)
         out[: values.shape[0]] = values
         return out
 
-    q, v, a = solution.q, solution.v, solution.a
-    effector = task.mechanism.end_effector
-    assert effector is not None
-    tip = point_motion(system, effector.point, q, v, a)
-    angles = [body.angle for body in system.bodies]
-    tips = np.stack([tip_deflection(system, body.name, q) for body in system.bodies], axis=1)
-    places = np.stack([point_motion(system, point, q, v, a).position for point in points], axis=1)
-    rows = np.array(
-        [[system.rows.index(f"{joint.name} {axis}") for axis in ("x", "y")] for joint in task.mechanism.joints]
-    )
     return {
-        "end_effector": (("axis",), full(tip.position)),
-        "end_effector_velocity": (("axis",), full(tip.velocity)),
-        "end_effector_acceleration": (("axis",), full(tip.acceleration)),
-        "torque": (("motor",), run.torques.evaluate(task.motion.t)),
-        "angle": (("body",), full(q[:, angles])),
-        "angular_velocity": (("body",), full(v[:, angles])),
-        "angular_acceleration": (("body",), full(a[:, angles])),
-        "tip_axial": (("body",), full(tips[:, :, 0])),
-        "tip_transverse": (("body",), full(tips[:, :, 1])),
-        "tip_slope": (("body",), full(tips[:, :, 2])),
-        "point_position": (("point", "axis"), full(places)),
-        # Phi = p_b - p_a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
-        "joint_force": (("joint", "axis"), full(-solution.multipliers[:, rows])),
-        "kinetic_energy": ((), full(solution.kinetic_energy)),
-        "strain_energy": ((), full(solution.strain_energy)),
-        "work": ((), full(solution.work)),
-        "actuation_condition": ((), run.condition),
+        "end_effector": (("axis",), full(one.end_effector.position)),
+        "end_effector_velocity": (("axis",), full(one.end_effector.velocity)),
+        "end_effector_acceleration": (("axis",), full(one.end_effector.acceleration)),
+        "torque": (("motor",), one.torque),
+        "angle": (("body",), full(one.angle)),
+        "angular_velocity": (("body",), full(one.rate)),
+        "angular_acceleration": (("body",), full(one.acceleration)),
+        "chord_angle": (("body",), full(one.chord)),
+        "chord_velocity": (("body",), full(one.chord_rate)),
+        "tip_axial": (("body",), full(one.tip[:, :, 0])),
+        "tip_transverse": (("body",), full(one.tip[:, :, 1])),
+        "tip_slope": (("body",), full(one.tip[:, :, 2])),
+        "point_position": (("point", "axis"), full(one.points)),
+        "joint_force": (("joint", "axis"), full(one.joint_force)),
+        "kinetic_energy": ((), full(one.kinetic_energy)),
+        "strain_energy": ((), full(one.strain_energy)),
+        "work": ((), full(one.work)),
+        "actuation_condition": ((), one.condition),
     }
 
 
-def _provenance(name: str, motion_end: float, options: IntegrationOptions, parameters: dict) -> dict:
+def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> dict:
     return {
-        "mechanism": name,
-        "motion_end": motion_end,
+        "mechanism": one.task.mechanism.name,
+        "motion_end": one.task.path.duration,
         "tolerance": options.tolerance,
         "baumgarte_alpha": options.alpha,
         "baumgarte_beta": options.beta,
-        "method": "TR-BDF2",
+        "method": one.method,
         "parameters": json.dumps(parameters, sort_keys=True),
         "paraflex_version": version("paraflex"),
         "numba_version": version("numba"),

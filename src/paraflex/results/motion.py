@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import System
+from paraflex.dynamics import Marker, System
 from paraflex.fem import node_weights
 from paraflex.fem.element import AXIAL, SLOPE, TRANSVERSE
 from paraflex.mechanism import PointRef
@@ -24,11 +24,17 @@ class PointMotion(NamedTuple):
 def point_motion(
     system: System, ref: PointRef, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
 ) -> PointMotion:
-    """Motion of a point for coordinates (k, n) and their derivatives.
+    """Motion of a named point for coordinates (k, n) and their derivatives."""
+    return marker_motion(system, system.marker(ref), q, v, a)
+
+
+def marker_motion(
+    system: System, marker: Marker, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
+) -> PointMotion:
+    """Motion of a material point of a body for coordinates (k, n) and their derivatives.
 
     p = r + R s, p' = r' + R (phi' E s + N u'), p'' = r'' + R (phi'' E s - phi'^2 s + 2 phi' E N u' + N u'').
     """
-    marker = system.marker(ref)
     body = system.bodies[marker.body]
     phi, w, dw = q[:, body.angle], v[:, body.angle, None], a[:, body.angle, None]
     c, s = np.cos(phi)[:, None], np.sin(phi)[:, None]

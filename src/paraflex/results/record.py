@@ -1,0 +1,189 @@
+"""A run told link by link: what every model of a mechanism can say, whoever computed it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System, node_marker
+from paraflex.mechanism import FIRST_END, LAST_END, FlexibleBeam, PointRef
+from paraflex.results.motion import PointMotion, marker_motion, point_motion, tip_deflection
+from paraflex.simulate import TrackingRun, TrackingTask
+
+# How a run went: names of the figures every record has.
+FIGURES = (
+    "status",
+    "message",
+    "steps",
+    "rejected",
+    "newton_iterations",
+    "factorisations",
+    "wall_time",
+    "constraint_position_max",
+    "constraint_velocity_max",
+    "energy_balance_max",
+)
+
+
+@dataclass(frozen=True)
+class Record:
+    """One run of a task, at the k sample times it reached; NaN for what a model does not tell.
+
+    Bodies, joints and points are those of the task's mechanism in its order, whatever the model cut them into. Points
+    are all the named points of all bodies, body after body.
+
+    Attributes
+    ----------
+    task : TrackingTask
+    method : str
+        How it was integrated.
+    mode : str
+        Name of the actuation mode.
+    torque : (samples, motors) array
+        Applied by the motors, at every sample time of the task [N m].
+    condition : (samples,) array
+        Condition number of the actuation matrix.
+    end_effector : PointMotion
+        Three (k, 2) arrays.
+    angle, rate, acceleration : (k, bodies) arrays
+        Of the body frames; in a model without them the tangent at a beam's first end [rad, rad/s, rad/s^2].
+    chord, chord_rate : (k, bodies) arrays
+        Of the line from a beam's first end to its last, which no choice of frame touches; a rigid body's angle
+        [rad, rad/s].
+    tip : (k, bodies, 3) array
+        Axial, transverse displacement and slope of a beam's last end in its body frame [m, m, rad].
+    points : (k, points, 2) array
+        Positions [m].
+    joint_force : (k, joints, 2) array
+        On the joint's second body, in the ground frame [N].
+    kinetic_energy, strain_energy, work : (k,) arrays
+        [J]
+    figures : mapping
+        The numbers and words named in FIGURES.
+    """
+
+    task: TrackingTask
+    method: str
+    mode: str
+    torque: NDArray[np.float64]
+    condition: NDArray[np.float64]
+    end_effector: PointMotion
+    angle: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    chord: NDArray[np.float64]
+    chord_rate: NDArray[np.float64]
+    tip: NDArray[np.float64]
+    points: NDArray[np.float64]
+    joint_force: NDArray[np.float64]
+    kinetic_energy: NDArray[np.float64]
+    strain_energy: NDArray[np.float64]
+    work: NDArray[np.float64]
+    figures: Mapping[str, Any] = field(default_factory=dict)
+
+
+def record(run: TrackingRun) -> Record:
+    """What a run of our own says of the links; finite segments are told as the links they were cut from."""
+    task, solution = run.task, run.solution
+    system, q, v, a = task.system, solution.q, solution.v, solution.a
+    whole = task if task.whole is None else task.whole
+    effector = task.mechanism.end_effector
+    assert effector is not None
+    parts = _parts(task)
+    first = [system.body(names[0]).angle for names in parts]
+    chords = [_chord(system, names, q, v) for names in parts]
+    joints = [[system.rows.index(f"{joint.name} {axis}") for axis in ("x", "y")] for joint in whole.mechanism.joints]
+    points = [
+        point_motion(system, PointRef(_owner(task, names, point), point), q, v, a).position
+        for body, names in zip(whole.mechanism.bodies, parts, strict=True)
+        for point in body.points
+    ]
+    return Record(
+        task=whole,
+        method=run.method,
+        mode=run.mode.name,
+        torque=run.torques.evaluate(task.motion.t),
+        condition=run.condition,
+        end_effector=point_motion(system, effector.point, q, v, a),
+        angle=q[:, first],
+        rate=v[:, first],
+        acceleration=a[:, first],
+        chord=np.stack([angle for angle, _ in chords], axis=1),
+        chord_rate=np.stack([rate for _, rate in chords], axis=1),
+        tip=np.stack([_tip(system, names, q) for names in parts], axis=1),
+        points=np.stack(points, axis=1) if points else np.zeros((q.shape[0], 0, 2)),
+        # Phi = p_b - p_a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
+        joint_force=-solution.multipliers[:, np.array(joints, dtype=int).reshape(-1, 2)],
+        kinetic_energy=solution.kinetic_energy,
+        strain_energy=solution.strain_energy,
+        work=solution.work,
+        figures={name: getattr(solution, name) for name in FIGURES},
+    )
+
+
+def _parts(task: TrackingTask) -> list[list[str]]:
+    """For each body of the uncut mechanism the names of what it was cut into, first end first: itself if it was not."""
+    if task.whole is None:
+        return [[body.name] for body in task.system.bodies]
+    parts: dict[str, list[str]] = {body.name: [] for body in task.whole.system.bodies}
+    for name, (carrier, _) in task.carriers.items():
+        parts[carrier].append(name)
+    return list(parts.values())
+
+
+def _owner(task: TrackingTask, names: list[str], point: str) -> str:
+    return next(name for name in names if point in task.mechanism.body(name).points)
+
+
+def _ends(system: System, names: list[str], q: NDArray[np.float64], v: NDArray[np.float64]) -> list[PointMotion]:
+    """Motion of the first and last end of a beam, or of what it was cut into."""
+    out = []
+    for name, node, segment_end in ((names[0], 0, FIRST_END), (names[-1], -1, LAST_END)):
+        body = system.body(name)
+        if body.mesh is None:
+            marker = system.marker(PointRef(name, segment_end))
+        else:
+            marker = node_marker(system.index[name], body, node % body.mesh.nodes.size)
+        out.append(marker_motion(system, marker, q, v, np.zeros_like(q)))
+    return out
+
+
+def _is_beam(system: System, names: list[str]) -> bool:
+    return len(names) > 1 or isinstance(system.mechanism.body(names[0]), FlexibleBeam)
+
+
+def _chord(
+    system: System, names: list[str], q: NDArray[np.float64], v: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Angle and rate of the line from a beam's first end to its last; a rigid body's own."""
+    angle = system.body(names[0]).angle
+    if not _is_beam(system, names):
+        return q[:, angle], v[:, angle]
+    first, last = _ends(system, names, q, v)
+    return line_angle(last.position - first.position, last.velocity - first.velocity, q[:, angle])
+
+
+def line_angle(
+    line: NDArray[np.float64], rate: NDArray[np.float64], near: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Angle (k,) of a line (k, 2) within a half turn of another angle (k,), and its rate."""
+    x, y = line[:, 0], line[:, 1]
+    turned = np.arctan2(y, x) - near
+    angle = near + (turned + np.pi) % (2.0 * np.pi) - np.pi
+    return angle, (x * rate[:, 1] - y * rate[:, 0]) / (x**2 + y**2)
+
+
+def _tip(system: System, names: list[str], q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Displacement and slope of a beam's last end in its frame: of segments, in that of the first one."""
+    if len(names) == 1:
+        return tip_deflection(system, names[0], q)
+    first, last = _ends(system, names, q, np.zeros_like(q))
+    phi, end = q[:, system.body(names[0]).angle], q[:, system.body(names[-1]).angle]
+    c, s = np.cos(phi), np.sin(phi)
+    x, y = (last.position - first.position).T
+    length = sum(system.marker(PointRef(name, LAST_END)).x0[0] for name in names)
+    return np.column_stack([c * x + s * y - length, c * y - s * x, end - phi])

@@ -1,0 +1,58 @@
+"""What a run says of its links, whatever they are cut into."""
+
+import numpy as np
+import pytest
+
+from paraflex.errors import InputError
+from paraflex.fem import ReferenceCondition
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import raparm_i
+from paraflex.results import tracking_dataset
+from paraflex.simulate import plan_tracking
+
+FINE = IntegrationOptions(tolerance=1e-5)
+
+
+def study(mechanism, path, segments=None):
+    task = plan_tracking(mechanism, path, duration=0.05, samples=26)
+    task = task if segments is None else task.in_segments(segments)
+    return tracking_dataset([task.simulate("++++", options=FINE)]).isel(mode=0)
+
+
+@pytest.fixture(scope="module")
+def links(square):
+    return study(raparm_i().with_geometry("second-order"), square)
+
+
+def test_the_chord_is_the_x_axis_of_a_pinned_frame(square):
+    data = study(raparm_i().with_beams(reference=ReferenceCondition.PINNED).with_geometry("second-order"), square)
+    np.testing.assert_allclose(data["chord_angle"], data["angle"], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(data["chord_velocity"], data["angular_velocity"], rtol=0, atol=1e-10)
+
+
+def test_the_chord_is_that_between_named_points(links):
+    line = links["point_position"].sel(point="link4.C") - links["point_position"].sel(point="link4.B1")
+    angle = np.arctan2(line.sel(axis="y"), line.sel(axis="x"))
+    chord = links["chord_angle"].sel(body="link4")
+    np.testing.assert_allclose(chord, angle, rtol=0, atol=1e-12)
+    # The tangent at the first end is not the chord: links bend.
+    assert np.abs(chord - links["angle"].sel(body="link4")).max() > 1e-4
+    rate = np.gradient(chord.values, links["time"].values)
+    np.testing.assert_allclose(links["chord_velocity"].sel(body="link4")[1:-1], rate[1:-1], rtol=0, atol=0.02)
+
+
+def test_segments_are_told_as_links(links, square):
+    cut = study(raparm_i(), square, 16)
+    for name in ("body", "joint", "point", "motor"):
+        assert list(cut[name].values) == list(links[name].values)
+    # Both are of the same mechanism: a chord turns alike, a tip bends alike (segments are stiffer by 1/n).
+    np.testing.assert_allclose(cut["chord_angle"], links["chord_angle"], rtol=0, atol=1e-4)
+    deepest = np.abs(links["tip_transverse"]).max("time")
+    np.testing.assert_allclose(np.abs(cut["tip_transverse"]).max("time"), deepest, rtol=0.25)
+    np.testing.assert_allclose(cut["joint_force"][5:], links["joint_force"][5:], rtol=0, atol=0.5)
+    np.testing.assert_array_equal(cut["angle_desired"], links["angle_desired"])
+
+
+def test_segments_are_not_cut_again(square):
+    with pytest.raises(InputError, match="cut into segments already"):
+        plan_tracking(raparm_i(), square, samples=3).in_segments(4).in_segments(2)
