@@ -53,6 +53,8 @@ BROKEN = [
     ("elements = 3", "elements = 0", "body.link1.elements: a span needs at least one element", "1 or more"),
     ("elements = 3", "elements = 2.5", "body.link1.elements: should be a valid integer (got 2.5)", "span"),
     ("elements = [1, 2]", "elements = [1, 2, 3]", "body.link4.elements: the beam has 2 span(s)", "one number a span"),
+    ("elements = 3", "elements = 3\nmodes = 0", "body.link1.modes: no such number of modes (got 0)", "from 1 to 12"),
+    ("elements = 3", "elements = 3\nmodes = 13", "body.link1.modes: no such number of modes (got 13)", "from 1 to 12"),
     ("youngs_modulus = 70e9  # Pa\n", "", "material.aluminium.youngs_modulus: is missing", "Young's modulus in Pa"),
     ("density = 2700.0 ", "density = -2700.0 ", "body.link1.material.density: must be positive", "kg/m^3"),
     ("thickness = 0.005 ", "thickness = nan ", "section.bar.thickness: should be a finite number", "in m"),

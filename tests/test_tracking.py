@@ -154,6 +154,19 @@ def test_separate_curvatures_change_little_here(geometry):
     assert errors[1] != pytest.approx(errors[0], rel=1e-5)
 
 
+@pytest.mark.parametrize("geometry", ["linear", "second-order"])
+def test_fewer_modes_converge_to_all_of_them(geometry):
+    base = raparm_i().with_geometry(geometry).with_beams(reference=ReferenceCondition.PINNED)
+    errors = {}
+    for modes in (None, 1, 2, 4):
+        mechanism = base if modes is None else base.with_beams(modes=modes)
+        task = plan_tracking(mechanism, SQUARE, duration=0.2, samples=101)
+        assert modes is None or task.system.n_flexible == 8 * modes
+        errors[modes] = error_of(simulate(task, "++++", options=IntegrationOptions(tolerance=1e-5)))
+    away = [abs(errors[modes] / errors[None] - 1.0) for modes in (1, 2, 4)]
+    assert 0.02 > away[0] > 2.0 * away[1] > 4.0 * away[2]
+
+
 def test_one_rigid_link_among_flexible_ones():
     mechanism = raparm_i().rigid(["link4", "link8"])
     task = plan_tracking(mechanism, SQUARE, duration=0.1, samples=21)

@@ -17,13 +17,12 @@ from paraflex.fem import (
     SpanProperties,
     beam_integrals,
     mass_points,
-    mesh_beam,
     modal_basis,
     node_weights,
     rigid_integrals,
 )
 from paraflex.fem.element import SLOPE
-from paraflex.mechanism import Body, Curvature, Geometry, Mechanism, PointRef, RigidBody
+from paraflex.mechanism import Body, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
 
@@ -128,9 +127,7 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordin
     if isinstance(body, RigidBody):
         integrals = rigid_integrals(body.mass, body.centre_of_mass, body.inertia)
         return BodyCoordinates(body.name, offset, integrals, modal_basis(integrals), None)
-    mesh = mesh_beam(body.length, body.points, body.elements)
-    if body.curvature is Curvature.SEPARATE:
-        mesh = mesh.with_separate_curvature(mesh.points[lump.point] for lump in body.lumps if lump.inertia > 0.0)
+    mesh = body.mesh
     span = SpanProperties(
         mass_per_length=body.material.density * body.section.area,
         axial_stiffness=body.material.youngs_modulus * body.section.area,
@@ -149,6 +146,8 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordin
             field=f"body.{body.name}",
             remedy="check section, material and lumped masses for values many orders of magnitude apart",
         ) from error
+    if body.modes is not None:
+        modes = modes.lowest(body.modes)
     integrals = integrals.in_basis(modes.vectors)
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf:

@@ -51,6 +51,11 @@ class BeamMesh:
         return COORDINATES_PER_NODE * self.nodes.size + len(self._split)
 
     @property
+    def n_flexible(self) -> int:
+        """Number of flexible coordinates a reference condition leaves: 4 an element, and one a separate curvature."""
+        return self.n_nodal - (3 if self.n_elements in self.separate else 4)
+
+    @property
     def _split(self) -> list[int]:
         return [node for node in self.separate if 0 < node < self.n_elements]
 

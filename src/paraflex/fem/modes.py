@@ -19,12 +19,16 @@ class ModalBasis:
     ----------
     omega : (nf,) array
         Angular frequencies, ascending [rad/s].
-    vectors : (nf, nf) array
-        Columns V with V^T Mff V = 1 and V^T K V = diag(omega^2).
+    vectors : (nodal, nf) array
+        Columns V with V^T Mff V = 1 and V^T K V = diag(omega^2); square where all modes are kept.
     """
 
     omega: NDArray[np.float64]
     vectors: NDArray[np.float64]
+
+    def lowest(self, count: int) -> ModalBasis:
+        """The modes of lowest frequency alone: the modal reduction."""
+        return ModalBasis(self.omega[:count], self.vectors[:, :count])
 
 
 def modal_basis(body: ShapeIntegrals) -> ModalBasis:

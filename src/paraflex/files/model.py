@@ -286,6 +286,7 @@ def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:
         lumps=tuple(lumps),
         reference=ReferenceCondition(body.reference),
         curvature=Curvature(body.curvature),
+        modes=body.modes,
         flexible=body.flexible,
     )
 

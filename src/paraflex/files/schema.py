@@ -64,6 +64,7 @@ class BeamTable(_Table):
     curvature: Literal["shared", "separate"] = Field(
         default="shared", description='curvature at lumped moments of inertia: "shared" or "separate"'
     )
+    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
     flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid beam")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from paraflex.fem import ReferenceCondition
+from paraflex.fem import BeamMesh, ReferenceCondition, mesh_beam
 
 
 @dataclass(frozen=True)
@@ -106,6 +106,8 @@ class FlexibleBeam:
         How the floating frame is fixed to the beam; the paper's is the cantilever.
     curvature : Curvature
         At nodes with a lumped moment of inertia; the paper's is shared.
+    modes : int, optional
+        Modes of lowest frequency kept as flexible coordinates, in its frame; all by default.
     flexible : bool
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
@@ -119,7 +121,22 @@ class FlexibleBeam:
     lumps: tuple[LumpedMass, ...] = ()
     reference: ReferenceCondition = ReferenceCondition.CANTILEVER
     curvature: Curvature = Curvature.SHARED
+    modes: int | None = None
     flexible: bool = True
+
+    @property
+    def mesh(self) -> BeamMesh:
+        """Its elements and nodes.
+
+        Raises
+        ------
+        InputError
+            See `fem.mesh_beam`.
+        """
+        mesh = mesh_beam(self.length, self.points, self.elements)
+        if self.curvature is Curvature.SEPARATE:
+            mesh = mesh.with_separate_curvature(mesh.points[lump.point] for lump in self.lumps if lump.inertia > 0.0)
+        return mesh
 
     def as_rigid(self) -> FlexibleBeam:
         """The same beam with its flexibility switched off."""

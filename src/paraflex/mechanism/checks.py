@@ -89,6 +89,13 @@ def check_body(body: Body) -> None:
             )
         _not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
         _not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
+    if body.modes is not None and not 1 <= body.modes <= body.mesh.n_flexible:
+        raise InputError(
+            "no such number of modes",
+            field=f"{field}.modes",
+            value=body.modes,
+            remedy=f"from 1 to {body.mesh.n_flexible}, or leave it out for all",
+        )
 
 
 def check_ground(mechanism: Mechanism) -> None:

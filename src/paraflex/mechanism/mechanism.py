@@ -154,8 +154,9 @@ class Mechanism:
         elements: int | None = None,
         reference: ReferenceCondition | None = None,
         curvature: Curvature | None = None,
+        modes: int | None = None,
     ) -> Mechanism:
-        """The mechanism with another mesh, reference condition or element variant on every flexible beam.
+        """The mechanism with another mesh, reference condition, element variant or reduction on every flexible beam.
 
         Parameters
         ----------
@@ -163,6 +164,8 @@ class Mechanism:
             Elements per span, the same for all.
         reference : ReferenceCondition, optional
         curvature : Curvature, optional
+        modes : int, optional
+            Modes of lowest frequency kept of each.
         """
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
         if elements is not None:
@@ -171,6 +174,8 @@ class Mechanism:
             beams = [replace(beam, reference=reference) for beam in beams]
         if curvature is not None:
             beams = [replace(beam, curvature=curvature) for beam in beams]
+        if modes is not None:
+            beams = [replace(beam, modes=modes) for beam in beams]
         return self.with_bodies(beams)
 
     def with_geometry(self, geometry: Geometry | str) -> Mechanism:
