@@ -22,6 +22,7 @@ from paraflex.mechanism import (
     SampledAngle,
     Section,
     finite_segments,
+    proportional_segments,
     raparm_i,
 )
 from paraflex.results import tracking_dataset
@@ -38,6 +39,7 @@ def tracking_error(task, mode, tolerance=2e-5):
 
 
 def test_the_papers_prototype_has_56_segments_and_118_constraints():
+    assert proportional_segments(raparm_i()) == PAPER
     segmented = finite_segments(raparm_i(), PAPER)
     system = build_system(segmented.mechanism)
     assert len(system.bodies) == 56

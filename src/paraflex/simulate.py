@@ -61,6 +61,17 @@ class TrackingTask:
         """Feed-forward torques of a mode: minimum norm, smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
 
+    def remodelled(self, mechanism: Mechanism) -> TrackingTask:
+        """The same motion and torques for another model of the same bodies: rigid ones, another mesh or geometry.
+
+        Parameters
+        ----------
+        mechanism : Mechanism
+            As `Mechanism.rigid`, `with_beams`, `with_geometry` or `refined` return it.
+        """
+        system = build_system(mechanism)
+        return replace(self, mechanism=mechanism, system=system, start=_start(system, self.motion, _in_place(system)))
+
     def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
         """The same task for the virtual prototype of finite segments, driven by the same torques.
 
@@ -167,7 +178,7 @@ def plan_tracking(
         motion=motion,
         effort=required_effort(motion),
         plan=plan_torques(follow, _knots(path, end)),
-        start=_start(system, motion, {body.name: (body.name, 0.0) for body in system.bodies}),
+        start=_start(system, motion, _in_place(system)),
     )
 
 
@@ -213,6 +224,10 @@ def simulate(
         error.partial = TrackingRun(task, torques, condition, error.partial)
         raise
     return TrackingRun(task, torques, condition, solution)
+
+
+def _in_place(system: System) -> dict[str, tuple[str, float]]:
+    return {body.name: (body.name, 0.0) for body in system.bodies}
 
 
 def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str, float]]) -> State:

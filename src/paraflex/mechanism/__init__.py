@@ -24,7 +24,7 @@ from paraflex.mechanism.mechanism import (
     parse_mode,
 )
 from paraflex.mechanism.raparm import raparm_i
-from paraflex.mechanism.segments import FIRST_END, LAST_END, Segmented, finite_segments
+from paraflex.mechanism.segments import FIRST_END, LAST_END, Segmented, finite_segments, proportional_segments
 
 __all__ = [
     "FIRST_END",
@@ -56,5 +56,6 @@ __all__ = [
     "mode_of_signs",
     "parse_geometry",
     "parse_mode",
+    "proportional_segments",
     "raparm_i",
 ]

@@ -178,6 +178,15 @@ class Mechanism:
             beams = [replace(beam, modes=modes) for beam in beams]
         return self.with_bodies(beams)
 
+    def refined(self, factor: int) -> Mechanism:
+        """The mechanism with so many times the elements on every span of its flexible beams."""
+
+        def times(elements: int | tuple[int, ...]) -> int | tuple[int, ...]:
+            return elements * factor if isinstance(elements, int) else tuple(count * factor for count in elements)
+
+        beams = [body for body in self.bodies if isinstance(body, FlexibleBeam) and body.flexible]
+        return self.with_bodies(replace(beam, elements=times(beam.elements)) for beam in beams)
+
     def with_geometry(self, geometry: Geometry | str) -> Mechanism:
         """The mechanism with linear or second-order geometry of its flexible beams.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import ceil
 
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody
@@ -28,6 +29,18 @@ class Segmented:
 
     mechanism: Mechanism
     carriers: Mapping[str, tuple[str, float]]
+
+
+def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, int]:
+    """Numbers of segments of about one length: so many on the longest flexible beam, others by their length.
+
+    Eight make the paper's 56 segments of RAParM-I.
+    """
+    lengths = {
+        body.name: body.length for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.flexible
+    }
+    # Rounding of a length's share must not make one segment more.
+    return {name: ceil(longest * length / max(lengths.values()) - 1e-9) for name, length in lengths.items()}
 
 
 def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8) -> Segmented:

@@ -1,0 +1,51 @@
+"""What adapters share: importing an engine, refusing what it cannot express, steps that end at samples."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+
+
+def import_engine(name: str) -> Any:
+    """The engine's module.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise InputError(
+            "not installed", field="engine", value=name, remedy="install it with pip install 'paraflex[engines]'"
+        ) from None
+
+
+def refuse(engine: str, what: str, field: str) -> NoReturn:
+    """Say that an engine cannot express a part of a mechanism.
+
+    Raises
+    ------
+    InputError
+        Always.
+    """
+    raise InputError(f"{engine} cannot express {what}", field=field, remedy="leave out this engine or that part")
+
+
+def steps_between(times: NDArray[np.float64], step: float) -> int:
+    """The fewest equal steps between two samples that are no longer than a step.
+
+    Raises
+    ------
+    InputError
+        A step that is not positive.
+    """
+    if not (np.isfinite(step) and step > 0.0):
+        raise InputError("must be positive", field="step", value=step, remedy="give it in seconds")
+    return max(1, int(np.ceil((times[1] - times[0]) / step * (1.0 - 1e-9))))

@@ -1,0 +1,254 @@
+"""MuJoCo: a mechanism of finite segments as a tree of hinges, with loops closed by equality constraints.
+
+MuJoCo works in joint angles. Joints with springs come into the tree first, then those with motors; what is left closes
+loops. Springs are explicit there, so the step must resolve the stiffest pair of segments; RK4 is the scheme.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.dynamics import System, constant_signals, pack_signals
+from paraflex.engines.common import import_engine, refuse, steps_between
+from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
+from paraflex.errors import IntegrationError, Moment
+from paraflex.integrators import Solution
+from paraflex.mechanism import GROUND, ActuationMode, Mechanism, RevoluteJoint
+from paraflex.results.record import Record, record
+from paraflex.simulate import TrackingRun, TrackingTask
+
+# Shares of a step in the work of the motors, stage by stage.
+_RK4 = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
+# MuJoCo's constraints are springs with a time constant, given in steps; two is the stiffest it allows.
+_TIME_CONSTANT = 2.0
+# How nearly a constraint is enforced; MuJoCo cuts it off here.
+_IMPEDANCE = 0.9999
+_SOLVER_TOLERANCE = 1e-12
+# Callbacks and warnings are global in MuJoCo: one run at a time.
+_ONE_AT_A_TIME = threading.Lock()
+
+
+@dataclass(frozen=True)
+class MuJoCoOptions:
+    """How MuJoCo is to run.
+
+    Attributes
+    ----------
+    step : float
+        Longest time step [s]; it is cut to divide the time between samples.
+    segments : int or mapping of str to int
+        Per flexible beam, where the task is not of segments already.
+    """
+
+    step: float = 1.0 / 30000.0
+    segments: int | Mapping[str, int] = 8
+
+
+def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJoCoOptions | None = None) -> Record:
+    """Drive the mechanism of finite segments with the torques of a mode, in MuJoCo.
+
+    Parameters
+    ----------
+    task : TrackingTask
+        Cut into segments or not.
+    mode : str or ActuationMode
+    options : MuJoCoOptions, optional
+
+    Returns
+    -------
+    Record
+        Told as links. Joint forces are not known.
+
+    Raises
+    ------
+    InputError
+        MuJoCo is not installed, or the mechanism has a prescribed angle, which this engine cannot express.
+    IntegrationError
+        The run diverges; it carries the Record of what was computed.
+    """
+    mujoco = import_engine("mujoco")
+    options = options or MuJoCoOptions()
+    for prescribed in task.mechanism.prescribed:
+        refuse("MuJoCo", "a prescribed angle", f"prescribed.{prescribed.name}")
+    began = time.perf_counter()
+    task = task if task.whole is not None else task.in_segments(options.segments)
+    torques = task.torques(mode)
+    tree = spanning_tree(task.mechanism)
+    count = steps_between(task.motion.t, options.step)
+    model = _model(mujoco, task.system, tree, float(task.motion.t[1] - task.motion.t[0]) / count)
+    motion = _march(mujoco, model, task, torques, tree, count)
+    q, v, a = body_motion(task.system, tree, motion.joints)
+    run = TrackingRun(
+        task,
+        torques,
+        actuation_condition(task.effort, torques.mode),
+        _solution(task, q, v, a, motion, count, time.perf_counter() - began),
+        method=f"MuJoCo {mujoco.__version__}, RK4",
+    )
+    if motion.trouble:
+        reached = task.motion.t[motion.samples - 1]
+        moment = Moment(float(reached), (motion.samples - 1) * count)
+        raise IntegrationError(motion.trouble, moment, record(run))
+    return record(run)
+
+
+def _model(mujoco: Any, system: System, tree: Tree, step: float) -> Any:
+    """The model of the tree, all angles zero in its own reference pose."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = step
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.gravity = [0.0, 0.0, 0.0]
+    spec.option.tolerance = _SOLVER_TOLERANCE
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    bodies = {GROUND: spec.worldbody}
+    for link in tree.links:
+        own = place(system, link.own)
+        s = system.body(link.name).integrals
+        centre = s.S1 / s.m
+        body = bodies[link.parent].add_body(name=link.name, pos=[*(place(system, link.other) - own), 0.0])
+        body.mass, body.ipos = s.m, [*centre, 0.0]
+        body.inertia = [s.I0 + s.J - s.m * float(centre @ centre)] * 3
+        body.explicitinertial = True
+        body.add_joint(name=link.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0], pos=[*own, 0.0])
+        bodies[link.name] = body
+    _add_springs(spec, system.mechanism, tree)
+    for joint in tree.closing:
+        _close(mujoco, spec, system, joint, bodies, step)
+    return spec.compile()
+
+
+def _add_springs(spec: Any, mechanism: Mechanism, tree: Tree) -> None:
+    hinge = {link.joint.name: link for link in tree.links}
+    for spring in mechanism.springs:
+        link = hinge[spring.joint]
+        joint = spec.joint(link.name)
+        # Linear, quadratic and cubic stiffness.
+        joint.stiffness = [spring.stiffness, 0.0, 0.0]
+        joint.springref = link.sign * spring.rest
+
+
+def _close(mujoco: Any, spec: Any, system: System, joint: RevoluteJoint, bodies: dict, step: float) -> None:
+    sites = []
+    for side, ref in (("a", joint.a), ("b", joint.b)):
+        name = f"{joint.name} {side}"
+        bodies[ref.body].add_site(name=name, pos=[*place(system, ref), 0.0])
+        sites.append(name)
+    equality = spec.add_equality(
+        name=joint.name,
+        type=mujoco.mjtEq.mjEQ_CONNECT,
+        objtype=mujoco.mjtObj.mjOBJ_SITE,
+        name1=sites[0],
+        name2=sites[1],
+    )
+    equality.solref = [_TIME_CONSTANT * step, 1.0]
+    equality.solimp = [_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0]
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """What MuJoCo said at the samples it reached: positions, velocities, accelerations of its joints; energies."""
+
+    joints: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+    energy: NDArray[np.float64]
+    work: NDArray[np.float64]
+    trouble: str
+
+    @property
+    def samples(self) -> int:
+        return self.joints[0].shape[0]
+
+
+def _march(mujoco: Any, model: Any, task: TrackingTask, torques: FeedForward, tree: Tree, count: int) -> _Motion:
+    times, step = task.motion.t, model.opt.timestep
+    data = mujoco.MjData(model)
+    # MuJoCo numbers the joints in an order of its own.
+    order = np.array([model.joint(link.name).dofadr[0] for link in tree.links])
+    data.qpos[order], data.qvel[order] = joint_state(task, tree)
+    halves = times[0] + 0.5 * step * np.arange(2 * count * (times.size - 1) + 1)
+    selection = np.zeros((model.nv, len(task.mechanism.motors)))
+    for k, motor in enumerate(task.mechanism.motors):
+        selection[order, k] = tree.relative_angle(task.mechanism.joint(motor.joint))
+    table = torques.evaluate(np.minimum(halves, times[-1])) @ selection.T
+    work, stage = 0.0, -1
+
+    def control(_: Any, now: Any) -> None:
+        nonlocal work, stage
+        force = table[min(round(2.0 * now.time / step), table.shape[0] - 1)]
+        now.qfrc_applied[:] = force
+        if stage >= 0:
+            work += _RK4[stage % 4] * step * float(force @ now.qvel)
+            stage += 1
+
+    kept: list[list[Any]] = [[], [], [], [], []]
+    trouble = ""
+    with _control_of(mujoco, control) as warnings:
+        for sample in range(times.size):
+            if sample:
+                stage = 0
+                mujoco.mj_step(model, data, count)
+                stage = -1
+            mujoco.mj_forward(model, data)
+            if warnings or not (np.isfinite(data.qacc).all() and np.isfinite(data.qpos).all()):
+                trouble = f"MuJoCo diverges with steps of {step:.3g} s"
+                break
+            values = (data.qpos[order], data.qvel[order], data.qacc[order], data.energy, work)
+            for rows, value in zip(kept, values, strict=True):
+                rows.append(np.array(value))
+    position, velocity, acceleration, energy, done = (np.array(rows) for rows in kept)
+    return _Motion((position, velocity, acceleration), energy, done, trouble)
+
+
+@contextmanager
+def _control_of(mujoco: Any, control: Any) -> Iterator[list[str]]:
+    """MuJoCo's global hooks for one run: torques at every stage, and its warnings, of which a reset is one."""
+    warnings: list[str] = []
+    with _ONE_AT_A_TIME:
+        mujoco.set_mjcb_control(control)
+        mujoco.set_mju_user_warning(warnings.append)
+        try:
+            yield warnings
+        finally:
+            mujoco.set_mjcb_control(None)
+            mujoco.set_mju_user_warning(None)
+
+
+def _solution(
+    task: TrackingTask, q: NDArray, v: NDArray, a: NDArray, motion: _Motion, count: int, wall_time: float
+) -> Solution:
+    system, times = task.system, task.motion.t
+    still = constant_signals([0.0] * len(task.mechanism.motors), float(times[-1]))
+    signals, _ = pack_signals(task.mechanism, still, float(times[-1]))
+    gaps = [system.constraints(signals, t, *state) for t, *state in zip(times, q, v, strict=False)]
+    kinetic, potential = motion.energy[:, 1], motion.energy[:, 0]
+    balance = kinetic + potential - kinetic[:1] - potential[:1] - motion.work
+    reached = times[: motion.samples]
+    return Solution(
+        t=reached,
+        q=q,
+        v=v,
+        a=a,
+        multipliers=np.full((q.shape[0], system.m), np.nan),
+        kinetic_energy=kinetic,
+        strain_energy=potential,
+        work=motion.work,
+        status="failed" if motion.trouble else "complete",
+        message=motion.trouble,
+        steps=count * (motion.samples - 1),
+        rejected=0,
+        newton_iterations=0,
+        factorisations=4 * count * (motion.samples - 1),
+        wall_time=wall_time,
+        constraint_position_max=float(max((np.abs(phi).max(initial=0.0) for phi, _ in gaps), default=0.0)),
+        constraint_velocity_max=float(max((np.abs(rate).max(initial=0.0) for _, rate in gaps), default=0.0)),
+        energy_balance_max=float(np.abs(balance).max(initial=0.0)),
+    )

@@ -1,0 +1,165 @@
+"""A mechanism as a tree of bodies on hinges, as engines in joint coordinates see it, and its motion told of bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System
+from paraflex.errors import InputError
+from paraflex.mechanism import GROUND, Mechanism, PointRef, RevoluteJoint
+from paraflex.simulate import TrackingTask
+
+
+@dataclass(frozen=True)
+class Link:
+    """A body hinged to its parent in the tree, or to the ground."""
+
+    name: str
+    joint: RevoluteJoint
+
+    @property
+    def sign(self) -> float:
+        """Of the joint's angle in terms of the hinge's, which is that of the child relative to the parent."""
+        return 1.0 if self.joint.b.body == self.name else -1.0
+
+    @property
+    def own(self) -> PointRef:
+        """The hinge's place on the body."""
+        return self.joint.b if self.sign > 0.0 else self.joint.a
+
+    @property
+    def other(self) -> PointRef:
+        """The hinge's place on the parent."""
+        return self.joint.a if self.sign > 0.0 else self.joint.b
+
+    @property
+    def parent(self) -> str:
+        """The body it hangs on, or the ground."""
+        return self.other.body
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Bodies on hinges, parents before children, and what the tree leaves out.
+
+    Attributes
+    ----------
+    links : tuple of Link
+        One a body; its hinge's angle is the coordinate of that number.
+    closing : tuple of RevoluteJoint
+        Joints that close loops.
+    angles : mapping of str to (links,) array
+        Weights of the hinges' angles in each body's angle; zero for the ground.
+    """
+
+    links: tuple[Link, ...]
+    closing: tuple[RevoluteJoint, ...]
+    angles: dict[str, NDArray[np.float64]]
+
+    def relative_angle(self, joint: RevoluteJoint) -> NDArray[np.float64]:
+        """Weights (links,) of the hinges' angles in the angle of a joint of the mechanism."""
+        return self.angles[joint.b.body] - self.angles[joint.a.body]
+
+
+def spanning_tree(mechanism: Mechanism) -> Tree:
+    """Hang all bodies on the ground, by joints with springs first and then by those with motors.
+
+    Raises
+    ------
+    InputError
+        A body that nothing joins to the ground.
+    """
+    sprung = {spring.joint for spring in mechanism.springs}
+    driven = {motor.joint for motor in mechanism.motors}
+    ranked = sorted(mechanism.joints, key=lambda joint: (joint.name not in sprung, joint.name not in driven))
+    kept, closing = _split(ranked)
+    links: list[Link] = []
+    hung, left = {GROUND}, [body.name for body in mechanism.bodies]
+    while left:
+        found = [
+            Link(child.body, joint)
+            for joint in kept
+            for parent, child in ((joint.a, joint.b), (joint.b, joint.a))
+            if parent.body in hung and child.body in left
+        ]
+        if not found:
+            raise InputError("nothing joins it to the ground", field=f"body.{left[0]}", remedy="add a joint")
+        new = found[0]
+        links.append(new)
+        hung.add(new.name)
+        left.remove(new.name)
+    angles = {GROUND: np.zeros(len(links))}
+    for i, link in enumerate(links):
+        angles[link.name] = angles[link.parent] + np.eye(len(links))[i]
+    return Tree(tuple(links), tuple(closing), angles)
+
+
+def _split(joints: list[RevoluteJoint]) -> tuple[list[RevoluteJoint], list[RevoluteJoint]]:
+    """Joints that join what was apart before, first come first served, and those that close loops (Kruskal)."""
+    group: dict[str, str] = {}
+
+    def root(name: str) -> str:
+        while name in group:
+            name = group[name]
+        return name
+
+    kept, closing = [], []
+    for joint in joints:
+        a, b = root(joint.a.body), root(joint.b.body)
+        if a == b:
+            closing.append(joint)
+        else:
+            group[a] = b
+            kept.append(joint)
+    return kept, closing
+
+
+def place(system: System, ref: PointRef) -> NDArray[np.float64]:
+    """Place (2,) of a named point in its rigid body, or in the ground frame [m]."""
+    return system.marker(ref).x0
+
+
+def joint_state(task: TrackingTask, tree: Tree) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Angles and rates of the hinges at the task's start, each (links,)."""
+
+    def angle(state: NDArray[np.float64], name: str) -> float:
+        return 0.0 if name == GROUND else state[task.system.body(name).angle]
+
+    q, v = (
+        np.array([angle(state, link.name) - angle(state, link.parent) for link in tree.links])
+        for state in (task.start.q, task.start.v)
+    )
+    return q, v
+
+
+def body_motion(
+    system: System, tree: Tree, hinges: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Coordinates of rigid bodies, velocities and accelerations (k, n) from those of the hinges (k, links)."""
+    k = hinges[0].shape[0]
+    q, v, a = out = tuple(np.zeros((k, system.n)) for _ in range(3))
+
+    def arm(ref: PointRef) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """From a body's origin to a point of it, and the derivatives."""
+        angle = system.body(ref.body).angle
+        x, y = place(system, ref)
+        c, s, w = np.cos(q[:, angle]), np.sin(q[:, angle]), v[:, angle, None]
+        turned = np.column_stack([c * x - s * y, s * x + c * y])
+        quarter = np.column_stack([-turned[:, 1], turned[:, 0]])
+        return turned, w * quarter, a[:, angle, None] * quarter - w**2 * turned
+
+    for link in tree.links:
+        body = system.body(link.name)
+        for values, angles in zip(out, hinges, strict=True):
+            values[:, body.angle] = angles @ tree.angles[link.name]
+        if link.parent == GROUND:
+            hinge = [np.broadcast_to(place(system, link.other), (k, 2)), np.zeros((k, 2)), np.zeros((k, 2))]
+        else:
+            origin = system.body(link.parent).position
+            hinge = [values[:, origin] + part for values, part in zip(out, arm(link.other), strict=True)]
+        for values, there, part in zip(out, hinge, arm(link.own), strict=True):
+            values[:, body.position] = there - part
+    return q, v, a
