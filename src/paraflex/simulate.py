@@ -70,7 +70,12 @@ class TrackingTask:
             As `Mechanism.rigid`, `with_beams`, `with_geometry` or `refined` return it.
         """
         system = build_system(mechanism)
-        return replace(self, mechanism=mechanism, system=system, start=_start(system, self.motion, _in_place(system)))
+        return replace(
+            self,
+            mechanism=mechanism,
+            system=system,
+            start=_start(system, self.motion, self.carriers or _in_place(system)),
+        )
 
     def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
         """The same task for the virtual prototype of finite segments, driven by the same torques.

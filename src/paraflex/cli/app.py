@@ -26,6 +26,9 @@ PathOption = Annotated[
         "--path", metavar="NAME|FILE", help="A path of the model (square, line, circle, ...) or a TOML file with one."
     ),
 ]
+MechanismOption = Annotated[
+    str, typer.Option("--mechanism", "-m", metavar="NAME|FILE", help="A library mechanism or a TOML file.")
+]
 Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
 
 
@@ -48,9 +51,7 @@ def _options(
 
 @app.command()
 def run(
-    mechanism: Annotated[
-        str, typer.Option("--mechanism", "-m", metavar="NAME|FILE", help="A library mechanism or a TOML file.")
-    ] = "raparm_i",
+    mechanism: MechanismOption = "raparm_i",
     path: PathOption = None,
     mode: Annotated[
         list[str] | None,
@@ -72,6 +73,13 @@ def run(
     geometry: Annotated[
         str | None, typer.Option(metavar="linear|second-order", help="Shape of the beams. Default: the model's.")
     ] = None,
+    segments: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Cut beams into finite segments, so many the longest (the paper's: 8)."),
+    ] = None,
+    ked: Annotated[
+        bool, typer.Option("--ked", help="Kineto-elastodynamics: active motors held on the rigid motion.")
+    ] = False,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder for results and figures.")] = "results",
     json: Json = False,
 ) -> None:
@@ -79,22 +87,72 @@ def run(
     from paraflex.cli.run import RunRequest, run_command
 
     request = RunRequest(
-        mechanism,
-        path,
-        mode or [],
-        tol,
-        duration,
-        samples,
-        assembly,
-        alpha,
-        beta,
-        max_steps,
-        rigid,
-        geometry,
-        out,
-        json,
+        mechanism=mechanism,
+        path=path,
+        modes=mode or [],
+        tolerance=tol,
+        duration=duration,
+        samples=samples,
+        assembly=assembly,
+        out=out,
+        json=json,
+        alpha=alpha,
+        beta=beta,
+        max_steps=max_steps,
+        rigid=rigid,
+        geometry=geometry,
+        segments=segments,
+        ked=ked,
     )
     raise typer.Exit(run_command(request))
+
+
+@app.command()
+def verify(
+    mechanism: MechanismOption = "raparm_i",
+    path: PathOption = None,
+    mode: Annotated[
+        list[str] | None,
+        typer.Option(metavar="MODE", help="Actuation mode; repeatable. Default: the study's with most motors."),
+    ] = None,
+    engine: Annotated[
+        list[str] | None, typer.Option(metavar="exudyn|mujoco", help="Another engine to compare with; repeatable.")
+    ] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Fidelity: rigid, ked, linear, second-order, segments; repeatable. Default: all of them.",
+        ),
+    ] = None,
+    tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance of runs with error control.")] = None,
+    segments: Annotated[int | None, typer.Option(metavar="N", help="Finite segments on the longest beam.")] = None,
+    duration: Annotated[float | None, typer.Option(metavar="S", help="Duration, dwell included.")] = None,
+    samples: Annotated[int | None, typer.Option(metavar="N", help="Samples compared.")] = None,
+    assembly: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")
+    ] = None,
+    out: Annotated[str, typer.Option(metavar="DIR", help="Folder for numbers and figures.")] = "verification",
+    json: Json = False,
+) -> None:
+    """Run a mechanism at every fidelity and in other engines; write verify.json, verify.nc and figures/."""
+    from paraflex.cli.verify import VerifyRequest, verify_command
+
+    request = VerifyRequest(
+        mechanism=mechanism,
+        path=path,
+        modes=mode or [],
+        tolerance=tol,
+        duration=duration,
+        samples=samples,
+        assembly=assembly,
+        out=out,
+        json=json,
+        engines=engine or [],
+        fidelities=model or [],
+        segments=segments,
+    )
+    raise typer.Exit(verify_command(request))
 
 
 @app.command()

@@ -10,55 +10,61 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from paraflex.cli.request import (
+    COMPLETE,
+    INTERRUPTED,
+    TROUBLE,
+    StudyRequest,
+    find_modes,
+    find_path,
+    plan_study,
+    results_folder,
+    write_json,
+)
 from paraflex.cli.tables import failures, plain_console, study_table
 from paraflex.compilation import compile_kernels
-from paraflex.errors import AssemblyError, InputError, OutputError
-from paraflex.files import Model, load, load_path
+from paraflex.elastodynamics import simulate_ked
+from paraflex.errors import InputError
+from paraflex.files import Model, load
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Path as EndEffectorPath
-from paraflex.mechanism import ActuationMode, Geometry, Mechanism, parse_mode
+from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
 from paraflex.results import save_results, summary
-from paraflex.simulate import TrackingTask, plan_tracking
-from paraflex.studies import StudyResult, run_study
-
-COMPLETE, TROUBLE, INTERRUPTED = 0, 1, 130
+from paraflex.simulate import TrackingTask
+from paraflex.studies import Simulator, StudyResult, run_study
 
 
 @dataclass(frozen=True)
-class RunRequest:
-    """What was asked for on the command line; None takes the model's or the library's default."""
+class RunRequest(StudyRequest):
+    """What `paraflex run` was asked for."""
 
-    mechanism: str
-    path: str | None
-    modes: list[str]
-    tolerance: float | None
-    duration: float | None
-    samples: int | None
-    assembly: str | None
-    alpha: float | None
-    beta: float | None
-    max_steps: int | None
-    rigid: bool
-    geometry: str | None
-    out: str
-    json: bool
+    alpha: float | None = None
+    beta: float | None = None
+    max_steps: int | None = None
+    rigid: bool = False
+    geometry: str | None = None
+    segments: int | None = None
+    ked: bool = False
 
 
 def run_command(request: RunRequest) -> int:
     """Run a study and write its results; the exit code."""
     console = plain_console(stderr=True)
     model = load(request.mechanism)
-    path, path_name = _path(model, request.path)
+    path, path_name = find_path(model, request.path)
     options = _options(request)
-    modes = _modes(model, request.modes)
+    modes = find_modes(model, request.modes)
+    _check_fidelity(request)
     # Every check that needs no computing comes before the first minute is spent.
-    folder = _folder(request.out)
+    folder = results_folder(request.out)
     mechanism = _mechanism(model, request)
-    compile_kernels(Geometry.LINEAR if request.rigid else mechanism.geometry, console.print)
+    stiff = request.rigid or request.ked or request.segments is not None
+    compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
     began = time.perf_counter()
-    task = _plan(model, mechanism, path, path_name, request)
-    parameters = _parameters(model, path_name, modes, task, options, request.rigid)
-    result = _simulate(console, task, modes, options, parameters)
+    task = plan_study(model, mechanism, path, path_name, request)
+    if request.segments is not None:
+        task = task.in_segments(proportional_segments(mechanism, request.segments))
+    parameters = _parameters(model, path_name, modes, task, options, request)
+    result = _simulate(console, task, modes, options, parameters, simulate_ked if request.ked else None)
     if result.data is None:
         failures(console, result)
         return INTERRUPTED if result.interrupted else TROUBLE
@@ -75,13 +81,6 @@ def run_command(request: RunRequest) -> int:
     return COMPLETE if result.complete else TROUBLE
 
 
-def _path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
-    if name is not None and name not in model.paths and name.endswith(".toml"):
-        return load_path(name), name
-    path = model.path(name)
-    return path, next(key for key, value in model.paths.items() if value is path)
-
-
 def _options(request: RunRequest) -> IntegrationOptions:
     given = {
         "tolerance": request.tolerance,
@@ -96,16 +95,22 @@ def _options(request: RunRequest) -> IntegrationOptions:
         raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
 
 
-def _modes(model: Model, names: list[str]) -> list[ActuationMode]:
-    wanted = names or list(model.study.modes) or [mode.name for mode in model.mechanism.modes]
-    if not wanted:
-        raise InputError(
-            "no actuation mode to run", field="--mode", remedy="name one, or add [study] modes to the file"
-        )
-    try:
-        return list(dict.fromkeys(parse_mode(model.mechanism, name) for name in wanted))
-    except InputError as error:
-        raise InputError(error.problem, field="--mode", value=error.value, remedy=error.remedy) from None
+def _check_fidelity(request: RunRequest) -> None:
+    """The four fidelities and finite segments exclude one another; KED has a step of its own."""
+    chosen = {
+        "--rigid": request.rigid,
+        "--segments": request.segments is not None,
+        "--ked": request.ked,
+        "--geometry": request.geometry is not None,
+    }
+    asked = [flag for flag, given in chosen.items() if given]
+    if len(asked) > 1:
+        raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
+    if request.segments is not None and request.segments < 1:
+        raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
+    for flag, value in (("--tol", request.tolerance), ("--max-steps", request.max_steps)):
+        if request.ked and value is not None:
+            raise InputError("means nothing with --ked", field=flag, value=value, remedy="its steps are fixed")
 
 
 def _mechanism(model: Model, request: RunRequest) -> Mechanism:
@@ -118,47 +123,13 @@ def _mechanism(model: Model, request: RunRequest) -> Mechanism:
         raise InputError(error.problem, field="--geometry", value=error.value, remedy=error.remedy) from None
 
 
-def _plan(
-    model: Model, mechanism: Mechanism, path: EndEffectorPath, path_name: str, request: RunRequest
-) -> TrackingTask:
-    # Another path than the study's has another length: its own duration, with the study's share of dwell.
-    duration, samples = request.duration, request.samples
-    if duration is None:
-        own = path_name == model.study.path
-        duration = model.study.duration if own and model.study.duration is not None else _with_dwell(model, path)
-    try:
-        return plan_tracking(
-            mechanism,
-            path,
-            duration=duration,
-            samples=model.study.samples if samples is None else samples,
-            assembly=request.assembly or model.study.assembly,
-        )
-    except AssemblyError as error:
-        raise InputError(
-            str(error), field=f"path.{path_name}", remedy="move the path or the bases, or choose another assembly",
-            source=model.source,
-        ) from error  # fmt: skip
-    except InputError as error:
-        flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly"}
-        if error.field in flags:
-            raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
-        raise error.in_file(model.source) from None
-
-
-def _with_dwell(model: Model, path: EndEffectorPath) -> float:
-    if model.study.path is None or model.study.duration is None:
-        return path.duration
-    return path.duration * model.study.duration / model.paths[model.study.path].duration
-
-
 def _parameters(
     model: Model,
     path: str,
     modes: list[ActuationMode],
     task: TrackingTask,
     options: IntegrationOptions,
-    rigid: bool,
+    request: RunRequest,
 ) -> dict:
     return {
         "model": dict(model.parameters),
@@ -171,7 +142,9 @@ def _parameters(
             "tolerance": options.tolerance,
             "alpha": options.alpha,
             "beta": options.beta,
-            "rigid": rigid,
+            "rigid": request.rigid,
+            "segments": request.segments,
+            "ked": request.ked,
             "geometry": task.mechanism.geometry.value,
         },
     }
@@ -183,6 +156,7 @@ def _simulate(
     modes: list[ActuationMode],
     options: IntegrationOptions,
     parameters: dict,
+    method: Simulator | None,
 ) -> StudyResult:
     end = float(task.motion.t[-1])
     columns = (
@@ -197,30 +171,7 @@ def _simulate(
             progress.start_task(bars[name])
             progress.update(bars[name], completed=reached)
 
-        return run_study(task, modes, options=options, parameters=parameters, on_progress=report)
-
-
-def _folder(out: str) -> Path:
-    """The results folder, proved writable; nothing is left of the proof until there are results."""
-    folder = Path(out)
-    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".paraflex-writable"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written ({(error.strerror or str(error)).lower()})",
-            field="--out",
-            value=out,
-            remedy="choose another folder",
-        ) from error
-    finally:
-        for parent in made:
-            if parent.is_dir() and not any(parent.iterdir()):
-                parent.rmdir()
-    return folder
+        return run_study(task, modes, options=options, parameters=parameters, on_progress=report, method=method)
 
 
 def _write(result: StudyResult, folder: Path) -> None:
@@ -229,7 +180,5 @@ def _write(result: StudyResult, folder: Path) -> None:
     assert result.data is not None
     folder.mkdir(parents=True, exist_ok=True)
     save_results(result.data, folder / "results.nc")
-    unfinished = folder / "summary.json.part"
-    unfinished.write_text(json.dumps(summary(result.data, result.failed), indent=2) + "\n", encoding="utf-8")
-    unfinished.replace(folder / "summary.json")
+    write_json(summary(result.data, result.failed), folder / "summary.json")
     save_figures(result.data, folder / "figures")

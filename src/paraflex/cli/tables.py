@@ -36,11 +36,11 @@ def study_table(figures: dict[str, Any], task: TrackingTask) -> Table:
             continue
         table.add_row(
             name,
-            _figure(mode["tracking_rms"], ".4e") if mode["status"] == "complete" else mode["status"],
-            *(_figure(mode["peak_torque"][motor], ".2f") for motor in motors),
-            _figure(mode["residual_vibration"], ".2e"),
+            number(mode["tracking_rms"], ".4e") if mode["status"] == "complete" else mode["status"],
+            *(number(mode["peak_torque"][motor], ".2f") for motor in motors),
+            number(mode["residual_vibration"], ".2e"),
             str(mode["steps"]),
-            _figure(mode["wall_time"], ".2f"),
+            number(mode["wall_time"], ".2f"),
         )
     return table
 
@@ -56,5 +56,6 @@ def failures(console: Console, result: StudyResult) -> None:
                 console.print(f'error: mode "{mode}": {run["message"].item()}', soft_wrap=True)
 
 
-def _figure(value: float | None, form: str) -> str:
+def number(value: float | None, form: str) -> str:
+    """A number in a form; nothing for None."""
     return "" if value is None else format(value, form)

@@ -9,6 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.mechanism import Mechanism
+
+# Names of the engines as users and Python's packages know them, and in print.
+_PRINTED = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}
+ENGINES = tuple(_PRINTED)
+
+
+def check_engine(name: str, mechanism: Mechanism) -> None:
+    """Nothing, if an engine is installed and can express a mechanism.
+
+    Raises
+    ------
+    InputError
+        It is not, or cannot.
+    """
+    for prescribed in mechanism.prescribed:
+        refuse(_PRINTED[name], "a prescribed angle", f"prescribed.{prescribed.name}")
+    import_engine(name)
 
 
 def import_engine(name: str) -> Any:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.dynamics import System, constant_signals, pack_signals
-from paraflex.engines.common import import_engine, refuse, steps_between
+from paraflex.engines.common import check_engine, import_engine, steps_between
 from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
@@ -75,10 +75,9 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
     IntegrationError
         The run diverges; it carries the Record of what was computed.
     """
+    check_engine("mujoco", task.mechanism)
     mujoco = import_engine("mujoco")
     options = options or MuJoCoOptions()
-    for prescribed in task.mechanism.prescribed:
-        refuse("MuJoCo", "a prescribed angle", f"prescribed.{prescribed.name}")
     began = time.perf_counter()
     task = task if task.whole is not None else task.in_segments(options.segments)
     torques = task.torques(mode)

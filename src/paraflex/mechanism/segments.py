@@ -36,11 +36,10 @@ def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, i
 
     Eight make the paper's 56 segments of RAParM-I.
     """
-    lengths = {
-        body.name: body.length for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.flexible
-    }
+    lengths = {body.name: body.length for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.flexible}
     # Rounding of a length's share must not make one segment more.
-    return {name: ceil(longest * length / max(lengths.values()) - 1e-9) for name, length in lengths.items()}
+    most = max(lengths.values(), default=0.0)
+    return {name: ceil(longest * length / most - 1e-9) for name, length in lengths.items()}
 
 
 def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8) -> Segmented:

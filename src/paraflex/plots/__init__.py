@@ -1,18 +1,23 @@
 """Figures of a tracking study, each a function from its dataset to a Matplotlib figure; their files."""
 
+from paraflex.plots.agreement import compared_links, compared_paths, model_distances
 from paraflex.plots.modes import motor_torques, tracking_errors
 from paraflex.plots.phase import phase_diagrams
-from paraflex.plots.save import save_figures
+from paraflex.plots.save import save_agreement_figures, save_figures
 from paraflex.plots.time_series import end_effector_motion, link_motions, tip_deflections
 from paraflex.plots.workspace import desired_path, end_effector_path
 
 __all__ = [
+    "compared_links",
+    "compared_paths",
     "desired_path",
     "end_effector_motion",
     "end_effector_path",
     "link_motions",
+    "model_distances",
     "motor_torques",
     "phase_diagrams",
+    "save_agreement_figures",
     "save_figures",
     "tip_deflections",
     "tracking_errors",

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import xarray as xr
+from matplotlib.figure import Figure
 
 from paraflex.errors import OutputError
+from paraflex.plots.agreement import compared_links, compared_paths, model_distances, prototype_pair
 from paraflex.plots.modes import motor_torques, tracking_errors
 from paraflex.plots.phase import phase_diagrams
 from paraflex.plots.runs import default_mode
@@ -43,7 +47,7 @@ def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) 
     OutputError
         The folder cannot be written.
     """
-    folder, mode = Path(folder), default_mode(data) if mode is None else mode
+    mode = default_mode(data) if mode is None else mode
     figures = {
         "fig11_desired_path": lambda: desired_path(data),
         "fig12_motor_torques": lambda: motor_torques(data),
@@ -54,6 +58,40 @@ def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) 
         "fig17_phase_diagrams": lambda: phase_diagrams(data, mode),
         "fig18_tracking_errors": lambda: tracking_errors(data),
     }
+    return _save(figures, Path(folder))
+
+
+def save_agreement_figures(data: xr.Dataset, folder: str | Path) -> list[Path]:
+    """Write figures 22 and 23 of every mode, and the distances of all models, as PNG and SVG.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `studies.Verification.dataset`.
+    folder : str or Path
+        Made if it is not there; files of the same names are written over.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    pair = prototype_pair(data)
+    figures: dict[str, Callable[[], Figure]] = {}
+    if pair is not None:
+        for mode in (str(name) for name in data["mode"].values):
+            figures[f"fig22_links_{mode}"] = partial(compared_links, data, mode, pair)
+            figures[f"fig23_paths_{mode}"] = partial(compared_paths, data, mode, pair)
+    figures["model_distances"] = partial(model_distances, data)
+    return _save(figures, Path(folder))
+
+
+def _save(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:
     written: list[Path] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)

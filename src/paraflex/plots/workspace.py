@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -60,20 +62,33 @@ def end_effector_path(data: xr.Dataset, mode: str, magnification: float | None =
         No such mode, or a magnification that is not positive.
     """
     run = select_run(data, mode)
-    desired = 1e3 * run["end_effector_desired"].transpose("time", "axis").values
-    deviation = 1e3 * run["end_effector"].transpose("time", "axis").values - desired
+    return deviated_paths({f"actual, {run_label(run)}": run}, magnification)
+
+
+def deviated_paths(
+    runs: Mapping[str, xr.Dataset], magnification: float | None, looks: Sequence[Mapping[str, Any]] = ({},)
+) -> Figure:
+    """Paths of the end-effector in runs with one desired path, by their labels, deviations magnified alike.
+
+    Raises
+    ------
+    InputError
+        A magnification that is not positive.
+    """
+    first = next(iter(runs.values()))
+    desired = 1e3 * first["end_effector_desired"].transpose("time", "axis").values
+    deviations = [1e3 * run["end_effector"].transpose("time", "axis").values - desired for run in runs.values()]
     if magnification is None:
-        magnification = _round_magnification(deviation, float(np.ptp(desired, axis=0).max()))
+        magnification = _round_magnification(np.concatenate(deviations), float(np.ptp(desired, axis=0).max()))
     elif not (math.isfinite(magnification) and magnification > 0.0):
         raise InputError(
             "not a magnification", field="magnification", value=magnification, remedy="give a positive number"
         )
-    shown = desired + magnification * deviation
-    label = f"actual, {run_label(run)}"
-    if magnification != 1.0:
-        label += f", deviation × {magnification:g}"
     figure, axes = _workspace_panel()
-    draw_actual(axes, run, *shown.T, label=label)
+    for (label, run), deviation, look in zip(runs.items(), deviations, looks, strict=True):
+        shown = desired + magnification * deviation
+        suffix = "" if magnification == 1.0 else f", deviation × {magnification:g}"
+        draw_actual(axes, run, *shown.T, label=label + suffix, **look)
     draw_desired(axes, *desired.T)
     axes.plot(*desired[0], **START)
     return _finish(figure, axes)

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from typing import Protocol
 
 import xarray as xr
 
@@ -15,6 +16,16 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import tracking_dataset
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
+
+
+class Simulator(Protocol):
+    """How one mode of a task is run where it is not by `simulate` with error control: `simulate_ked`, say."""
+
+    def __call__(
+        self, task: TrackingTask, mode: str | ActuationMode, *, on_progress: Callable[[float], None] | None = None
+    ) -> TrackingRun:
+        """The run; an IntegrationError carries what was computed."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -49,6 +60,7 @@ def run_study(
     parameters: dict | None = None,
     on_progress: Callable[[str, float], None] | None = None,
     workers: int | None = None,
+    method: Simulator | None = None,
 ) -> StudyResult:
     """Simulate every mode; one that fails is reported and the others go on.
 
@@ -63,6 +75,8 @@ def run_study(
         Told the mode's name and the time reached [s]; called from several threads.
     workers : int, optional
         Threads; as many as there are processors by default. The results do not depend on it.
+    method : Simulator, optional
+        `simulate` with the options by default.
 
     Returns
     -------
@@ -86,6 +100,8 @@ def run_study(
         if stop.is_set():
             return None
         try:
+            if method is not None:
+                return method(task, mode, on_progress=report)
             return simulate(task, mode, options=options, on_progress=report)
         except IntegrationError as error:
             return error.partial

@@ -1,0 +1,117 @@
+"""What commands that simulate a study have in common: which path, which modes, the plan, where results go."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from paraflex.errors import AssemblyError, InputError, OutputError
+from paraflex.files import Model, load_path
+from paraflex.kinematics import Path as EndEffectorPath
+from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
+from paraflex.simulate import TrackingTask, plan_tracking
+
+COMPLETE, TROUBLE, INTERRUPTED = 0, 1, 130
+
+
+@dataclass(frozen=True)
+class StudyRequest:
+    """What was asked for on the command line; None takes the model's or the library's default."""
+
+    mechanism: str
+    path: str | None
+    modes: list[str]
+    tolerance: float | None
+    duration: float | None
+    samples: int | None
+    assembly: str | None
+    out: str
+    json: bool
+
+
+def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
+    """A path of the model or of a file, and its name."""
+    if name is not None and name not in model.paths and name.endswith(".toml"):
+        return load_path(name), name
+    path = model.path(name)
+    return path, next(key for key, value in model.paths.items() if value is path)
+
+
+def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
+    """The modes asked for, or the study's."""
+    wanted = names or list(model.study.modes) or [mode.name for mode in model.mechanism.modes]
+    if not wanted:
+        raise InputError(
+            "no actuation mode to run", field="--mode", remedy="name one, or add [study] modes to the file"
+        )
+    try:
+        return list(dict.fromkeys(parse_mode(model.mechanism, name) for name in wanted))
+    except InputError as error:
+        raise InputError(error.problem, field="--mode", value=error.value, remedy=error.remedy) from None
+
+
+def plan_study(
+    model: Model, mechanism: Mechanism, path: EndEffectorPath, path_name: str, request: StudyRequest
+) -> TrackingTask:
+    """The study, planned; errors name the option or the field at fault."""
+    # Another path than the study's has another length: its own duration, with the study's share of dwell.
+    duration, samples = request.duration, request.samples
+    if duration is None:
+        own = path_name == model.study.path
+        duration = model.study.duration if own and model.study.duration is not None else _with_dwell(model, path)
+    try:
+        return plan_tracking(
+            mechanism,
+            path,
+            duration=duration,
+            samples=model.study.samples if samples is None else samples,
+            assembly=request.assembly or model.study.assembly,
+        )
+    except AssemblyError as error:
+        raise InputError(
+            str(error), field=f"path.{path_name}", remedy="move the path or the bases, or choose another assembly",
+            source=model.source,
+        ) from error  # fmt: skip
+    except InputError as error:
+        flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly"}
+        if error.field in flags:
+            raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
+        raise error.in_file(model.source) from None
+
+
+def _with_dwell(model: Model, path: EndEffectorPath) -> float:
+    if model.study.path is None or model.study.duration is None:
+        return path.duration
+    return path.duration * model.study.duration / model.paths[model.study.path].duration
+
+
+def results_folder(out: str) -> Path:
+    """The results folder, proved writable; nothing is left of the proof until there are results."""
+    folder = Path(out)
+    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".paraflex-writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written ({(error.strerror or str(error)).lower()})",
+            field="--out",
+            value=out,
+            remedy="choose another folder",
+        ) from error
+    finally:
+        for parent in made:
+            if parent.is_dir() and not any(parent.iterdir()):
+                parent.rmdir()
+    return folder
+
+
+def write_json(figures: Any, file: Path) -> None:
+    """Write a file of numbers; it appears whole or not at all."""
+    unfinished = file.with_name(file.name + ".part")
+    unfinished.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    unfinished.replace(file)

@@ -1,0 +1,267 @@
+"""Kineto-elastodynamics (KED): the elastic response to a prescribed rigid motion, with no way back.
+
+All coordinates xi = (dr, dphi, u) of all bodies are small displacements about the motion q_r(t) of the rigid mechanism.
+At every instant the mechanism is a structure, undeformed in its nominal pose, the joints of the active motors held:
+
+    M xi'' + K xi + C(t)^T mu = -(M q_r'' + h),    C(t) xi = 0,    C = [Phi_q(q_r); angle rows of the active motors]
+
+dr stands in the body frame, so M and K of a body are constant. Terms from the turning of the body frames while xi
+changes (Coriolis, gyroscopic, softening by rotation) are left out: that is the assumption of the instantaneous
+structure. Motor torques are replaced by the forces that hold the motors at their nominal angles.
+
+Winfrey (1971), J. Eng. Ind. 93, 268-272; Erdman, Sandor and Oakberg (1972), J. Eng. Ind. 94, 1193-1205; Midha, Erdman
+and Frohrib (1978), Mech. Mach. Theory 13, 603-618; Turcic and Midha (1984), J. Dyn. Syst. Meas. Control 106, 243-248.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.dynamics import BodyCoordinates, System, pack_signals
+from paraflex.errors import InputError, IntegrationError
+from paraflex.integrators import Solution
+from paraflex.integrators.generalised_alpha import Block, GeneralisedAlpha, Response, march
+from paraflex.kernel.bodies import motion_forces, system_energy
+from paraflex.kernel.packed import make_point_scratch
+from paraflex.mechanism import ActuationMode, Geometry
+from paraflex.simulate import TrackingRun, TrackingTask
+
+Array = NDArray[np.float64]
+
+# A sample spacing may be this much longer than a whole number of steps: rounding of the division.
+_ROUNDING = 1e-9
+
+
+def simulate_ked(
+    task: TrackingTask,
+    mode: str | ActuationMode,
+    *,
+    step: float = 1e-4,
+    spectral_radius: float = 0.8,
+    on_progress: Callable[[float], None] | None = None,
+) -> TrackingRun:
+    """Elastic response of a mechanism whose active motors follow the planned motion exactly.
+
+    Parameters
+    ----------
+    task : TrackingTask
+        Second-order geometry is taken as linear: the model is linear in the displacements.
+    mode : str or ActuationMode
+        Its name, signs ("+-+-") or motor names ("tau1,tau5"): which motors are held; the others turn freely.
+    step : float
+        Longest step [s]; the time between two samples is divided evenly.
+    spectral_radius : float
+        Of the generalised-alpha method at infinite frequency, from 0 (annihilates) to 1 (no damping; constraint
+        forces then keep every disturbance).
+    on_progress : callable, optional
+        Told the time reached [s]. A KeyboardInterrupt, in it or elsewhere, ends the run with what is there, marked
+        "interrupted".
+
+    Returns
+    -------
+    TrackingRun
+        Its `torques` are the feed-forward of the mode, which do not drive this model. Its task is of linear geometry.
+        In its solution q = q_r + xi with derivatives v and a; multipliers are those of the system's rows, of least norm
+        (rows scaled to one size) where rows are dependent; work and energy balance are NaN; the largest violations are
+        those of the nonlinear constraints at the samples, which tell how small the displacements are. Its wall time
+        is that of the whole call.
+
+    Raises
+    ------
+    InputError
+        Springs, a step that is not positive, or a spectral radius outside [0, 1].
+    ActuationError, SingularActuationError
+        The mode cannot drive the mechanism along the path.
+    IntegrationError
+        The rank of the constraints changes along the motion; it carries a TrackingRun with what was computed.
+    """
+    began = time.perf_counter()
+    _check(task, step, spectral_radius)
+    # Finite segments that no spring joins are rigid links: they have no geometry, and names of their own.
+    if task.mechanism.geometry is not Geometry.LINEAR and task.whole is None:
+        task = task.remodelled(task.mechanism.with_geometry(Geometry.LINEAR))
+    torques, samples = task.torques(mode), task.motion.t
+    condition = actuation_condition(task.effort, torques.mode)
+    substeps = max(1, math.ceil((samples[1] - samples[0]) / step * (1.0 - _ROUNDING)))
+    times = np.linspace(samples[0], samples[-1], substeps * (samples.size - 1) + 1)
+    scheme = GeneralisedAlpha(float(times[1] - times[0]), spectral_radius)
+    nominal = _nominal(task, times)
+    blocks = [Block(body.all, _mass(body), _stiffness(body)) for body in task.system.bodies]
+    held = _angle_rows(task.system, torques.mode)
+    kept, steps, status, message, failure = [], 0, "complete", "", None
+    try:
+        responses = march(scheme, blocks, lambda instants: nominal[instants].structure(held), times)
+        for steps, response in enumerate(responses):
+            if steps % substeps == 0:
+                kept.append(response)
+                if on_progress is not None:
+                    on_progress(float(times[steps]))
+    except KeyboardInterrupt:
+        status, message = "interrupted", f"interrupted at t = {times[steps]:.6g} s"
+    except IntegrationError as error:
+        status, message, failure = "failed", str(error), error
+    figures = _figures(task, torques, nominal[::substeps], kept)
+    wall_time = time.perf_counter() - began
+    solution = Solution(
+        **figures, status=status, message=message, steps=steps, factorisations=steps + 1, wall_time=wall_time
+    )
+    run = TrackingRun(task, torques, condition, solution, method="KED, generalised-alpha")
+    if failure is not None:
+        failure.partial = run
+        raise failure
+    return run
+
+
+def _check(task: TrackingTask, step: float, spectral_radius: float) -> None:
+    if task.mechanism.springs:
+        raise InputError(
+            "kineto-elastodynamics does not account for springs",
+            field="spring",
+            value=task.mechanism.springs[0].name,
+            remedy="use the task of the mechanism itself, not in segments",
+        )
+    if not (math.isfinite(step) and step > 0.0):
+        raise InputError("must be positive", field="step", value=step, remedy="give a time in seconds, say 1e-4")
+    if not 0.0 <= spectral_radius <= 1.0:
+        raise InputError(
+            "not between 0 and 1", field="spectral_radius", value=spectral_radius, remedy="choose it from 0 to 1"
+        )
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """The rigid motion q, v, a (k, n) in a system's coordinates, undeformed; forces and turns that follow from it."""
+
+    system: System
+    q: Array
+    v: Array
+    a: Array
+
+    def __getitem__(self, instants: slice) -> _Motion:
+        return _Motion(self.system, self.q[instants], self.v[instants], self.a[instants])
+
+    @property
+    def angles(self) -> Array:
+        """Of the body frames (k, bodies)."""
+        return self.q[:, [body.angle for body in self.system.bodies]]
+
+    def structure(self, held: Array) -> tuple[Array, Array]:
+        """Constraints C (k, rows, n) with constant rows of the held motors, and forces -(M q_r'' + h) (k, n).
+
+        Both in the body frames.
+        """
+        forces, packed = np.zeros_like(self.q), self.system.packed
+        motion_forces(packed, self.q, self.v, self.a, forces, make_point_scratch(packed))
+        joints = np.array([self.system.jacobian(q) for q in self.q])
+        held = np.broadcast_to(held, (len(joints), *held.shape))
+        return self.to_bodies(np.concatenate([joints, held], axis=1)), -self.to_bodies(forces)
+
+    def to_bodies(self, values: Array) -> Array:
+        """Translational parts of vectors (k, n) or rows (k, m, n) turned from the ground frame to the body frames."""
+        angles = self.angles if values.ndim == 2 else self.angles[:, None, :]
+        return _turned(self.system, values, -angles)
+
+    def displaced(self, xi: Array, dxi: Array, ddxi: Array) -> tuple[Array, Array, Array]:
+        """q_r + xi and its two derivatives; d = R dr turns with its frame, d' = R (dr' + w E dr)."""
+        rates, seconds = dxi.copy(), ddxi.copy()
+        for body in self.system.bodies:
+            r = body.position
+            w, dw = self.v[:, body.angle, None], self.a[:, body.angle, None]
+            rates[:, r] += w * _quarter(xi[:, r])
+            seconds[:, r] += 2.0 * w * _quarter(dxi[:, r]) + dw * _quarter(xi[:, r]) - w**2 * xi[:, r]
+        turned = (_turned(self.system, values, self.angles) for values in (xi, rates, seconds))
+        q, v, a = (nominal + change for nominal, change in zip((self.q, self.v, self.a), turned, strict=True))
+        return q, v, a
+
+
+def _nominal(task: TrackingTask, times: Array) -> _Motion:
+    """The rigid motion in the coordinates of the task's system."""
+    rigid = task.plan.follow(times)
+    q, v, a = np.zeros((3, times.size, task.system.n))
+    for body in task.system.bodies:
+        # A beam in one segment has another name; more segments have springs between them.
+        carrier, _ = task.carriers.get(body.name, (body.name, 0.0))
+        source = rigid.system.body(carrier).all
+        target = slice(body.offset, body.offset + 3)
+        q[:, target], v[:, target], a[:, target] = rigid.q[:, source], rigid.v[:, source], rigid.a[:, source]
+    return _Motion(task.system, q, v, a)
+
+
+def _angle_rows(system: System, mode: ActuationMode) -> Array:
+    """Rows (motors, n) of the angles of a mode's motors, slopes of the beams included: side b less side a."""
+    active = [motor for motor in system.mechanism.motors if motor.name in mode.motors]
+    rows = np.zeros((len(active), system.n))
+    for row, motor in zip(rows, active, strict=True):
+        joint = system.mechanism.joint(motor.joint)
+        for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
+            if not ref.on_ground:
+                body = system.body(ref.body)
+                row[body.angle] += sign
+                row[body.flexible] += sign * system.marker(ref).slope
+    return rows
+
+
+def _mass(body: BodyCoordinates) -> Array:
+    """Mass matrix of the undeformed body in its own frame (M_rr ... M_ff of the theory with R = 1, u = 0)."""
+    s = body.integrals
+    M = np.eye(3 + body.nf)
+    M[:2, :2] *= s.m
+    M[:2, 2] = M[2, :2] = -s.S1[1], s.S1[0]
+    M[2, 2] = s.I0 + s.J
+    M[:2, 3:], M[3:, :2] = s.S2, s.S2.T
+    M[2, 3:] = M[3:, 2] = s.G1 + s.Jf
+    return M
+
+
+def _stiffness(body: BodyCoordinates) -> Array:
+    return np.diag(np.concatenate([np.zeros(3), body.modes.omega**2]))
+
+
+def _quarter(x: Array) -> Array:
+    """E x for vectors (k, 2)."""
+    return np.column_stack([-x[:, 1], x[:, 0]])
+
+
+def _turned(system: System, values: Array, angles: Array) -> Array:
+    """Values (..., n) with the translational part of every body turned by its angle (..., bodies)."""
+    x = np.array([body.offset for body in system.bodies])
+    c, s = np.cos(angles), np.sin(angles)
+    out = values.copy()
+    out[..., x] = c * values[..., x] - s * values[..., x + 1]
+    out[..., x + 1] = s * values[..., x] + c * values[..., x + 1]
+    return out
+
+
+def _figures(task: TrackingTask, torques: FeedForward, nominal: _Motion, kept: list[Response]) -> dict[str, Any]:
+    """What a Solution holds of the samples reached; violations are those of the nonlinear constraints there."""
+    system, t = task.system, task.motion.t[: len(kept)]
+    xi, dxi, ddxi, mu = (np.array(values) for values in zip(*kept, strict=True))
+    q, v, a = nominal[: len(kept)].displaced(xi, dxi, ddxi)
+    points = make_point_scratch(system.packed)
+    energy = np.array([system_energy(system.packed, *state, points) for state in zip(q, v, strict=True)])
+    signals, _ = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))
+    violation = np.array([system.constraints(signals, *state) for state in zip(t, q, v, strict=True)])
+    position, velocity = np.max(np.abs(violation), axis=(0, 2))
+    return {
+        "t": t,
+        "q": q,
+        "v": v,
+        "a": a,
+        "multipliers": mu[:, : system.m],
+        "kinetic_energy": energy[:, 0],
+        "strain_energy": energy[:, 1],
+        "work": np.full(t.size, np.nan),
+        "rejected": 0,
+        "newton_iterations": 0,
+        "constraint_position_max": float(position),
+        "constraint_velocity_max": float(velocity),
+        "energy_balance_max": math.nan,
+    }

@@ -1,0 +1,311 @@
+"""Rigid bodies and ANCF cables: what coordinates as Exudyn has them say of the links of a mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.fem import BeamMesh, SpanProperties
+from paraflex.mechanism import PointRef, RevoluteJoint
+from paraflex.results.motion import PointMotion
+
+Array = NDArray[np.float64]
+Columns = NDArray[np.int64]
+
+# Points of Gauss quadrature: as many as Exudyn takes for a cable's virtual work, and what mass of sixth degree needs.
+_AXIAL_POINTS, _BENDING_POINTS, _MASS_POINTS = 5, 3, 4
+# Cubic Hermite polynomials in z = x/L, ascending powers; position and slope of the first node, then of the second.
+_CUBIC = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
+# The power of L that scales each.
+_LENGTH_POWER = np.array([0, 1, 0, 1])
+
+
+class Pose(NamedTuple):
+    """Where a body is at the start and how it moves [m, rad, m/s, rad/s]."""
+
+    x: float
+    y: float
+    phi: float
+    vx: float
+    vy: float
+    w: float
+
+    def direction(self, x: float, y: float) -> tuple[list[float], list[float]]:
+        """A vector of the body frame in the ground frame, and its rate."""
+        c, s = float(np.cos(self.phi)), float(np.sin(self.phi))
+        X, Y = c * x - s * y, s * x + c * y
+        return [X, Y], [-self.w * Y, self.w * X]
+
+    def point(self, x: float, y: float) -> tuple[list[float], list[float]]:
+        """Position and velocity of a point of the body frame."""
+        (X, Y), (dX, dY) = self.direction(x, y)
+        return [self.x + X, self.y + Y], [self.vx + dX, self.vy + dY]
+
+
+@dataclass(frozen=True)
+class History:
+    """What Exudyn computed at its steps.
+
+    Attributes
+    ----------
+    t : (k,) array
+    states : (3, k, n) array
+        Coordinates and their two derivatives.
+    multipliers : (k, m) array
+        As Exudyn gives them.
+    """
+
+    t: Array
+    states: Array
+    multipliers: Array
+
+    def thinned(self, every: int) -> History:
+        """Every so many steps."""
+        return History(self.t[::every], self.states[:, ::every], self.multipliers[::every])
+
+
+class Turn(NamedTuple):
+    """Angle, rate and acceleration of the material at a point, each (k,)."""
+
+    angle: Array
+    rate: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground: an object of the engine, by number, that does not move."""
+
+    item: int
+    points: Mapping[str, tuple[float, float]]
+    start: ClassVar[float] = 0.0
+
+    def place(self, point: str) -> dict[str, Any]:
+        """Where a named point is, in the words of Exudyn's markers."""
+        return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
+
+    def motion(self, point: str, history: History) -> PointMotion:
+        """None."""
+        still = np.zeros((history.t.size, 2))
+        return PointMotion(still + self.points[point], still, still)
+
+    def turn(self, point: str, history: History) -> Turn:
+        """None."""
+        return Turn(*np.zeros((3, history.t.size)))
+
+
+@dataclass(frozen=True)
+class RigidLink:
+    """A rigid body; its coordinates are those of its centre of mass.
+
+    Attributes
+    ----------
+    item : int
+        The engine's number of the object.
+    columns : (3,) array of int
+        Its coordinates among all: x, y, angle.
+    points : mapping
+        Named points, from the centre of mass [m].
+    mass, inertia : float
+        [kg, kg m^2]
+    start : float
+        Angle at the start [rad].
+    """
+
+    item: int
+    columns: Columns
+    points: Mapping[str, Array]
+    mass: float
+    inertia: float
+    start: float
+
+    def place(self, point: str) -> dict[str, Any]:
+        """Where a named point is, in the words of Exudyn's markers."""
+        return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
+
+    def motion(self, point: str, history: History) -> PointMotion:
+        """Of a named point."""
+        r, v, a = history.states[:, :, self.columns[:2]]
+        angle, rate, acceleration = self.frame(history)
+        x, y = self.points[point]
+        c, s, w, dw = np.cos(angle), np.sin(angle), rate[:, None], acceleration[:, None]
+        arm = np.column_stack([c * x - s * y, s * x + c * y])
+        across = np.column_stack([-arm[:, 1], arm[:, 0]])
+        return PointMotion(r + arm, v + w * across, a + dw * across - w**2 * arm)
+
+    def turn(self, point: str, history: History) -> Turn:
+        """Of the material at a named point."""
+        return self.frame(history)
+
+    def frame(self, history: History) -> Turn:
+        """Of the body."""
+        return Turn(*history.states[:, :, self.columns[2]])
+
+    def chord(self, history: History) -> Turn:
+        """Of the body."""
+        return self.frame(history)
+
+    def tip(self, history: History) -> Array:
+        """Nothing bends."""
+        return np.zeros((history.t.size, 3))
+
+    def kinetic_energy(self, history: History) -> Array:
+        """Of the body [J]."""
+        return 0.5 * history.states[1][:, self.columns] ** 2 @ [self.mass, self.mass, self.inertia]
+
+    def strain_energy(self, history: History) -> Array:
+        """None."""
+        return np.zeros(history.t.size)
+
+
+@dataclass(frozen=True)
+class Cable:
+    """A row of ANCF cables, cubic in positions r and slope vectors r' = dr/dx of its nodes.
+
+    Attributes
+    ----------
+    mesh : BeamMesh
+    span : SpanProperties
+    items : tuple of int
+        The engine's numbers of the elements.
+    columns : (2 nodes, 2) array of int
+        Coordinates x, y among all, of r and r' of each node in turn.
+    lumps : (nodes, 2) array
+        Mass and moment of inertia lumped at each node [kg, kg m^2].
+    start : float
+        Angle at the start [rad].
+    """
+
+    mesh: BeamMesh
+    span: SpanProperties
+    items: tuple[int, ...]
+    columns: Columns
+    lumps: Array
+    start: float
+
+    @property
+    def points(self) -> Mapping[str, int]:
+        """Node of each named point."""
+        return self.mesh.points
+
+    def place(self, point: str) -> dict[str, Any]:
+        """Where a named point is, in the words of Exudyn's markers."""
+        node = self.points[point]
+        element = min(node, self.mesh.n_elements - 1)
+        along = float(self.mesh.nodes[node] - self.mesh.nodes[element])
+        return {"bodyNumber": self.items[element], "localPosition": [along, 0.0, 0.0]}
+
+    def motion(self, point: str, history: History) -> PointMotion:
+        """Of a named point."""
+        return PointMotion(*history.states[:, :, self.columns[2 * self.points[point]]])
+
+    def turn(self, point: str, history: History) -> Turn:
+        """Of the tangent at a named point."""
+        return self._tangent(self.points[point], history)
+
+    def frame(self, history: History) -> Turn:
+        """Of the tangent at the first end."""
+        return self._tangent(0, history)
+
+    def chord(self, history: History) -> Turn:
+        """Of the line from the first end to the last."""
+        return turn_of(self.start, *self._line(history))
+
+    def tip(self, history: History) -> Array:
+        """Axial, transverse displacement and slope (k, 3) of the last end against the tangent at the first."""
+        phi = self.frame(history).angle
+        x, y = self._line(history)[0].T
+        c, s = np.cos(phi), np.sin(phi)
+        slope = self._tangent(-1, history).angle - phi
+        return np.column_stack([c * x + s * y - self.mesh.length, c * y - s * x, slope])
+
+    def kinetic_energy(self, history: History) -> Array:
+        """1/2 int rho A |r_t|^2 dx, and the lumps' 1/2 m |r_t|^2 + 1/2 J |r'_t|^2 [J]."""
+        weights, rows = self._quadrature(_MASS_POINTS, 0)
+        mass = np.diag(self.lumps.ravel()) + self.span.mass_per_length * (rows.T * weights) @ rows
+        v = history.states[1][:, self.columns]
+        return 0.5 * np.sum(v * (mass @ v), axis=(1, 2))
+
+    def strain_energy(self, history: History) -> Array:
+        """1/2 int EA (|r'| - 1)^2 + EI (r' x r'' / |r'|^2)^2 dx [J]."""
+        q = history.states[0][:, self.columns]
+        weights, rows = self._quadrature(_AXIAL_POINTS, 1)
+        strain = np.linalg.norm(rows @ q, axis=2) - 1.0
+        axial = self.span.axial_stiffness * strain**2 @ weights
+        weights, rows = self._quadrature(_BENDING_POINTS, 1)
+        first, second = rows @ q, self._quadrature(_BENDING_POINTS, 2)[1] @ q
+        curvature = _cross(first, second) / np.sum(first**2, axis=2)
+        return 0.5 * (axial + self.span.bending_stiffness * curvature**2 @ weights)
+
+    def rounding(self, reference: Array) -> float:
+        """Of the axial force: EA times the rounding of positions over the shortest element's length [N]."""
+        far = float(np.max(np.abs(reference[self.columns[::2]])))
+        shortest = float(np.min(np.diff(self.mesh.nodes)))
+        return float(np.finfo(float).eps) * self.span.axial_stiffness * far / shortest
+
+    def _tangent(self, node: int, history: History) -> Turn:
+        return turn_of(self.start, *history.states[:, :, self.columns[1::2][node]])
+
+    def _line(self, history: History) -> Array:
+        """From the first end to the last, with two derivatives (3, k, 2)."""
+        return history.states[:, :, self.columns[-2]] - history.states[:, :, self.columns[0]]
+
+    def _quadrature(self, count: int, order: int) -> tuple[Array, Array]:
+        """Gauss points along the beam: weights [m], and rows that make of r and r' at the nodes a derivative of r."""
+        z, weights = np.polynomial.legendre.leggauss(count)
+        lengths = np.diff(self.mesh.nodes)
+        rows = np.zeros((lengths.size, count, len(self.columns)))
+        for element, length in enumerate(lengths):
+            rows[element, :, 2 * element : 2 * element + 4] = _shape(0.5 * (z + 1.0), length, order)
+        return np.outer(0.5 * lengths, weights).ravel(), rows.reshape(-1, len(self.columns))
+
+
+Link = RigidLink | Cable
+
+
+@dataclass(frozen=True)
+class Linkage:
+    """The ground, and the bodies of a mechanism in its order."""
+
+    ground: Ground
+    bodies: Mapping[str, Link]
+
+    def part(self, ref: PointRef) -> Link | Ground:
+        """What a point belongs to."""
+        return self.ground if ref.on_ground else self.bodies[ref.body]
+
+    def motion(self, ref: PointRef, history: History) -> PointMotion:
+        """Of a named point."""
+        return self.part(ref).motion(ref.point, history)
+
+    def gap(self, joint: RevoluteJoint, history: History) -> Array:
+        """From side a of a joint to side b, with two derivatives (3, k, 2)."""
+        return np.subtract(self.motion(joint.b, history), self.motion(joint.a, history))
+
+    def joint_turn(self, joint: RevoluteJoint, history: History) -> Turn:
+        """Of the material at side b of a joint against that at side a."""
+        a, b = (self.part(ref).turn(ref.point, history) for ref in (joint.a, joint.b))
+        return Turn(*np.subtract(b, a))
+
+
+def turn_of(start: float, d: Array, v: Array, a: Array) -> Turn:
+    """Angle of a vector (k, 2) from its value at the start on, by the vector's first two derivatives."""
+    angle = np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
+    angle += 2.0 * np.pi * np.round((start - angle[:1]) / (2.0 * np.pi))
+    square = np.sum(d**2, axis=1)
+    rate = _cross(d, v) / square
+    return Turn(angle, rate, (_cross(d, a) - 2.0 * rate * np.sum(d * v, axis=1)) / square)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _shape(z: Array, length: float, order: int) -> Array:
+    """Cubic shape functions (points, 4) at x = z L, or a derivative of them along the beam."""
+    coefficients = np.polynomial.polynomial.polyder(_CUBIC, order, axis=1)
+    return np.polynomial.polynomial.polyval(z, coefficients.T).T * float(length) ** (_LENGTH_POWER - order)

@@ -1,0 +1,436 @@
+"""A tracking task run in Exudyn: beams as planar ANCF cables, geometrically exact, driven by the same torques.
+
+A second opinion from another formulation and another integrator. Cables bend and stretch by the true curvature and
+length of their centre line (cubic in position and slope vector, nodes where paraflex has them); there is no floating
+frame, no assumption of small slopes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.dynamics import System
+from paraflex.engines.cables import Array, Cable, Columns, Ground, History, Link, Linkage, Pose, RigidLink
+from paraflex.engines.common import check_engine, import_engine, steps_between
+from paraflex.errors import InputError, IntegrationError, Moment
+from paraflex.fem import SpanProperties
+from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Mechanism, PointRef, RevoluteJoint, TorsionalSpring
+from paraflex.results.record import Record
+from paraflex.simulate import TrackingTask
+
+# Newton's residual, a norm over all coordinates, is as good as zero at this many times the rounding of one inner force.
+_FLOOR = 100.0
+
+
+@dataclass(frozen=True)
+class ExudynOptions:
+    """How Exudyn discretises and integrates: generalised alpha with fixed steps, constraints on positions (index 3).
+
+    Attributes
+    ----------
+    step : float
+        Longest step; it is cut to divide the spacing of the task's samples [s].
+    refinement : int
+        Multiplies the elements of every span of every beam.
+    tolerance : float
+        Of Newton's residual, relative.
+    spectral_radius : float
+        Of generalised alpha at high frequency: below 1 it damps, 0 all in one step. 1 is the trapezoidal rule, which
+        damps nothing, with constraints on velocities (index 2).
+    """
+
+    step: float = 5e-5
+    refinement: int = 1
+    tolerance: float = 1e-6
+    spectral_radius: float = 0.9
+
+    @property
+    def method(self) -> str:
+        """The scheme in words."""
+        return "Exudyn, trapezoidal rule" if self.spectral_radius == 1.0 else "Exudyn, generalised alpha"
+
+    def __post_init__(self) -> None:
+        for name, remedy in (("step", "give a time in seconds"), ("tolerance", "give a fraction, say 1e-6")):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InputError("must be positive", field=name, value=value, remedy=remedy)
+        if self.refinement < 1:
+            raise InputError("must be at least 1", field="refinement", value=self.refinement, remedy="say 1 or 2")
+        if not 0.0 <= self.spectral_radius <= 1.0:
+            raise InputError(
+                "must be between 0 and 1", field="spectral_radius", value=self.spectral_radius, remedy="say 0.9"
+            )
+
+
+def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: ExudynOptions | None = None) -> Record:
+    """Drive the mechanism in Exudyn with the feed-forward torques of a mode.
+
+    The geometry of the mechanism, its reference conditions and its kinds of curvature are paraflex's own and mean
+    nothing here.
+
+    Parameters
+    ----------
+    task : TrackingTask
+        Of one in finite segments the uncut mechanism is simulated: Exudyn has cables of its own.
+    mode : str or ActuationMode
+        Its name, signs ("+-+-") or motor names ("tau1,tau5").
+    options : ExudynOptions, optional
+
+    Returns
+    -------
+    Record
+        Told as links.
+
+    Raises
+    ------
+    InputError
+        Exudyn is not installed, or the mechanism has what this engine cannot express: prescribed angles.
+    ActuationError, SingularActuationError
+        The mode cannot drive the mechanism along the path.
+    IntegrationError
+        Exudyn gave up; the error carries a Record of what was computed.
+    """
+    options = options or ExudynOptions()
+    task = task.whole or task
+    check_engine("exudyn", task.mechanism)
+    torques = task.torques(mode)
+    substeps = steps_between(task.motion.t, options.step)
+    begin = time.perf_counter()
+    engine = _start_engine()
+    with _silent(engine.exu):
+        model = _build(engine, task, options.refinement)
+        history, figures = _run(engine, model, task, torques, substeps, options)
+    figures["wall_time"] = time.perf_counter() - begin
+    record = _record(model, task, torques, history, substeps, options.method, figures)
+    if record.figures["message"]:
+        raise IntegrationError(f"Exudyn: {record.figures['message']}", _last_moment(record, history), record)
+    return record
+
+
+def _last_moment(record: Record, history: History) -> Moment:
+    """The last step that was finished; the end-effector at the last sample before it."""
+    places = record.end_effector.position
+    position = (float(places[-1, 0]), float(places[-1, 1])) if len(places) else None
+    return Moment(float(history.t[-1]) if history.t.size else 0.0, record.figures["steps"], position)
+
+
+# --- The system ----------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Engine:
+    """Exudyn's modules and the system under construction; who holds the system must hold its container."""
+
+    exu: Any
+    items: Any
+    container: Any
+    mbs: Any
+    coordinates: int = 0
+
+    def add(self, kind: str, **settings: Any) -> int:
+        return self.mbs.AddObject(getattr(self.items, kind)(**settings))
+
+    def node(self, kind: str, place: list[float], velocity: list[float]) -> tuple[int, Columns]:
+        """A node and its coordinates among all, which Exudyn numbers node after node."""
+        node = getattr(self.items, kind)(referenceCoordinates=place, initialVelocities=velocity)
+        first, self.coordinates = self.coordinates, self.coordinates + len(place)
+        return self.mbs.AddNode(node), np.arange(first, self.coordinates)
+
+    def marker(self, linkage: Linkage, ref: PointRef) -> int:
+        """On position and turn of the material at a point."""
+        return self.mbs.AddMarker(self.items.MarkerBodyRigid(**linkage.part(ref).place(ref.point)))
+
+    def markers(self, linkage: Linkage, joint: RevoluteJoint) -> list[int]:
+        return [self.marker(linkage, ref) for ref in (joint.a, joint.b)]
+
+
+def _start_engine() -> _Engine:
+    exu, items = import_engine("exudyn"), import_engine("exudyn.itemInterface")
+    container = exu.SystemContainer()
+    return _Engine(exu, items, container, container.AddSystem())
+
+
+@contextmanager
+def _silent(exu: Any) -> Iterator[None]:
+    """Exudyn prints its failures; here they are exceptions."""
+    before = exu.config.printToConsole, exu.config.suppressWarnings
+    exu.config.printToConsole, exu.config.suppressWarnings = False, True
+    try:
+        yield
+    finally:
+        exu.config.printToConsole, exu.config.suppressWarnings = before
+
+
+class _Model(NamedTuple):
+    """What was built: the links; for each motor its loads and their signs; the multipliers of each joint."""
+
+    linkage: Linkage
+    loads: list[list[tuple[int, float]]]
+    rows: NDArray[np.int64]
+
+
+def _build(engine: _Engine, task: TrackingTask, refinement: int) -> _Model:
+    mechanism = task.mechanism.refined(refinement)
+    ground = Ground(engine.add("ObjectGround"), mechanism.ground)
+    linkage = Linkage(ground, {body.name: _add_body(engine, task, body) for body in mechanism.bodies})
+    joints = [
+        engine.add("ObjectJointRevolute2D", markerNumbers=engine.markers(linkage, joint)) for joint in mechanism.joints
+    ]
+    loads = [_add_motor(engine, linkage, mechanism.joint(motor.joint)) for motor in mechanism.motors]
+    for spring in mechanism.springs:
+        _add_spring(engine, linkage, mechanism.joint(spring.joint), spring)
+    engine.mbs.Assemble()
+    rows = [engine.mbs.systemData.GetObjectLTGAE(joint) for joint in joints]
+    return _Model(linkage, loads, np.array(rows, dtype=np.int64).reshape(-1, 2))
+
+
+def _add_body(engine: _Engine, task: TrackingTask, body: Body) -> Link:
+    first = task.system.body(body.name).offset
+    pose = Pose(*(x for values in (task.start.q, task.start.v) for x in values[first : first + 3].tolist()))
+    if isinstance(body, FlexibleBeam) and body.flexible:
+        return _add_cable(engine, body, pose)
+    return _add_rigid(engine, task.system, body, pose)
+
+
+def _add_rigid(engine: _Engine, system: System, body: Body, pose: Pose) -> RigidLink:
+    s = system.body(body.name).integrals
+    centre = s.S1 / s.m
+    inertia = s.I0 + s.J - s.m * float(centre @ centre)
+    position, velocity = pose.point(*centre.tolist())
+    node, columns = engine.node("NodeRigidBody2D", [*position, pose.phi], [*velocity, pose.w])
+    item = engine.add("ObjectRigidBody2D", mass=s.m, inertia=inertia, nodeNumber=node)
+    points = {point: system.marker(PointRef(body.name, point)).x0 - centre for point in body.points}
+    return RigidLink(item, columns, points, s.m, inertia, pose.phi)
+
+
+def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: Pose) -> Cable:
+    mesh, E, area = beam.mesh, beam.material.youngs_modulus, beam.section.area
+    span = SpanProperties(beam.material.density * area, E * area, E * beam.section.second_moment)
+    slope, turning = pose.direction(1.0, 0.0)
+    nodes, columns = [], []
+    for x in mesh.nodes.tolist():
+        position, velocity = pose.point(x, 0.0)
+        node, own = engine.node("NodePoint2DSlope1", [*position, *slope], [*velocity, *turning])
+        nodes.append(node)
+        columns.append(own)
+    items = [
+        engine.add(
+            "ObjectANCFCable2D",
+            length=length,
+            massPerLength=span.mass_per_length,
+            bendingStiffness=span.bending_stiffness,
+            axialStiffness=span.axial_stiffness,
+            nodeNumbers=nodes[i : i + 2],
+        )
+        for i, length in enumerate(np.diff(mesh.nodes).tolist())
+    ]
+    lumps = np.zeros((len(nodes), 2))
+    for lump in beam.lumps:
+        lumps[mesh.points[lump.point]] += lump.mass, lump.inertia
+    for node in np.flatnonzero(lumps.any(axis=1)):
+        # Kinetic energy J/2 |r'_t|^2: that of the turning cross-section as long as |r'| = 1, to within the strain.
+        engine.add("ObjectGenericODE2", nodeNumbers=[nodes[node]], massMatrix=np.diag(np.repeat(lumps[node], 2)))
+    return Cable(mesh, span, tuple(items), np.reshape(columns, (-1, 2)), lumps, pose.phi)
+
+
+def _add_motor(engine: _Engine, linkage: Linkage, joint: RevoluteJoint) -> list[tuple[int, float]]:
+    """Loads on the material at both sides of a joint, as numbers with signs."""
+    return [
+        (engine.mbs.AddLoad(engine.items.LoadTorqueVector(markerNumber=engine.marker(linkage, ref))), sign)
+        for ref, sign in ((joint.a, -1.0), (joint.b, 1.0))
+        if not ref.on_ground
+    ]
+
+
+def _add_spring(engine: _Engine, linkage: Linkage, joint: RevoluteJoint, spring: TorsionalSpring) -> None:
+    """A spring between the material at both sides of a joint."""
+    # Exudyn counts the angle on from its start, and starts within half a turn of zero.
+    turns = 2.0 * np.pi * np.round((linkage.part(joint.b).start - linkage.part(joint.a).start) / (2.0 * np.pi))
+    state = engine.items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1)
+    engine.add(
+        "ObjectConnectorTorsionalSpringDamper",
+        markerNumbers=engine.markers(linkage, joint),
+        nodeNumber=engine.mbs.AddNode(state),
+        stiffness=spring.stiffness,
+        offset=spring.rest - turns,
+    )
+
+
+# --- The run -------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Recorder:
+    """Drives the motors and keeps the state, step by step; Exudyn calls it before and after every step.
+
+    Torques are those at the end of the step, where generalised alpha takes its forces.
+    """
+
+    loads: list[list[tuple[int, float]]]
+    torques: Array
+    states: list[tuple[Array, Array, Array]] = field(default_factory=list)
+    multipliers: list[Array] = field(default_factory=list)
+    finite: bool = True
+
+    def before(self, mbs: Any, _: float) -> bool:
+        for torque, sides in zip(self.torques[len(self.states)], self.loads, strict=True):
+            for load, sign in sides:
+                mbs.SetLoadParameter(load, "loadVector", [0.0, 0.0, sign * torque])
+        return True
+
+    def after(self, mbs: Any, _: float) -> bool:
+        """Keep the state, the start's too; False ends the run."""
+        data = mbs.systemData
+        state = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()
+        self.finite = bool(np.isfinite(state).all())
+        if self.finite:
+            self.states.append(state)
+            self.multipliers.append(data.GetAECoordinates())
+        return self.finite
+
+    def verdict(self) -> str:
+        """Why a run that raised nothing stopped early; nothing if it did not."""
+        if not self.finite:
+            return "the solution is no longer finite"
+        if len(self.states) == len(self.torques):
+            return ""
+        return "Newton's iteration does not converge" if self.states else "no accelerations satisfy the constraints"
+
+
+def _run(
+    engine: _Engine, model: _Model, task: TrackingTask, torques: FeedForward, substeps: int, options: ExudynOptions
+) -> tuple[History, dict[str, Any]]:
+    """Integrate; the figures say why the run stopped early, if it did."""
+    times = task.motion.t
+    grid = np.linspace(times[0], times[-1], substeps * (times.size - 1) + 1)
+    recorder = _Recorder(model.loads, torques.evaluate(grid))
+    solver, mbs, cause = engine.exu.MainSolverImplicitSecondOrder(), engine.mbs, ""
+    reference = mbs.systemData.GetODE2Coordinates(engine.exu.ConfigurationType.Reference)
+    # No residual gets smaller than the force that rounding makes of nothing in the stiffest element.
+    rounding = [link.rounding(reference) for link in model.linkage.bodies.values() if isinstance(link, Cable)]
+    settings = _settings(engine.exu, grid, options, _FLOOR * max(rounding, default=0.0))
+    recorder.before(mbs, grid[0])
+    mbs.SetPreStepUserFunction(recorder.before)
+    mbs.SetPostStepUserFunction(recorder.after)
+    try:
+        if solver.InitializeSolver(mbs, settings):
+            solver.SolveSteps(mbs, settings)
+        solver.FinalizeSolver(mbs, settings)
+    except engine.exu.ExudynError as error:
+        cause = next((line.strip() for line in str(error).splitlines() if line.strip()), "ExudynError")
+    finally:
+        mbs.SetPreStepUserFunction(0)
+        mbs.SetPostStepUserFunction(0)
+    cause, k = cause or recorder.verdict(), len(recorder.states)
+    states = np.reshape(recorder.states, (k, 3, reference.size)).swapaxes(0, 1)
+    # Exudyn 1.13 has a method for the sum, GetODE2CoordinatesTotal, which corrupts memory.
+    states[0] += reference
+    figures = {
+        "status": "failed" if cause else "complete",
+        "message": cause,
+        "steps": max(0, k - 1),
+        "rejected": 0,
+        "newton_iterations": int(solver.it.newtonStepsCount),
+        "factorisations": int(solver.it.newtonJacobiCount),
+    }
+    return History(grid[:k], states, np.reshape(recorder.multipliers, (k, model.rows.size))), figures
+
+
+def _settings(exu: Any, grid: Array, options: ExudynOptions, floor: float) -> Any:
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.solution.sensors.active = False
+    settings.linearSolver.showCausingItems = False
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
+    integration = settings.timeIntegration
+    integration.startTime, integration.endTime = float(grid[0]), float(grid[-1])
+    integration.numberOfSteps = grid.size - 1
+    integration.adaptiveStep = integration.automaticStepSize = False
+    integration.newton.relativeTolerance = options.tolerance
+    integration.newton.absoluteTolerance = max(integration.newton.absoluteTolerance, floor)
+    undamped = options.spectral_radius == 1.0
+    integration.generalizedAlpha.spectralRadius = options.spectral_radius
+    # Without damping constraints on positions are unstable; Exudyn has those on velocities for Newmark's rule only.
+    integration.generalizedAlpha.useNewmark = integration.generalizedAlpha.useIndex2Constraints = undamped
+    return settings
+
+
+# --- The record ----------------------------------------------------------------------------------------------------
+
+
+def _record(
+    model: _Model,
+    task: TrackingTask,
+    torques: FeedForward,
+    steps: History,
+    substeps: int,
+    method: str,
+    figures: dict[str, Any],
+) -> Record:
+    mechanism, linkage, links = task.mechanism, model.linkage, model.linkage.bodies.values()
+    samples = steps.thinned(substeps)
+    effector = mechanism.end_effector
+    assert effector is not None
+    angle, rate, acceleration = np.stack([link.frame(samples) for link in links], axis=-1)
+    chord, chord_rate, _ = np.stack([link.chord(samples) for link in links], axis=-1)
+    points = [link.motion(point, samples).position for link in links for point in link.points]
+    kinetic = np.sum([link.kinetic_energy(samples) for link in links], axis=0)
+    strain = np.sum([link.strain_energy(samples) for link in links], axis=0)
+    strain += _spring_energy(linkage, mechanism, samples)
+    work = _work(linkage, mechanism, torques, steps)[::substeps]
+    gaps = np.array([linkage.gap(joint, samples) for joint in mechanism.joints])
+    balance = kinetic + strain - work
+    return Record(
+        task=task,
+        method=method,
+        mode=torques.mode.name,
+        torque=torques.evaluate(task.motion.t),
+        condition=actuation_condition(task.effort, torques.mode),
+        end_effector=linkage.motion(effector.point, samples),
+        angle=angle,
+        rate=rate,
+        acceleration=acceleration,
+        chord=chord,
+        chord_rate=chord_rate,
+        tip=np.stack([link.tip(samples) for link in links], axis=1),
+        points=np.stack(points, axis=1),
+        # Exudyn's multipliers stand on the left of the equations, with the constraint p_b - p_a.
+        joint_force=-samples.multipliers[:, model.rows],
+        kinetic_energy=kinetic,
+        strain_energy=strain,
+        work=work,
+        figures={
+            **figures,
+            "constraint_position_max": _largest(gaps[:, 0]),
+            "constraint_velocity_max": _largest(gaps[:, 1]),
+            "energy_balance_max": _largest(balance - balance[:1]),
+        },
+    )
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))
+
+
+def _work(linkage: Linkage, mechanism: Mechanism, torques: FeedForward, history: History) -> Array:
+    """Of the motors, by the trapezoidal rule over the steps."""
+    power = np.zeros(history.t.size)
+    for motor, torque in zip(mechanism.motors, torques.evaluate(history.t).T, strict=True):
+        power += torque * linkage.joint_turn(mechanism.joint(motor.joint), history).rate
+    return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(history.t))])[: power.size]
+
+
+def _spring_energy(linkage: Linkage, mechanism: Mechanism, history: History) -> Array:
+    energy = np.zeros(history.t.size)
+    for spring in mechanism.springs:
+        angle = linkage.joint_turn(mechanism.joint(spring.joint), history).angle
+        energy += 0.5 * spring.stiffness * (angle - spring.rest) ** 2
+    return energy

@@ -1,0 +1,170 @@
+"""Several models of one mechanism, overlaid: links, end-effector, distances (Figs. 22, 23 and beyond)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import mode_label, peak, symbol
+from paraflex.plots.layout import label_outer_time, lay_out, panels
+from paraflex.plots.runs import draw_actual, select_run, shade_rest
+from paraflex.plots.style import BLUE, COLOURS, DASHES, VERMILLION, journal_style, keep_flat
+from paraflex.plots.workspace import deviated_paths
+
+_PRINTED = {
+    "rigid": "rigid",
+    "ked": "KED",
+    "linear": "linear geometry",
+    "second-order": "second-order geometry",
+    "segments": "finite segments",
+    "exudyn": "Exudyn",
+    "mujoco": "MuJoCo",
+}
+_PAIR: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "linestyle": "-"},
+    {"color": VERMILLION, "linestyle": (0, (4, 2))},
+)
+# Distances below this are rounding; they would stretch a logarithmic axis [m].
+_SHORTEST = 1e-8
+
+
+def printed(model: str) -> str:
+    """A model's name for legends."""
+    return _PRINTED.get(model, model)
+
+
+def select_model(data: xr.Dataset, model: str) -> xr.Dataset:
+    """The runs of one model.
+
+    Raises
+    ------
+    InputError
+        No such model.
+    """
+    names = [str(name) for name in data["model"].values]
+    if model not in names:
+        raise InputError(
+            "no such model in these results", field="model", value=model, remedy="one of " + ", ".join(names)
+        )
+    return data.isel(model=names.index(model))
+
+
+def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
+    """The floating frame's best model and the most independent other one, as Figs. 22 and 23 compare them."""
+    names = [str(name) for name in data["model"].values]
+    ours = next((name for name in ("second-order", "linear") if name in names), None)
+    other = next((name for name in ("segments", "mujoco", "exudyn") if name in names), None)
+    return None if ours is None or other is None else (ours, other)
+
+
+@journal_style()
+def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure:
+    """Angle and angular velocity of every link in two models (Fig. 22).
+
+    A link's angle is that of the line from its first end to its last, which every model has.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `studies.Verification.dataset`.
+    mode : str
+        Actuation mode.
+    models : sequence of str
+        Two of its models.
+
+    Raises
+    ------
+    InputError
+        No such mode or model.
+    """
+    runs = [select_run(select_model(data, model), mode) for model in models]
+    columns = (
+        ("chord_angle", "angle", r"$\varphi$ [rad]"),
+        ("chord_velocity", "angular velocity", r"$\dot\varphi$ [rad/s]"),
+    )
+    bodies, time = data["body"].values, data["time"].values
+    figure, axes = panels(len(bodies), len(columns))
+    for column, (variable, title, label) in zip(axes.T, columns, strict=True):
+        scale = max(float(np.ptp(run[variable].values, axis=0).max()) for run in runs)
+        for panel, body in zip(column, bodies, strict=True):
+            for run, model, look in zip(runs, models, _PAIR, strict=True):
+                draw_actual(panel, run, time, run[variable].sel(body=body).values, label=printed(model), **look)
+            shade_rest(panel, data)
+            keep_flat(panel, scale)
+            panel.set_title(f"{symbol(str(body))}: {title}")
+            panel.set_ylabel(label)
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=21.5)
+
+
+@journal_style()
+def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnification: float | None = None) -> Figure:
+    """Paths of the end-effector in two models, deviations from the desired one magnified (Fig. 23).
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `studies.Verification.dataset`.
+    mode : str
+        Actuation mode.
+    models : sequence of str
+        Two of its models.
+    magnification : float, optional
+        Of the deviations; by default one at which they can be seen.
+
+    Raises
+    ------
+    InputError
+        No such mode or model, or a magnification that is not positive.
+    """
+    runs = [select_run(select_model(data, model), mode) for model in models]
+    return deviated_paths(dict(zip(map(printed, models), runs, strict=True)), magnification, _PAIR)
+
+
+@journal_style()
+def model_distances(data: xr.Dataset) -> Figure:
+    """Distance of the end-effector from its desired place, and from where the reference has it, in every model.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `studies.Verification.dataset`, which names the reference.
+    """
+    reference = str(data.attrs["reference"])
+    modes = [str(name) for name in data["mode"].values]
+    time = data["time"].values
+    figure, axes = panels(2, len(modes))
+    for column, mode in zip(axes.T, modes, strict=True):
+        datum = select_run(select_model(data, reference), mode)["end_effector"].values
+        for k, name in enumerate(str(name) for name in data["model"].values):
+            run = select_run(select_model(data, name), mode)
+            place = run["end_effector"].values
+            look: dict[str, Any] = {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k % len(DASHES)]}
+            for panel, other in zip(column, (run["end_effector_desired"].values, datum), strict=True):
+                distance = np.linalg.norm(place - other, axis=1)
+                shown = np.where(distance > _SHORTEST, distance, np.nan)
+                draw_actual(panel, run, time, 1e3 * shown, label=printed(name), **look)
+        for panel, title in zip(column, ("from the desired path", f"from {printed(reference)}"), strict=True):
+            shade_rest(panel, data)
+            panel.set_title(f"{mode_label(mode)}: distance {title}")
+            _logarithmic(panel)
+    for panel in axes[:, 0]:
+        panel.set_ylabel("distance [mm]")
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=48.0)
+
+
+def _logarithmic(panel: Axes) -> None:
+    values = [line.get_ydata() for line in panel.lines]
+    if not any(peak(np.asarray(y, dtype=float)) > 0.0 for y in values):
+        return
+    panel.set_yscale("log")
+    # Plain text: the layout knows how wide digits are.
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

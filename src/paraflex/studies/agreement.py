@@ -1,0 +1,89 @@
+"""What runs of several models say of each other, as plain numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.results.record import Record
+from paraflex.simulate import TrackingTask
+from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model
+
+
+def agreement(verification: Verification) -> dict[str, Any]:
+    """The agreement of all models as plain numbers: what `verify.json` holds. None for what a run did not reach."""
+    task = verification.task
+    reference = reference_model(verification.models)
+    return {
+        "mechanism": task.mechanism.name,
+        "duration": float(task.motion.t[-1]),
+        "samples": int(task.motion.t.size),
+        "reference": reference,
+        "links": [body.name for body in task.mechanism.bodies],
+        "complete": verification.complete,
+        "interrupted": verification.interrupted,
+        "modes": {mode: _of_mode(task, by_model, reference) for mode, by_model in verification.runs.items()},
+    }
+
+
+def _of_mode(task: TrackingTask, by_model: Mapping[str, ModelRuns], reference: str) -> dict[str, Any]:
+    of_reference = by_model[reference].base if reference in by_model else None
+    whole = {name: runs.base for name, runs in by_model.items()}
+    return {
+        "models": {name: _of_model(task, runs, of_reference) for name, runs in by_model.items()},
+        "distances": {
+            a: {b: None if x is None or y is None else _distance(x, y) for b, y in whole.items()}
+            for a, x in whole.items()
+        },
+    }
+
+
+def _of_model(task: TrackingTask, runs: ModelRuns, reference: Record | None) -> dict[str, Any]:
+    base = runs.base
+    out: dict[str, Any] = {"status": "failed" if runs.failure else "complete", "message": runs.failure}
+    if base is None:
+        return out
+    out |= {
+        "method": base.method,
+        "tracking_error": float(np.sqrt(np.mean(_gaps(base.end_effector.position, task.motion.desired.position) ** 2))),
+        "change_with_finer_step": _change(runs, Refinement.STEP),
+        "change_with_finer_mesh": _change(runs, Refinement.MESH),
+    }
+    for name in ("wall_time", "steps", "energy_balance_max", "constraint_position_max", "constraint_velocity_max"):
+        value = float(base.figures[name])
+        out[name] = value if np.isfinite(value) else None
+    if reference is not None:
+        gaps = _gaps(base.end_effector.position, reference.end_effector.position)
+        out["distance_max"], out["distance_rms"] = float(gaps.max()), _rms(gaps)
+        links = [body.name for body in task.mechanism.bodies]
+        for key, one, other in (
+            ("angle", base.chord, reference.chord),
+            ("angular_velocity", base.chord_rate, reference.chord_rate),
+        ):
+            apart = np.abs(one - other)
+            out[f"{key}_difference_rms"] = {link: _rms(apart[:, i]) for i, link in enumerate(links)}
+            out[f"{key}_difference_max"] = {link: float(apart[:, i].max()) for i, link in enumerate(links)}
+    return out
+
+
+def _change(runs: ModelRuns, level: Refinement) -> float | None:
+    base, finer = runs.base, runs.records.get(level)
+    if base is None or finer is None or finer.figures["status"] != "complete":
+        return None
+    return _distance(base, finer)
+
+
+def _distance(a: Record, b: Record) -> float:
+    """Largest distance between the end-effectors of two whole runs [m]."""
+    return float(_gaps(a.end_effector.position, b.end_effector.position).max())
+
+
+def _gaps(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.linalg.norm(a - b, axis=1)
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,245 @@
+"""One mechanism, path and mode at every fidelity and in other engines: do they agree, and is each converged?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import partial
+
+import xarray as xr
+
+from paraflex.elastodynamics import simulate_ked
+from paraflex.engines import ENGINES, check_engine
+from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
+from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
+from paraflex.errors import InputError, IntegrationError, NumericalError, suggestion
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
+from paraflex.results import tracking_dataset
+from paraflex.results.record import Record, record
+from paraflex.simulate import TrackingTask, simulate
+
+FIDELITIES = ("rigid", "ked", "linear", "second-order", "segments")
+
+
+class Refinement(Enum):
+    """Runs of one model: as asked for, and finer ones whose distance from that shows how converged it is."""
+
+    NONE = "base"
+    STEP = "finer step"
+    MESH = "finer mesh"
+
+
+@dataclass(frozen=True)
+class VerificationOptions:
+    """How fine the runs are; the finer ones take a quarter of the tolerance, half the step, or twice the mesh.
+
+    Attributes
+    ----------
+    tolerance : float
+        Of paraflex's own runs with error control [m].
+    ked_step, exudyn_step, mujoco_step : float
+        Of those with fixed steps [s].
+    segments : int
+        On the longest flexible beam; others get as many as their length takes.
+    """
+
+    tolerance: float = 1e-5
+    ked_step: float = 1e-4
+    exudyn_step: float = 5e-5
+    mujoco_step: float = 1.0 / 30000.0
+    segments: int = 8
+
+
+@dataclass(frozen=True)
+class ModelRuns:
+    """What became of one model in one mode.
+
+    Attributes
+    ----------
+    records : mapping of Refinement to Record
+        Runs that were begun; one that failed says so in its figures.
+    failure : str
+        Why one of them failed; empty where none did.
+    """
+
+    records: Mapping[Refinement, Record]
+    failure: str = ""
+
+    @property
+    def base(self) -> Record | None:
+        """The run to compare, if it got to its end."""
+        run = self.records.get(Refinement.NONE)
+        return run if run is not None and run.figures["status"] == "complete" else None
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Runs of all models in all modes.
+
+    Attributes
+    ----------
+    task : TrackingTask
+    models : tuple of str
+    runs : mapping of str to mapping of str to ModelRuns
+        By mode and model.
+    interrupted : bool
+        Whether the user stopped it; models that were not begun are missing.
+    """
+
+    task: TrackingTask
+    models: tuple[str, ...]
+    runs: Mapping[str, Mapping[str, ModelRuns]]
+    interrupted: bool = False
+
+    @property
+    def complete(self) -> bool:
+        """Whether every run got to its end."""
+        return not self.interrupted and not any(
+            runs.failure for by_model in self.runs.values() for runs in by_model.values()
+        )
+
+    def dataset(self, *, parameters: dict | None = None) -> xr.Dataset:
+        """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
+
+        Modes in which a model did not start are left out of it as a whole.
+        """
+        names = [
+            name
+            for name in self.models
+            if all(Refinement.NONE in by_model[name].records for by_model in self.runs.values() if name in by_model)
+            and all(name in by_model for by_model in self.runs.values())
+        ]
+        if not names:
+            raise InputError("no run to keep", field="models", remedy="see why the runs failed")
+        parts = [
+            tracking_dataset(
+                [by_model[name].records[Refinement.NONE] for by_model in self.runs.values()], parameters=parameters
+            )
+            for name in names
+        ]
+        methods = [part.attrs.pop("method") for part in parts]
+        data = xr.concat(parts, xr.Variable("model", names), combine_attrs="drop_conflicts", join="exact")
+        data.attrs["reference"] = reference_model(names)
+        return data.assign(method=("model", methods))
+
+
+def reference_model(models: Sequence[str]) -> str:
+    """What the others are compared with: second-order geometry, or else the first that has flexible links."""
+    for name in ("second-order", "exudyn", "segments", "mujoco", "linear", "ked"):
+        if name in models:
+            return name
+    return models[0]
+
+
+def verify(
+    task: TrackingTask,
+    modes: Sequence[str | ActuationMode],
+    *,
+    models: Sequence[str] = FIDELITIES,
+    options: VerificationOptions | None = None,
+    on_progress: Callable[[str, int, int], None] | None = None,
+) -> Verification:
+    """Run every model in every mode, each with a finer step and a finer mesh; one that fails does not stop the others.
+
+    Runs come one after the other, so that their wall times can be compared.
+
+    Parameters
+    ----------
+    task : TrackingTask
+        Of a mechanism with flexible beams; its own geometry does not matter.
+    modes : sequence of str or ActuationMode
+    models : sequence of str
+        From FIDELITIES and engines.ENGINES.
+    options : VerificationOptions, optional
+    on_progress : callable, optional
+        Told what begins, its number and how many runs there are.
+
+    Raises
+    ------
+    InputError
+        An unknown model or mode, an engine that is not installed, or one that cannot express the mechanism: before
+        anything runs.
+    """
+    options = options or VerificationOptions()
+    models = list(dict.fromkeys(models))
+    for name in models:
+        check_model(name, task.mechanism)
+    chosen = list(dict.fromkeys(task.mode(mode) for mode in modes))
+    plan = [
+        (mode, name, level) for mode in chosen for name in models for level in Refinement if _has_meaning(name, level)
+    ]
+    runs: dict[str, dict[str, ModelRuns]] = {mode.name: {} for mode in chosen}
+    for number, (mode, name, level) in enumerate(plan):
+        so_far = runs[mode.name].get(name, ModelRuns({}))
+        if so_far.failure:
+            continue
+        try:
+            if on_progress is not None:
+                on_progress(f"{mode.name}: {name}, {level.value}", number, len(plan))
+            extended = _extended(so_far, level, partial(run_model, task, mode, name, level, options))
+        except KeyboardInterrupt:
+            return Verification(task, tuple(models), runs, True)
+        # A run that was stopped returns what it has; it is none to compare.
+        if any(run.figures["status"] == "interrupted" for run in extended.records.values()):
+            return Verification(task, tuple(models), runs, True)
+        runs[mode.name][name] = extended
+    return Verification(task, tuple(models), runs)
+
+
+def _extended(runs: ModelRuns, level: Refinement, run: Callable[[], Record]) -> ModelRuns:
+    try:
+        return ModelRuns({**runs.records, level: run()})
+    except IntegrationError as error:
+        partial = error.partial if isinstance(error.partial, Record) else record(error.partial)
+        return ModelRuns({**runs.records, level: partial}, f"{level.value}: {error}")
+    except NumericalError as error:
+        return ModelRuns(runs.records, f"{level.value}: {error}")
+
+
+def run_model(
+    task: TrackingTask, mode: ActuationMode, name: str, level: Refinement, options: VerificationOptions
+) -> Record:
+    """One run of one model.
+
+    Raises
+    ------
+    NumericalError
+        See the model's own function.
+    """
+    finer, denser = level is Refinement.STEP, 2 if level is Refinement.MESH else 1
+    half = 0.5 if finer else 1.0
+    tolerance = IntegrationOptions(tolerance=options.tolerance * (0.25 if finer else 1.0))
+    beams = task.mechanism.refined(denser)
+    if name == "rigid":
+        return record(simulate(task.remodelled(beams.rigid()), mode, options=tolerance))
+    if name == "ked":
+        return record(simulate_ked(task.remodelled(beams), mode, step=half * options.ked_step))
+    if name in ("linear", "second-order"):
+        return record(simulate(task.remodelled(beams.with_geometry(Geometry(name))), mode, options=tolerance))
+    if name == "exudyn":
+        return simulate_exudyn(task, mode, ExudynOptions(step=half * options.exudyn_step, refinement=denser))
+    segments = task.in_segments(proportional_segments(task.mechanism, denser * options.segments))
+    if name == "segments":
+        return record(simulate(segments, mode, options=tolerance))
+    return simulate_mujoco(segments, mode, MuJoCoOptions(step=half * options.mujoco_step))
+
+
+def check_model(name: str, mechanism: Mechanism) -> None:
+    """Nothing, if a mechanism can be run in a model.
+
+    Raises
+    ------
+    InputError
+        No such model, an engine that is not installed, or one that cannot express the mechanism.
+    """
+    if name not in FIDELITIES + ENGINES:
+        raise InputError("unknown model", field="model", value=name, remedy=suggestion(name, FIDELITIES + ENGINES))
+    if name in ENGINES:
+        check_engine(name, mechanism)
+
+
+def _has_meaning(name: str, level: Refinement) -> bool:
+    """A rigid mechanism has no mesh; MuJoCo's is that of our own segments, run by our own kernels."""
+    return level is not Refinement.MESH or name not in ("rigid", "mujoco")

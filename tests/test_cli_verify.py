@@ -1,0 +1,120 @@
+"""`paraflex verify` as a user meets it, and the fidelities of `paraflex run`."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from paraflex.results import load_results
+from test_cli import FAST, paraflex
+
+SHORT = ["--duration", "0.02", "--samples", "11", "--tol", "1e-5"]
+
+
+def test_verify_prints_and_saves_how_models_agree(tmp_path):
+    out = tmp_path / "deep" / "verification"
+    done = paraflex("verify", "--model", "linear", "--model", "second-order", "--engine", "mujoco", *SHORT,
+                    "--out", str(out))  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "mode ++++: tracking error" in done.stdout
+    assert "Largest distance between the paths of two models [m]" in done.stdout
+    assert "RMS difference of each link's angular velocity [rad/s] from 2nd-ord." in done.stdout
+    # Whole numbers at eighty columns, none cut short.
+    assert "…" not in done.stdout
+    assert sorted(entry.name for entry in out.iterdir()) == ["figures", "verify.json", "verify.nc"]
+    figures = json.loads((out / "verify.json").read_text())
+    models = figures["modes"]["++++"]["models"]
+    assert list(models) == ["linear", "second-order", "mujoco"]
+    assert figures["parameters"]["run"]["path"] == "square"
+    assert figures["complete"]
+    data = load_results(out / "verify.nc")
+    assert float(data["tracking_rms"].sel(model="linear", mode="++++")) == models["linear"]["tracking_error"]
+    assert {path.name for path in (out / "figures").iterdir()} >= {"model_distances.png", "fig22_links_++++.svg"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--engine", "mujuco"], "--engine: unknown engine (got 'mujuco'); did you mean \"mujoco\"?"),
+        (["--model", "KED"], "--model: unknown model (got 'KED'); "),
+        (["--segments", "0"], "--segments: must be positive (got 0)"),
+        (["--tol", "-1"], "--tol: must be positive (got -1.0)"),
+        (["--mode", "+-+"], "--mode: not an actuation mode"),
+        (["--path", "spiral"], "path: unknown path (got 'spiral')"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(tmp_path, arguments, says):
+    done = paraflex("verify", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_engine_that_is_not_there_names_the_extra(tmp_path):
+    hidden = "import sys; sys.modules['exudyn'] = None; from paraflex.cli.app import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", hidden, "verify", "--engine", "exudyn"],
+        capture_output=True, text=True, cwd=tmp_path, check=False, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: engine: not installed (got 'exudyn'); install it with pip install 'paraflex[engines]'\n"
+    )
+
+
+def test_an_engine_that_diverges_is_reported_and_the_others_go_on(tmp_path):
+    # Forty segments are 25 times as stiff as eight: MuJoCo's step no longer resolves them.
+    done = paraflex("verify", "--model", "rigid", "--engine", "mujoco", "--segments", "40", *SHORT,
+                    "--out", str(tmp_path), "--json")  # fmt: skip
+    assert done.returncode == 1
+    assert 'error: mode "++++", mujoco: base: MuJoCo diverges with steps of ' in done.stderr
+    models = json.loads(done.stdout)["modes"]["++++"]["models"]
+    assert (models["rigid"]["status"], models["mujoco"]["status"]) == ("complete", "failed")
+    assert load_results(tmp_path / "verify.nc")["status"].sel(model="mujoco").item() == "failed"
+
+
+def test_interrupt_keeps_the_models_that_are_done(tmp_path):
+    command = [sys.executable, "-m", "paraflex", "verify", "--model", "rigid", "--model", "second-order",
+               "--tol", "1e-9", "--out", str(tmp_path)]  # fmt: skip
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    time.sleep(12.0)
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize(
+    ("flag", "extra", "largest"), [("--segments", ["6"], 1e-3), ("--ked", [], 2e-2)], ids=["segments", "ked"]
+)
+def test_run_at_other_fidelities(tmp_path, flag, extra, largest):
+    fast = [part for part in FAST if flag == "--segments" or part not in ("--tol", "1e-3")]
+    done = paraflex("run", "--mode", "++++", flag, *extra, *fast, "--out", str(tmp_path), "--json")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert 1e-6 < summary["modes"]["++++"]["tracking_rms"] < largest
+    assert summary["parameters"]["run"][flag[2:]]
+    data = load_results(tmp_path / "results.nc")
+    assert list(data["body"].values) == [f"link{i}" for i in range(1, 9)]
+    assert (tmp_path / "figures" / "fig14_link_motions.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--rigid", "--ked"], "--rigid: cannot be combined (got '--rigid --ked'); choose one of them"),
+        (["--segments", "4", "--geometry", "linear"], "--segments: cannot be combined"),
+        (["--segments", "0"], "--segments: must be positive (got 0); say 8"),
+        (["--ked", "--tol", "1e-4"], "--tol: means nothing with --ked (got 0.0001); its steps are fixed"),
+    ],
+)
+def test_fidelities_exclude_one_another(tmp_path, arguments, says):
+    done = paraflex("run", *arguments, "--out", str(tmp_path / "out"), cwd=tmp_path)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert list(tmp_path.iterdir()) == []

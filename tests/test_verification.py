@@ -1,0 +1,189 @@
+"""Every fidelity and both other engines on one mechanism: the short cross-engine check, run for real."""
+
+import json
+
+import numpy as np
+import pytest
+
+from conftest import make_five_bar
+from paraflex import plots
+from paraflex.errors import InputError
+from paraflex.kinematics import Line
+from paraflex.mechanism import proportional_segments, raparm_i
+from paraflex.results import load_results, save_results
+from paraflex.simulate import plan_tracking
+from paraflex.studies import (
+    FIDELITIES,
+    Refinement,
+    VerificationOptions,
+    agreement,
+    check_model,
+    reference_model,
+    verify,
+)
+
+MODELS = (*FIDELITIES, "exudyn", "mujoco")
+
+
+@pytest.fixture(scope="module")
+def verification(square):
+    """RAParM-I in ++++ along the first tenth of a second."""
+    task = plan_tracking(raparm_i(), square, duration=0.1, samples=51)
+    return verify(task, ["++++"], models=MODELS, options=VerificationOptions(tolerance=5e-7))
+
+
+@pytest.fixture(scope="module")
+def figures(verification):
+    return agreement(verification)["modes"]["++++"]
+
+
+def test_every_model_ran_to_its_end(verification, figures):
+    assert verification.complete
+    assert list(figures["models"]) == list(MODELS)
+    assert all(model["status"] == "complete" for model in figures["models"].values())
+    json.dumps(agreement(verification), allow_nan=False)
+
+
+def test_exact_beams_confirm_second_order_geometry_and_not_the_linear_shape(figures):
+    """The end-effector strays by 0.125 mm in this time; linear geometry misses a quarter of that."""
+    apart = figures["distances"]["exudyn"]
+    assert apart["rigid"] > 1e-4
+    assert apart["second-order"] < 0.01 * apart["rigid"]
+    assert apart["linear"] > 0.1 * apart["rigid"]
+
+
+def test_mujoco_confirms_our_segments(figures):
+    """Two programs, one model: a thousandth of the deflection at most."""
+    apart = figures["distances"]["mujoco"]
+    assert apart["segments"] < 1e-3 * apart["rigid"]
+    # The model itself is coarse: eight segments a link.
+    assert apart["segments"] < 0.2 * apart["second-order"] < 0.02 * apart["rigid"]
+
+
+def test_each_shows_how_converged_it_is(figures):
+    models = figures["models"]
+    for name in ("linear", "second-order", "exudyn"):
+        for change in ("change_with_finer_step", "change_with_finer_mesh"):
+            assert 0.0 < models[name][change] < 5e-6
+    assert models["rigid"]["change_with_finer_mesh"] is None
+    assert models["mujoco"]["change_with_finer_mesh"] is None
+    # Twice the segments move the path by more than a finer step does: the mesh is what limits them.
+    assert models["segments"]["change_with_finer_mesh"] > 2.0 * models["segments"]["change_with_finer_step"]
+
+
+def test_links_turn_alike_where_models_agree(figures):
+    for link in (f"link{i}" for i in range(1, 9)):
+        exact = figures["models"]["exudyn"]["angle_difference_rms"][link]
+        linear = figures["models"]["linear"]["angle_difference_rms"][link]
+        assert exact < 0.1 * linear
+        assert exact <= figures["models"]["exudyn"]["angle_difference_max"][link]
+        assert figures["models"]["second-order"]["angular_velocity_difference_max"][link] == 0.0
+
+
+def test_kineto_elastodynamics_holds_the_motors_and_misses(figures):
+    """With its motors held on the rigid motion the arm bends by millimetres that torques would have let go."""
+    assert figures["models"]["ked"]["distance_max"] > 10.0 * figures["models"]["linear"]["distance_max"]
+    assert figures["models"]["ked"]["energy_balance_max"] is None
+
+
+def test_the_dataset_has_all_models_and_survives_a_file(verification, tmp_path):
+    data = verification.dataset()
+    assert list(data["model"].values) == list(MODELS)
+    assert data.sizes == {"model": 7, "mode": 1, "time": 51, "axis": 2, "body": 8, "motor": 4, "joint": 11, "point": 18}
+    assert data.attrs["reference"] == "second-order"
+    assert [str(method).split()[0].strip(",") for method in data["method"].values] == [
+        "TR-BDF2", "KED", "TR-BDF2", "TR-BDF2", "TR-BDF2", "Exudyn", "MuJoCo",
+    ]  # fmt: skip
+    np.testing.assert_array_equal(data["torque"].sel(model="mujoco"), data["torque"].sel(model="rigid"))
+    save_results(data, tmp_path / "verify.nc")
+    np.testing.assert_array_equal(load_results(tmp_path / "verify.nc")["chord_angle"], data["chord_angle"])
+
+
+def test_figures_overlay_the_models(verification, tmp_path):
+    data = verification.dataset()
+    written = plots.save_agreement_figures(data, tmp_path)
+    names = ["fig22_links_++++", "fig23_paths_++++", "model_distances"]
+    assert [path.name for path in written] == [f"{name}.{suffix}" for name in names for suffix in ("png", "svg")]
+    links = plots.compared_links(data, "++++", ("second-order", "segments"))
+    assert len(links.axes) == 16
+    panel = links.axes[3]
+    assert panel.get_title() == "link 2: angular velocity"
+    for line, model in zip(panel.lines, ("second-order", "segments"), strict=True):
+        values = data["chord_velocity"].sel(model=model, mode="++++", body="link2")
+        np.testing.assert_array_equal(line.get_ydata(), values)
+    distances = plots.model_distances(data)
+    far = next(line for line in distances.axes[1].lines if line.get_label() == "rigid").get_ydata()
+    assert np.nanmax(far) == pytest.approx(
+        1e3 * agreement(verification)["modes"]["++++"]["models"]["rigid"]["distance_max"]
+    )
+    with pytest.raises(InputError, match="no such model"):
+        plots.compared_paths(data, "++++", ("second-order", "adams"))
+
+
+def test_an_engine_that_diverges_is_reported_and_the_others_go_on(square):
+    task = plan_tracking(raparm_i(), square, duration=0.02, samples=3)
+    coarse = VerificationOptions(tolerance=1e-4, mujoco_step=1e-3, exudyn_step=1e-3)
+    seen = []
+    verification = verify(
+        task, ["++++"], models=("mujoco", "linear", "exudyn"), options=coarse, on_progress=lambda *a: seen.append(a)
+    )
+    figures = agreement(verification)["modes"]["++++"]["models"]
+    assert not verification.complete
+    assert figures["mujoco"]["status"] == "failed"
+    assert "base: MuJoCo diverges with steps of 0.001 s" in figures["mujoco"]["message"]
+    assert figures["linear"]["status"] == figures["exudyn"]["status"] == "complete"
+    # MuJoCo's finer run is left out once the base run has failed.
+    assert [number for _, number, total in seen] == [0, 2, 3, 4, 5, 6, 7]
+    data = verification.dataset()
+    assert data["status"].sel(model="mujoco").item() == "failed"
+    assert np.isnan(data["tracking_rms"].sel(model="mujoco").item())
+
+
+def test_ctrl_c_keeps_the_models_that_are_done(square):
+    task = plan_tracking(raparm_i(), square, duration=0.01, samples=3)
+
+    def stop(what, number, total):
+        if number == 2:
+            raise KeyboardInterrupt
+
+    options = VerificationOptions(tolerance=1e-3)
+    verification = verify(task, ["++++"], models=("rigid", "linear"), options=options, on_progress=stop)
+    assert verification.interrupted
+    assert list(verification.runs["++++"]) == ["rigid"]
+    assert list(verification.dataset()["model"].values) == ["rigid"]
+    assert agreement(verification)["interrupted"]
+
+
+def test_a_rigid_mechanism_is_the_same_in_every_model():
+    """A five-bar without beams, every model of it: only MuJoCo's and Exudyn's own errors are left."""
+    path = Line((0.0, 0.30), (0.04, 0.27), 20.0)
+    task = plan_tracking(make_five_bar(), path, duration=0.1, samples=21)
+    figures = agreement(verify(task, ["++"], models=MODELS))["modes"]["++"]
+    assert proportional_segments(make_five_bar()) == {}
+    for name in MODELS:
+        assert figures["models"][name]["distance_max"] < 2e-5, name
+        assert figures["models"][name]["tracking_error"] < 2e-5, name
+
+
+def test_the_reference_is_the_best_there_is():
+    assert reference_model(["rigid", "exudyn", "linear"]) == "exudyn"
+    assert reference_model(["rigid"]) == "rigid"
+
+
+def test_a_model_that_is_none():
+    with pytest.raises(InputError, match=r'unknown model \(got "?\'?mujuco.* did you mean "mujoco"'):
+        check_model("mujuco", raparm_i())
+
+
+def test_refinements_are_of_each_model_what_they_say(square):
+    task = plan_tracking(raparm_i(), square, duration=0.02, samples=3)
+    options = VerificationOptions(tolerance=1e-5, segments=2)
+    runs = verify(task, ["++++"], models=("linear", "segments", "ked"), options=options).runs["++++"]
+    for model in runs.values():
+        assert list(model.records) == list(Refinement)
+    steps = {name: [run.figures["steps"] for run in model.records.values()] for name, model in runs.items()}
+    assert steps["ked"][1] == 2 * steps["ked"][0] == 2 * steps["ked"][2]
+    for name in ("linear", "segments"):
+        assert steps[name][1] > 1.5 * steps[name][0]
+    refined = raparm_i().refined(2)
+    assert [body.elements for body in refined.bodies[:4]] == [6, 2, 6, (2, 4)]
