@@ -31,6 +31,7 @@ DESIRED_TWINS = (
     "angular_acceleration",
 )
 SINGLE = ("tip_deflections", "link_motions", "end_effector_path", "end_effector_motion", "phase_diagrams")
+COMPARED = ("compared_links", "compared_paths")
 NAMES = (
     "fig11_desired_path",
     "fig12_motor_torques",
@@ -87,8 +88,26 @@ def data() -> xr.Dataset:
     )
 
 
+def models_of(data: xr.Dataset) -> xr.Dataset:
+    """Three models of the arm: what `studies.Verification.dataset` gives, deviations of three sizes."""
+    parts = []
+    for scale in (1.0, 1.01, 0.2):
+        part = data.copy()
+        part["end_effector"] = data["end_effector_desired"] + scale * (
+            data["end_effector"] - data["end_effector_desired"]
+        )
+        part["chord_angle"], part["chord_velocity"] = scale * data["angle"], -500.0 * scale * data["angular_velocity"]
+        parts.append(part)
+    both = xr.concat(parts, xr.Variable("model", ["second-order", "segments", "exudyn"]), combine_attrs="override")
+    return both.assign_attrs(reference="second-order")
+
+
 def figure_of(name: str, data: xr.Dataset, mode: str = FULL) -> Figure:
     draw: Callable[..., Figure] = getattr(plots, name)
+    if name in COMPARED:
+        return draw(models_of(data), mode, ("second-order", "segments"))
+    if name == "model_distances":
+        return draw(models_of(data))
     return draw(data, mode) if name in SINGLE else draw(data)
 
 
@@ -121,6 +140,9 @@ same = partial(np.testing.assert_allclose, rtol=1e-12, atol=0.0)
         ("end_effector_motion", {"mm", "m/s", "m/s²", "s"}),
         ("phase_diagrams", {"mm", "m/s", "m/s²"}),
         ("tracking_errors", {"mm", "s"}),
+        ("compared_links", {"rad", "rad/s", "s"}),
+        ("compared_paths", {"mm"}),
+        ("model_distances", {"mm", "s"}),
     ],
 )
 def test_every_axis_label_names_its_unit(data: xr.Dataset, name: str, units: set[str]) -> None:
@@ -132,7 +154,7 @@ def test_every_axis_label_names_its_unit(data: xr.Dataset, name: str, units: set
 
 
 @pytest.mark.parametrize("mode", [FULL, PARTIAL])
-@pytest.mark.parametrize("name", [name for name in plots.__all__ if name != "save_figures"])
+@pytest.mark.parametrize("name", [name for name in plots.__all__ if not name.startswith("save")])
 def test_nothing_overlaps_or_leaves_the_page(data: xr.Dataset, name: str, mode: str) -> None:
     data["angular_acceleration"] *= 50.0  # five digits and a sign
     figure = figure_of(name, data, mode)
