@@ -11,6 +11,7 @@ from paraflex.dynamics import build_system, consistent_state, pack_signals
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions, integrate
+from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import body_terms, system_energy
 from paraflex.kernel.joints import body_joints, start_rows
 from paraflex.kernel.linear import factor_system, mass_norm, solve_system
@@ -26,8 +27,10 @@ from paraflex.mechanism import (
     RevoluteJoint,
     RigidBody,
     Section,
+    raparm_i,
 )
 from paraflex.results.motion import point_motion
+from paraflex.simulate import plan_tracking
 
 RUBBER = Material(youngs_modulus=5e6, density=1100.0)
 
@@ -201,16 +204,12 @@ def test_joints_follow_the_shortened_points():
     np.testing.assert_allclose(elbow[1].position[0], expected, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("b", [0.0, 1e-6])
-def test_the_factored_system_solves_the_dense_one(b):
-    system = build_system(chain())
-    q, v, _ = random_state(system, 13)
-    ws = system.workspace()
-    assert factor_system(system.packed, b, q, ws) == 0
+def dense_system(system, q, b):
+    """[M + b K, Phi_q^T; Phi_q, 0] with M column by column from the equations of motion, and M."""
     matrix = np.zeros((system.n + system.m, system.n + system.m))
     matrix[system.n :, : system.n] = system.jacobian(q)
     matrix[: system.n, system.n :] = system.jacobian(q).T
-    still, points = np.zeros(system.n), ws.points
+    still, points = np.zeros(system.n), system.workspace().points
     modal = system.packed.modal.copy()
     modal[OMEGA2] = 0.0
     inert = system.packed._replace(modal=modal)
@@ -227,13 +226,74 @@ def test_the_factored_system_solves_the_dense_one(b):
     for body in system.bodies:
         k = np.arange(body.flexible.start, body.flexible.stop)
         matrix[k, k] += b * body.modes.omega**2
+    return matrix, mass
+
+
+def check_solution(system, ws, matrix):
     right = np.random.default_rng(1).normal(size=system.n + system.m)
     x, mu = right[: system.n].copy(), right[system.n :].copy()
     solve_system(system.packed, ws, x, mu)
     expected = np.linalg.solve(matrix, right)
     np.testing.assert_allclose(np.concatenate([x, mu]), expected, rtol=0, atol=1e-9 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("b", [0.0, 1e-6])
+def test_the_factored_system_solves_the_dense_one(b):
+    system = build_system(chain())
+    q, v, _ = random_state(system, 13)
+    ws = system.workspace()
+    assert factor_system(system.packed, b, q, ws) == 0
+    matrix, mass = dense_system(system, q, b)
+    check_solution(system, ws, matrix)
     assert np.linalg.eigvalsh(mass).min() > 0.0
     assert mass_norm(system.packed, ws, v) ** 2 == pytest.approx(v @ mass @ v / system.total_mass, rel=1e-10)
+
+
+@pytest.mark.parametrize("source", ["inertia forces", "joint forces"])
+def test_the_iteration_matrix_has_the_geometric_stiffness(source):
+    """Forces on u are linear in u where bodies are only pushed along: their differences are K and K_g exactly."""
+    system = build_system(chain())
+    q, v, a = random_state(system, 17)
+    v[:] = 0.0
+    pushed = np.zeros(system.n)
+    lam = np.zeros(system.m)
+    if source == "inertia forces":
+        for body in system.bodies:
+            pushed[body.position] = 30.0 * a[body.position]
+    else:
+        lam[:] = 1e3 * np.random.default_rng(2).normal(size=system.m)
+    b, ws = 1e-5, system.workspace()
+
+    def forces(q):
+        f, rows = np.zeros(system.n), np.zeros(system.m)
+        for i in range(len(system.bodies)):
+            body_terms(system.packed, i, q, v, pushed, f, ws.points)
+            body_joints(system.packed, i, q, v, pushed, lam, 0.0, 0.0, f, rows)
+        return f
+
+    matrix, _ = dense_system(system, q, 0.0)
+    share = []
+    for body in (body for body in system.bodies if body.nf):
+        k = np.arange(body.flexible.start, body.flexible.stop)
+        base = forces(q)
+        tangent = np.column_stack([forces(q + unit)[k] - base[k] for unit in np.eye(system.n)[k]])
+        matrix[np.ix_(k, k)] += b * tangent
+        share.append(np.abs(b * (tangent - np.diag(body.modes.omega**2))).max(initial=0.0))
+    # Beside the unit mass matrix: far more than the tolerance, and not so much that a beam would buckle.
+    assert max(share) > 0.05
+    note_all_axial_forces(system.packed, q, v, pushed, lam, ws, ws.geometric)
+    assert factor_system(system.packed, b, q, ws) == 0
+    check_solution(system, ws, matrix)
+
+
+@pytest.mark.parametrize("mode", ["++++", "+-+-"])
+def test_newton_converges_as_fast_as_in_the_linear_case(square, mode):
+    rates = []
+    for geometry in Geometry:
+        task = plan_tracking(raparm_i().with_geometry(geometry), square, duration=0.1, samples=11)
+        solution = task.simulate(mode, options=IntegrationOptions(tolerance=1e-5)).solution
+        rates.append(solution.newton_iterations / (solution.steps + solution.rejected))
+    assert rates[1] < 1.1 * rates[0]
 
 
 def test_small_deflections_are_the_linear_ones():

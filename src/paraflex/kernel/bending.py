@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from paraflex.kernel.compiling import routine
+from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.packed import ANGLE, NX, NY, OMEGA2, SLOPE
 
 # Rows of Workspace.points: slopes at the Gauss points, their two derivatives, and the axial force carried there.
@@ -198,7 +198,7 @@ def note_axial_forces(p, i, q, v, a, lam, ws):
             ws.geometric[at + j] -= force * p.bending[bending + j]
 
 
-@routine
+@kernel
 def note_all_axial_forces(p, q, v, a, lam, ws, geometric):
     """Geometric stiffness of every body for the next factor; `geometric` is ws.geometric, None for linear geometry."""
     if geometric is None:

@@ -48,7 +48,9 @@ def _of_model(task: TrackingTask, runs: ModelRuns, reference: Record | None) -> 
         return out
     out |= {
         "method": base.method,
-        "tracking_error": float(np.sqrt(np.mean(_gaps(base.end_effector.position, task.motion.desired.position) ** 2))),
+        "tracking_error": _tracking_error(task, base),
+        "tracking_error_with_finer_step": _tracking_error(task, runs.finished(Refinement.STEP)),
+        "tracking_error_with_finer_mesh": _tracking_error(task, runs.finished(Refinement.MESH)),
         "change_with_finer_step": _change(runs, Refinement.STEP),
         "change_with_finer_mesh": _change(runs, Refinement.MESH),
     }
@@ -70,10 +72,13 @@ def _of_model(task: TrackingTask, runs: ModelRuns, reference: Record | None) -> 
 
 
 def _change(runs: ModelRuns, level: Refinement) -> float | None:
-    base, finer = runs.base, runs.records.get(level)
-    if base is None or finer is None or finer.figures["status"] != "complete":
-        return None
-    return _distance(base, finer)
+    base, finer = runs.base, runs.finished(level)
+    return None if base is None or finer is None else _distance(base, finer)
+
+
+def _tracking_error(task: TrackingTask, run: Record | None) -> float | None:
+    """Root mean square distance from the desired path (Eq. 64) [m]."""
+    return None if run is None else _rms(_gaps(run.end_effector.position, task.motion.desired.position))
 
 
 def _distance(a: Record, b: Record) -> float:

@@ -45,7 +45,7 @@ class VerificationOptions:
         On the longest flexible beam; others get as many as their length takes.
     """
 
-    tolerance: float = 1e-5
+    tolerance: float = 5e-6
     ked_step: float = 1e-4
     exudyn_step: float = 5e-5
     mujoco_step: float = 1.0 / 30000.0
@@ -67,11 +67,15 @@ class ModelRuns:
     records: Mapping[Refinement, Record]
     failure: str = ""
 
+    def finished(self, level: Refinement) -> Record | None:
+        """A run that got to its end."""
+        run = self.records.get(level)
+        return run if run is not None and run.figures["status"] == "complete" else None
+
     @property
     def base(self) -> Record | None:
         """The run to compare, if it got to its end."""
-        run = self.records.get(Refinement.NONE)
-        return run if run is not None and run.figures["status"] == "complete" else None
+        return self.finished(Refinement.NONE)
 
 
 @dataclass(frozen=True)
