@@ -172,31 +172,34 @@ def test_the_response_does_not_depend_on_the_reference_condition(arm, condition)
 def test_a_slow_motion_gives_static_deflections(raparm, mode):
     # [K C^T; C 0] [xi; mu] = [-(M a + h); 0] by the plain formulas of the twins, in the ground frame.
     task = plan_tracking(stiffened(raparm, 400), PointPath(((0.0, 0.264), (0.03, 0.284)), 1.5), samples=16)
-    solution = simulate_ked(task, mode, step=1e-3, spectral_radius=0.3).solution
-    system, (q, v, a) = task.system, nominal(task)
+    run = simulate_ked(task, mode, step=1e-3, spectral_radius=0.3)
+    solution, system, (q, v, a) = run.solution, task.system, nominal(task)
+    active = [k for k, motor in enumerate(raparm.motors) if motor.name in task.mode(mode).motors]
     held = [
         twins.joint_angle_row(system, motor.joint) for motor in raparm.motors if motor.name in task.mode(mode).motors
     ]
     K = np.zeros(system.n)
     for body in system.bodies:
         K[body.flexible] = body.modes.omega**2
-    expected, forces = np.zeros_like(q), np.zeros_like(solution.multipliers)
+    expected, forces, torques = np.zeros_like(q), np.zeros_like(solution.multipliers), np.zeros_like(run.holding)
     for k in range(len(q)):
         C = np.vstack([twins.constraint_jacobian(system, q[k]), held])
         load = -twins.system_mass_matrix(system, q[k]) @ a[k] - twins.system_forces(system, q[k], v[k])
         matrix = np.block([[np.diag(K), C.T], [C, np.zeros((len(C), len(C)))]])
         both = np.linalg.solve(matrix, np.concatenate([load, np.zeros(len(C))]))
         expected[k], forces[k] = both[: system.n], both[system.n :][: system.m]
+        torques[k, active] = -both[system.n + system.m :]
     assert largest(expected) > 1e-7
     # The jerk at the start leaves a vibration of 1 / omega T, about 1e-3, and more where the path is steep.
     np.testing.assert_allclose(solution.q - q, expected, rtol=0, atol=0.02 * largest(expected))
     np.testing.assert_allclose(solution.multipliers, forces, rtol=0, atol=0.02 * largest(forces))
+    np.testing.assert_allclose(run.holding, torques, rtol=0, atol=0.02 * largest(torques))
 
 
 def test_a_rigid_mechanism_moves_as_planned_and_its_joints_carry_the_planned_torques(raparm):
     task = plan_tracking(raparm.rigid(), SHORT, duration=0.08, samples=9)
-    solution = simulate_ked(task, "+--+", step=1e-3).solution
-    q, v, a = nominal(task)
+    run = simulate_ked(task, "+--+", step=1e-3)
+    solution, (q, v, a) = run.solution, nominal(task)
     for values, expected in zip((solution.q, solution.v, solution.a), (q, v, a), strict=True):
         np.testing.assert_allclose(values, expected, rtol=0, atol=1e-9 * largest(expected))
     torques = task.torques("+--+").evaluate(task.motion.t)
@@ -205,6 +208,8 @@ def test_a_rigid_mechanism_moves_as_planned_and_its_joints_carry_the_planned_tor
         inertia = twins.system_mass_matrix(task.system, q[k]) @ a[k] + twins.system_forces(task.system, q[k], v[k])
         balance = inertia + twins.constraint_jacobian(task.system, q[k]).T @ solution.multipliers[k]
         np.testing.assert_allclose(balance, rows.T @ torques[k], rtol=0, atol=1e-6 * largest(torques))
+    np.testing.assert_allclose(run.holding, torques, rtol=0, atol=1e-6 * largest(torques))
+    np.testing.assert_array_equal(tracking_dataset([run])["torque"][0], run.holding)
 
 
 def test_dependent_rows_of_redundant_motors_do_no_harm(raparm):

@@ -68,7 +68,8 @@ def simulate_ked(
     Returns
     -------
     TrackingRun
-        Its `torques` are the feed-forward of the mode, which do not drive this model. Its task is of linear geometry.
+        Its `torques` are the feed-forward of the mode, which do not drive this model: `holding` are those that hold the
+        motors. Its task is of linear geometry.
         In its solution q = q_r + xi with derivatives v and a; multipliers are those of the system's rows, of least norm
         (rows scaled to one size) where rows are dependent; work and energy balance are NaN; the largest violations are
         those of the nonlinear constraints at the samples, which tell how small the displacements are. Its wall time
@@ -113,7 +114,8 @@ def simulate_ked(
     solution = Solution(
         **figures, status=status, message=message, steps=steps, factorisations=steps + 1, wall_time=wall_time
     )
-    run = TrackingRun(task, torques, condition, solution, method="KED, generalised-alpha")
+    holding = _holding(task.system, torques.mode, kept)
+    run = TrackingRun(task, torques, condition, solution, method="KED, generalised-alpha", holding=holding)
     if failure is not None:
         failure.partial = run
         raise failure
@@ -207,6 +209,15 @@ def _angle_rows(system: System, mode: ActuationMode) -> Array:
                 row[body.angle] += sign
                 row[body.flexible] += sign * system.marker(ref).slope
     return rows
+
+
+def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array:
+    """Torques (k, motors) of the held motors: C^T mu stands on the left of the equations, so they are -mu."""
+    torques = np.zeros((len(kept), len(system.mechanism.motors)))
+    active = [k for k, motor in enumerate(system.mechanism.motors) if motor.name in mode.motors]
+    for row, response in zip(torques, kept, strict=True):
+        row[active] = -response.mu[system.m :]
+    return torques
 
 
 def _mass(body: BodyCoordinates) -> Array:

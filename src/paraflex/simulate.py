@@ -121,6 +121,8 @@ class TrackingRun:
     solution : Solution
     method : str
         How it was integrated.
+    holding : (k, motors) array, optional
+        Torques at the samples where motors were held on a motion instead of driven by `torques` [N m].
     """
 
     task: TrackingTask
@@ -128,6 +130,7 @@ class TrackingRun:
     condition: NDArray[np.float64]
     solution: Solution
     method: str = "TR-BDF2"
+    holding: NDArray[np.float64] | None = None
 
     @property
     def mode(self) -> ActuationMode:

@@ -73,7 +73,7 @@ def run_command(request: RunRequest) -> int:
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
-        plain_console().print(study_table(figures, task))
+        plain_console().print(study_table(figures, task, _model_name(request, mechanism)))
         console.print(f"{time.perf_counter() - began:.1f} s; results and figures in {folder}")
     failures(console, result)
     if result.interrupted:
@@ -111,6 +111,14 @@ def _check_fidelity(request: RunRequest) -> None:
     for flag, value in (("--tol", request.tolerance), ("--max-steps", request.max_steps)):
         if request.ked and value is not None:
             raise InputError("means nothing with --ked", field=flag, value=value, remedy="its steps are fixed")
+
+
+def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
+    if request.rigid:
+        return "rigid"
+    if request.ked:
+        return "kineto-elastodynamics"
+    return f"{mechanism.geometry.value} geometry" if request.segments is None else "finite segments"
 
 
 def _mechanism(model: Model, request: RunRequest) -> Mechanism:

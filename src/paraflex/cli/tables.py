@@ -17,11 +17,11 @@ def plain_console(*, stderr: bool = False) -> Console:
     return Console(highlight=False, markup=False, stderr=stderr)
 
 
-def study_table(figures: dict[str, Any], task: TrackingTask) -> Table:
-    """Tracking error and peak torques of every mode, and what the solver did."""
+def study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Table:
+    """Tracking error and peak torques of every mode in a model, and what the solver did."""
     motors = [motor.name for motor in task.mechanism.motors]
     table = Table(
-        title=f"{figures['mechanism']}, {task.mechanism.geometry.value} geometry: tracking error and peak torques",
+        title=f"{figures['mechanism']}, {model}: tracking error and peak torques",
         title_justify="left",
         box=box.SIMPLE,
         collapse_padding=True,

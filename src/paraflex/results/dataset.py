@@ -137,7 +137,7 @@ def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]
         "end_effector": (("axis",), full(one.end_effector.position)),
         "end_effector_velocity": (("axis",), full(one.end_effector.velocity)),
         "end_effector_acceleration": (("axis",), full(one.end_effector.acceleration)),
-        "torque": (("motor",), one.torque),
+        "torque": (("motor",), full(one.torque)),
         "angle": (("body",), full(one.angle)),
         "angular_velocity": (("body",), full(one.rate)),
         "angular_acceleration": (("body",), full(one.acceleration)),

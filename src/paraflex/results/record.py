@@ -44,7 +44,7 @@ class Record:
     mode : str
         Name of the actuation mode.
     torque : (samples, motors) array
-        Applied by the motors, at every sample time of the task [N m].
+        Applied by the motors, at every sample time of the task, or at the k reached where they were held [N m].
     condition : (samples,) array
         Condition number of the actuation matrix.
     end_effector : PointMotion
@@ -106,7 +106,7 @@ def record(run: TrackingRun) -> Record:
         task=whole,
         method=run.method,
         mode=run.mode.name,
-        torque=run.torques.evaluate(task.motion.t),
+        torque=run.torques.evaluate(task.motion.t) if run.holding is None else run.holding,
         condition=run.condition,
         end_effector=point_motion(system, effector.point, q, v, a),
         angle=q[:, first],
