@@ -9,15 +9,29 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
-from paraflex.kernel.packed import ANGLE, BODY, EFFORT, MARKER, MASS, POINT, PORT, ROW, PackedSystem
-from paraflex.mechanism import Mechanism, PointRef
+from paraflex.kernel.packed import (
+    ANGLE,
+    BODY,
+    CONSTRAINT,
+    DAMPER,
+    EFFORT,
+    LOAD,
+    MARKER,
+    MASS,
+    POINT,
+    PORT,
+    ROW,
+    SPRING,
+    PackedSystem,
+)
+from paraflex.mechanism import Load, Mechanism, PointForce, PointRef
 
 
 @dataclass(frozen=True)
 class Constraint:
     """A joint, a prescribed angle or a spring before packing: two points, and a signal where it is driven in time.
 
-    A spring is a compliant constraint: angle - rest = compliance * multiplier.
+    A spring is a compliant constraint: angle - rest = compliance * multiplier; so is a damper, of the angle's rate.
     """
 
     name: str
@@ -25,6 +39,7 @@ class Constraint:
     a: PointRef
     b: PointRef
     signal: int
+    row: int = CONSTRAINT
     compliance: float = 0.0
     rest: float = 0.0
 
@@ -42,7 +57,12 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
         constraints.append(Constraint(prescribed.name, ANGLE, joint.a, joint.b, len(mechanism.motors) + k))
     for spring in mechanism.springs:
         joint = mechanism.joint(spring.joint)
-        constraints.append(Constraint(spring.name, ANGLE, joint.a, joint.b, -1, 1.0 / spring.stiffness, spring.rest))
+        constraints.append(
+            Constraint(spring.name, ANGLE, joint.a, joint.b, -1, SPRING, 1.0 / spring.stiffness, spring.rest)
+        )
+    for damper in mechanism.dampers:
+        joint = mechanism.joint(damper.joint)
+        constraints.append(Constraint(damper.name, ANGLE, joint.a, joint.b, -1, DAMPER, 1.0 / damper.coefficient))
     return constraints
 
 
@@ -72,6 +92,7 @@ def pack_system(
     labels: list[str] = []
     ground: list[float] = []
     signals: list[int] = []
+    kinds: list[int] = []
     compliance: list[float] = []
 
     def add_marker(ref: PointRef) -> int:
@@ -82,6 +103,7 @@ def pack_system(
         row, n_rows = len(labels), len(constraint.labels)
         labels += constraint.labels
         signals += [constraint.signal] * n_rows
+        kinds += [constraint.row] * n_rows
         compliance += [constraint.compliance] * n_rows
         ground += [-constraint.rest] * n_rows
         for ref, sign in ((constraint.a, -1.0), (constraint.b, 1.0)):
@@ -98,13 +120,15 @@ def pack_system(
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
             if not ref.on_ground:
                 efforts[index[ref.body]].append({"marker": add_marker(ref), "signal": k, "sign": sign})
+    loads = [_load_record(load) | {"marker": add_marker(load.point)} for load in mechanism.loads]
 
     packed = PackedSystem(
         bodies=_body_records(bodies, ports, efforts),
         markers=_marker_records(markers),
         ports=_port_records(bodies, ports),
         efforts=_records(EFFORT, [effort for group in efforts for effort in group]),
-        rows=_row_records(signals, ground, compliance, ports),
+        loads=_records(LOAD, loads),
+        rows=_row_records(kinds, signals, ground, compliance, ports),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
         G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
@@ -114,8 +138,15 @@ def pack_system(
         mass_shape=np.concatenate([np.zeros((3, 0)), *(_mass_rows(body) for body in bodies)], axis=1),
         mass_weights=np.concatenate([np.zeros(0), *(w for body in bodies for w in _mass_weights(body))]),
         total_mass=float(sum(body.integrals.m for body in bodies)),
+        gravity=np.array(mechanism.gravity, dtype=float),
     )
     return packed, tuple(labels)
+
+
+def _load_record(load: Load) -> dict[str, float]:
+    if isinstance(load, PointForce):
+        return {"fx": load.force[0], "fy": load.force[1]}
+    return {"torque": load.torque}
 
 
 def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
@@ -242,7 +273,7 @@ def _port_records(bodies, ports) -> NDArray[np.void]:
 
 
 def _row_records(
-    signals: list[int], ground: list[float], compliance: list[float], ports: list[list[dict]]
+    kinds: list[int], signals: list[int], ground: list[float], compliance: list[float], ports: list[list[dict]]
 ) -> NDArray[np.void]:
     """Constraint rows with the envelope of the Schur complement: rows of one body are coupled."""
     first = list(range(len(signals)))
@@ -255,6 +286,7 @@ def _row_records(
     for row, (signal, value) in enumerate(zip(signals, ground, strict=True)):
         values.append(
             {
+                "kind": kinds[row],
                 "signal": signal,
                 "ground": value,
                 "compliance": compliance[row],

@@ -13,7 +13,7 @@ from paraflex.dynamics.signals import constant_signals, pack_signals
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.bodies import body_terms
-from paraflex.kernel.packed import Signals, make_point_scratch
+from paraflex.kernel.packed import CONSTRAINT, Signals, make_point_scratch
 from paraflex.mechanism import Assembly
 
 _MAX_ITERATIONS = 50
@@ -68,7 +68,7 @@ def redundant_rows(system: System, q: NDArray[np.float64], threshold: float = DE
     """
     if system.n_constraints == 0:
         return []
-    rigid = np.nonzero(system.packed.rows["compliance"] == 0.0)[0]
+    rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
     factors = scipy.linalg.qr(system.jacobian(q)[rigid].T, mode="r", pivoting=True)
     size, order = np.abs(np.diag(factors[0])), factors[-1]
     rank = int(np.sum(size > threshold * size.max(initial=0.0)))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
 from paraflex.dynamics.packing import pack_system, row_order
 from paraflex.kernel.joints import constraint_values, fill_jacobian
-from paraflex.kernel.packed import PackedSystem, Signals, Workspace, make_workspace
+from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_workspace
 from paraflex.mechanism import Mechanism, PointRef
 
 
@@ -41,13 +41,13 @@ class System:
 
     @property
     def m(self) -> int:
-        """Number of multipliers: constraint rows and springs."""
+        """Number of multipliers: constraint rows, springs and dampers."""
         return len(self.rows)
 
     @property
     def n_constraints(self) -> int:
-        """Number of rows that are constraints: those of springs are not."""
-        return int(np.sum(self.packed.rows["compliance"] == 0.0))
+        """Number of rows that are constraints: those of springs and dampers are not."""
+        return int(np.sum(self.packed.rows["kind"] == CONSTRAINT))
 
     @property
     def n_flexible(self) -> int:

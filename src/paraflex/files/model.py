@@ -17,6 +17,7 @@ from paraflex.files.read import read_toml, validate
 from paraflex.files.schema import (
     BeamTable,
     CircleTable,
+    ForceTable,
     GeneralSectionTable,
     LineTable,
     ModelTable,
@@ -24,25 +25,30 @@ from paraflex.files.schema import (
     PointsTable,
     PolygonTable,
     RigidTable,
+    TorqueTable,
 )
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
     ActuationMode,
+    AppliedTorque,
     Assembly,
     Body,
     Curvature,
     EndEffector,
     FlexibleBeam,
     Geometry,
+    Load,
     LumpedMass,
     Material,
     Mechanism,
     Motor,
+    PointForce,
     PointRef,
     PrescribedAngle,
     RevoluteJoint,
     RigidBody,
     Section,
+    TorsionalDamper,
     TorsionalSpring,
     parse_mode,
 )
@@ -248,12 +254,22 @@ def _mechanism(table: ModelTable) -> Mechanism:
         springs=tuple(
             TorsionalSpring(name, entry.joint, entry.stiffness, entry.rest) for name, entry in table.spring.items()
         ),
+        dampers=tuple(TorsionalDamper(name, entry.joint, entry.coefficient) for name, entry in table.damper.items()),
+        loads=tuple(_load(name, load) for name, load in table.load.items()),
+        gravity=(table.gravity[0], table.gravity[1]),
         end_effector=None
         if effector is None
         else EndEffector(PointRef.parse(effector.point, "end_effector.point"), tuple(effector.coordinates)),
         assemblies=tuple(Assembly(name, angles) for name, angles in table.assembly.items()),
         modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
     )
+
+
+def _load(name: str, load: ForceTable | TorqueTable) -> Load:
+    point = PointRef.parse(load.point, f"load.{name}.point")
+    if isinstance(load, TorqueTable):
+        return AppliedTorque(name, point, load.torque)
+    return PointForce(name, point, (load.force[0], load.force[1]))
 
 
 def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:

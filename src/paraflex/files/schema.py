@@ -94,6 +94,29 @@ class SpringTable(_Table):
     rest: Number = Field(default=0.0, description="the joint's angle at which the spring is free in rad")
 
 
+class DamperTable(_Table):
+    """A torsional damper at a joint."""
+
+    joint: Text = Field(description="the name of a joint")
+    coefficient: Number = Field(description="the coefficient in N m s/rad")
+
+
+class ForceTable(_Table):
+    """A constant force."""
+
+    type: Literal["force"] = Field(description='"force" or "torque"')
+    point: Text = Field(description='"body.point"')
+    force: Pair = Field(description="[x, y] in the ground frame in N")
+
+
+class TorqueTable(_Table):
+    """A constant torque."""
+
+    type: Literal["torque"] = Field(description='"force" or "torque"')
+    point: Text = Field(description='"body.point"')
+    torque: Number = Field(description="the torque in N m")
+
+
 class EndEffectorTable(_Table):
     """The point that is to follow a path."""
 
@@ -172,6 +195,9 @@ class ModelTable(_Table):
     motor: dict[str, Text] = Field(default={}, description="the joint of each motor")
     prescribed: dict[str, PrescribedTable] = {}
     spring: dict[str, SpringTable] = {}
+    damper: dict[str, DamperTable] = {}
+    load: dict[str, Annotated[ForceTable | TorqueTable, Field(discriminator="type")]] = {}
+    gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
     end_effector: EndEffectorTable | None = None
     assembly: dict[str, dict[str, Number]] = Field(
         default={}, description="approximate angles of all bodies in rad for each assembly"

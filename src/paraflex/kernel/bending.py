@@ -18,13 +18,14 @@ W0, W1, W2, AXIAL = range(4)
 
 @routine
 def bent_equations(p, i, q, v, a, f, points):
-    """M q'' + h + K u of body i into f, and the axial inertia force at its Gauss points into `points`."""
+    """M q'' + h + K u of body i, less its weight, into f; axial inertia forces at Gauss points into `points`."""
     body = p.bodies[i]
     o, n = body.offset, body.nf
     e = o + 3
     c, s = cos(q[o + 2]), sin(q[o + 2])
     w, dw = v[o + 2], a[o + 2]
-    ax, ay = c * a[o] + s * a[o + 1], c * a[o + 1] - s * a[o]
+    gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
+    ax, ay = c * gx + s * gy, c * gy - s * gx
     for j in range(body.slopes):
         h = p.masses[body.mass + j].shape
         s0, s1, s2 = 0.0, 0.0, 0.0
@@ -79,6 +80,23 @@ def bent_equations(p, i, q, v, a, f, points):
     f[o] = c * fx - s * fy
     f[o + 1] = s * fx + c * fy
     f[o + 2] = torque
+
+
+@routine
+def bent_shortening(p, i, q, points):
+    """Sum of m f/2 over the mass points of body i: by how much bending shifts its first moment along it."""
+    body = p.bodies[i]
+    for j in range(body.slopes):
+        h = p.masses[body.mass + j].shape
+        points[W0, j] = 0.0
+        for l in range(body.nf):
+            points[W0, j] += p.mass_shape[SLOPE, h + l] * q[body.offset + 3 + l]
+    total = 0.0
+    for k in range(body.mass, body.mass_end):
+        point = p.masses[k]
+        for j in range(point.reach):
+            total += 0.5 * point.mass * p.mass_weights[point.weights + j] * points[W0, j] * points[W0, j]
+    return total
 
 
 @routine

@@ -7,20 +7,23 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from paraflex.kernel.bending import bent_energy, bent_equations
+from paraflex.kernel.bending import bent_energy, bent_equations, bent_shortening
 from paraflex.kernel.compiling import inlined, kernel
+from paraflex.kernel.joints import apply_loads
 from paraflex.kernel.packed import GJ, I1, OMEGA2, S2X, S2Y
 
 
 @inlined
 def body_equations(p, i, q, v, a, f):
-    """M q'' + h + K u of body i into f; the translational part in the ground frame."""
+    """M q'' + h + K u of body i, less its weight, into f; the translational part in the ground frame."""
     body = p.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
     c, s = cos(q[o + 2]), sin(q[o + 2])
     w, dw = v[o + 2], a[o + 2]
-    ax, ay = c * a[o] + s * a[o + 1], c * a[o + 1] - s * a[o]
+    # Gravity acts as a frame that is accelerated upwards.
+    gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
+    ax, ay = c * gx + s * gy, c * gy - s * gx
     # First moments s, S2 u' and S2 u''.
     sx, sy, vx, vy, fx, fy = body.S1x, body.S1y, 0.0, 0.0, 0.0, 0.0
     i1u, i1v = 0.0, 0.0
@@ -65,7 +68,10 @@ def body_equations(p, i, q, v, a, f):
 
 @inlined
 def body_terms(p, i, q, v, a, f, points):
-    """M q'' + h + K u of body i into f; `points` is scratch of second-order geometry (Workspace.points), or None."""
+    """M q'' + h + K u of body i, less its weight, into f.
+
+    `points` is scratch of second-order geometry (Workspace.points), or None.
+    """
     if points is None:
         body_equations(p, i, q, v, a, f)
     elif p.bodies[i].slopes > 0:
@@ -76,10 +82,33 @@ def body_terms(p, i, q, v, a, f, points):
 
 @kernel
 def motion_forces(p, q, v, a, f, points):
-    """M q'' + h + K u of the whole system at every instant of a motion, all (instants, n)."""
+    """M q'' + h + K u of the whole system at every instant of a motion, less weight and loads: all (instants, n)."""
     for k in range(q.shape[0]):
         for i in range(p.bodies.size):
             body_terms(p, i, q[k], v[k], a[k], f[k], points)
+        apply_loads(p, q[k], f[k])
+
+
+@kernel
+def weight_work(p, q, points):
+    """What gravity has done since all mass lay at the origin of the ground frame: g . sum m p."""
+    total = 0.0
+    if p.gravity[0] == 0.0 and p.gravity[1] == 0.0:
+        return total
+    for i in range(p.bodies.size):
+        body = p.bodies[i]
+        o, k = body.offset, body.flex
+        sx, sy = body.S1x, body.S1y
+        for j in range(body.nf):
+            sx += p.modal[S2X, k + j] * q[o + 3 + j]
+            sy += p.modal[S2Y, k + j] * q[o + 3 + j]
+        if points is not None:
+            if body.slopes > 0:
+                sx -= bent_shortening(p, i, q, points)
+        c, s = cos(q[o + 2]), sin(q[o + 2])
+        total += p.gravity[0] * (body.m * q[o] + c * sx - s * sy)
+        total += p.gravity[1] * (body.m * q[o + 1] + s * sx + c * sy)
+    return total
 
 
 @inlined

@@ -12,7 +12,7 @@ from math import cos, sin
 
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.packed import ANGLE, NX, NY, SLOPE
+from paraflex.kernel.packed import ANGLE, CONSTRAINT, DAMPER, NX, NY, SLOPE, SPRING
 from paraflex.kernel.signals import evaluate_signal
 
 
@@ -148,10 +148,10 @@ def start_rows(p, signals, t, weight_v, weight_q, rows):
 
 
 @routine
-def add_springs(p, lam, rows):
-    """Rows of springs before any body: less the rest angle, less compliance times the torque."""
+def start_compliant_rows(p, lam, rows):
+    """Rows of springs and dampers before any body: less the rest angle, less compliance times the torque."""
     for r in range(p.rows.size):
-        if p.rows[r].compliance > 0.0:
+        if p.rows[r].kind != CONSTRAINT:
             rows[r] = p.rows[r].ground - p.rows[r].compliance * lam[r]
 
 
@@ -160,8 +160,42 @@ def spring_energy(p, lam):
     """Energy of the springs by their torques."""
     energy = 0.0
     for r in range(p.rows.size):
-        energy += 0.5 * p.rows[r].compliance * lam[r] * lam[r]
+        if p.rows[r].kind == SPRING:
+            energy += 0.5 * p.rows[r].compliance * lam[r] * lam[r]
     return energy
+
+
+@routine
+def damper_power(p, lam):
+    """What the dampers take, by their torques."""
+    power = 0.0
+    for r in range(p.rows.size):
+        if p.rows[r].kind == DAMPER:
+            power += p.rows[r].compliance * lam[r] * lam[r]
+    return power
+
+
+@routine
+def apply_loads(p, q, f):
+    """Subtract the generalised forces of constant loads from f."""
+    for k in range(p.loads.size):
+        load = p.loads[k]
+        marker = p.markers[load.marker]
+        _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
+        apply_force(p, marker, q, -load.fx, -load.fy, rx, ry, f)
+        apply_torque(p, marker, -load.torque, f)
+
+
+@routine
+def load_power(p, q, v):
+    """Power of constant loads."""
+    power = 0.0
+    for k in range(p.loads.size):
+        load = p.loads[k]
+        marker = p.markers[load.marker]
+        _, _, vx, vy, _, _, _, _ = marker_motion(p, marker, q, v, v)
+        power += load.fx * vx + load.fy * vy + load.torque * marker_angle(p, marker, v)
+    return power
 
 
 @inlined
@@ -173,8 +207,10 @@ def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
         marker = p.markers[port.marker]
         r, sign = port.row, port.sign
         if port.kind == ANGLE:
-            if p.rows[r].compliance > 0.0:
+            if p.rows[r].kind == SPRING:
                 rows[r] += sign * marker_angle(p, marker, q)
+            elif p.rows[r].kind == DAMPER:
+                rows[r] += sign * marker_angle(p, marker, v)
             else:
                 rows[r] += sign * (
                     marker_angle(p, marker, a)
@@ -200,10 +236,10 @@ def body_efforts(p, i, torques, f):
 
 @kernel
 def constraint_values(p, signals, t, q, v, phi, dphi):
-    """Phi and Phi' at (t, q, v), into phi and dphi; zero for springs."""
+    """Phi and Phi' at (t, q, v), into phi and dphi; zero for springs and dampers."""
     for r in range(p.rows.size):
         row = p.rows[r]
-        phi[r], dphi[r] = row.ground if row.compliance == 0.0 else 0.0, 0.0
+        phi[r], dphi[r] = row.ground if row.kind == CONSTRAINT else 0.0, 0.0
         if row.signal >= 0:
             value, rate, _ = evaluate_signal(signals, row.signal, t)
             phi[r] -= value
@@ -212,7 +248,7 @@ def constraint_values(p, signals, t, q, v, phi, dphi):
         port = p.ports[k]
         marker = p.markers[port.marker]
         r, sign = port.row, port.sign
-        if p.rows[r].compliance > 0.0:
+        if p.rows[r].kind != CONSTRAINT:
             continue
         if port.kind == ANGLE:
             phi[r] += sign * marker_angle(p, marker, q)
@@ -228,13 +264,13 @@ def constraint_values(p, signals, t, q, v, phi, dphi):
 
 @kernel
 def fill_jacobian(p, q, jacobian):
-    """Phi_q into a dense (rows, n) array, zero for springs; for closure and checks, not for the time loop."""
+    """Phi_q into a dense (rows, n) array, zero for springs and dampers; not for the time loop."""
     for r in range(p.rows.size):
         fill(jacobian[r], 0.0)
     for k in range(p.ports.size):
         port = p.ports[k]
         marker = p.markers[port.marker]
-        if p.rows[port.row].compliance > 0.0:
+        if p.rows[port.row].kind != CONSTRAINT:
             continue
         if port.kind == ANGLE:
             apply_torque(p, marker, port.sign, jacobian[port.row])

@@ -16,7 +16,25 @@ from paraflex.kernel.arrays import fill
 from paraflex.kernel.bending import bent_mass_square, bent_mass_times, factor_bent, solve_bent
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import marker_shape, marker_shortening, shorten
-from paraflex.kernel.packed import ANGLE, DINV, GJ, I1, MPF, NX, NY, OMEGA2, POINT, S2X, S2Y, SLOPE, YP, YX, YY
+from paraflex.kernel.packed import (
+    ANGLE,
+    CONSTRAINT,
+    DINV,
+    GJ,
+    I1,
+    MPF,
+    NX,
+    NY,
+    OMEGA2,
+    POINT,
+    S2X,
+    S2Y,
+    SLOPE,
+    SPRING,
+    YP,
+    YX,
+    YY,
+)
 
 # A pivot smaller than this fraction of its diagonal entry marks a constraint row that depends on those before it.
 DEPENDENT_ROW = 1e-12
@@ -227,6 +245,15 @@ def factor_bodies(p, b, q, ws):
         body_jacobian(p, i, q, ws)
 
 
+@inlined
+def row_scale(p, r, ws, scale):
+    """What makes the iteration matrix symmetric: scale for a constraint, 1/b for a spring and 1/g for a damper."""
+    kind = p.rows[r].kind
+    if kind == SPRING:
+        return 1.0 / ws.step[0]
+    return scale if kind == CONSTRAINT else 1.0 / sqrt(ws.step[0])
+
+
 @kernel
 def orient(p, q, ws):
     """Turn the factored bodies to their angles in q and factor the Schur complement; number of dependent rows."""
@@ -236,8 +263,8 @@ def orient(p, q, ws):
         ws.frame[i, 0], ws.frame[i, 1] = cos(phi), sin(phi)
         add_schur(p, i, ws)
     for r in range(p.rows.size):
-        if p.rows[r].compliance > 0.0:
-            ws.schur[p.rows[r].start + r - p.rows[r].first] += p.rows[r].compliance / ws.step[0]
+        if p.rows[r].kind != CONSTRAINT:
+            ws.schur[p.rows[r].start + r - p.rows[r].first] += p.rows[r].compliance * row_scale(p, r, ws, 1.0)
     return factor_schur(p, ws)
 
 
@@ -266,13 +293,17 @@ def to_ground_frame(p, i, ws, x):
 
 @inlined
 def jacobian_times(p, i, ws, x, scale, spring_scale, rows):
-    """Add scale * J x of body i to rows, or spring_scale * J x to those of springs; x in the body frame."""
+    """Add scale * J x of body i to rows, spring_scale * J x to those of springs, nothing to those of dampers.
+
+    x stands in the body frame.
+    """
     body = p.bodies[i]
     o, width = body.offset, 3 + body.nf
     c, s = ws.frame[i, 0], ws.frame[i, 1]
     for k in range(body.port, body.port_end):
         port = p.ports[k]
-        factor = port.sign * (scale if p.rows[port.row].compliance == 0.0 else spring_scale)
+        kind = p.rows[port.row].kind
+        factor = port.sign * (scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else 0.0))
         d0, d1 = 0.0, 0.0
         for j in range(width):
             d0 += ws.jac[port.jac + j] * x[o + j]
@@ -308,7 +339,7 @@ def subtract_reactions(p, i, ws, mu, x):
 def solve_system(p, ws, x, mu):
     """Solve [M + b K, Phi_q^T; Phi_q, -C/b] [x; mu] = [x; mu] in place; x in the ground frame.
 
-    C holds the compliance of springs, zero for constraints.
+    C holds the compliance of springs, zero for constraints; for dampers it is -C/g.
     """
     for r in range(mu.size):
         mu[r] = -mu[r]
@@ -324,11 +355,11 @@ def solve_system(p, ws, x, mu):
 
 @routine
 def right_hand_side(p, ws, scale):
-    """-f and -rows as the right-hand side of `solve_system`; constraint rows times scale, those of springs over b."""
+    """-f and -rows as the right-hand side of `solve_system`; rows times their `row_scale`."""
     for j in range(ws.f.size):
         ws.x[j] = -ws.f[j]
     for r in range(ws.rows.size):
-        ws.mu[r] = -ws.rows[r] * (scale if p.rows[r].compliance == 0.0 else 1.0 / ws.step[0])
+        ws.mu[r] = -ws.rows[r] * row_scale(p, r, ws, scale)
 
 
 @inlined

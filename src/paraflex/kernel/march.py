@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from paraflex.kernel.arrays import copy
-from paraflex.kernel.bodies import system_energy
+from paraflex.kernel.bodies import system_energy, weight_work
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import constraint_values, spring_energy
 from paraflex.kernel.linear import factor_system, right_hand_side, solve_system
@@ -25,6 +25,7 @@ from paraflex.kernel.run_state import (
     STEPS,
     STOP,
     TIME,
+    WEIGHT_0,
     WORK,
 )
 from paraflex.kernel.stage import equations
@@ -75,6 +76,7 @@ def write_samples(p, tableau, t, h, m, ws, out):
         out.energy[i, 2] = m.clock[WORK] + h * done * (
             (1.0 - 0.5 * done) * m.power[0] + 0.5 * done * m.power[m.power.size - 1]
         )
+        out.energy[i, 2] += weight_work(p, out.q[i], ws.points) - m.clock[WEIGHT_0]
         i += 1
     m.counts[SAMPLE] = i
 
@@ -111,6 +113,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
     strain += spring_energy(p, lam)
     m.clock[ENERGY_0] = kinetic + strain
+    m.clock[WEIGHT_0] = weight_work(p, m.q, ws.points)
     note_constraints(p, signals, t, m, ws)
     if out.times.size > 0 and out.times[0] <= t:
         copy(m.q, out.q[0])
@@ -154,7 +157,8 @@ def accept(p, signals, tableau, t, h, m, ws, out):
     m.counts[FAILURES] = 0
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
     strain += spring_energy(p, m.stage_lam[0])
-    balance = abs(kinetic + strain - m.clock[ENERGY_0] - m.clock[WORK])
+    done = m.clock[WORK] + weight_work(p, m.q, ws.points) - m.clock[WEIGHT_0]
+    balance = abs(kinetic + strain - m.clock[ENERGY_0] - done)
     m.clock[BALANCE] = max(m.clock[BALANCE], balance)
     note_constraints(p, signals, t + h, m, ws)
 

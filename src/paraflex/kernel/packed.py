@@ -18,6 +18,8 @@ S2X, S2Y, I1, GJ, OMEGA2 = range(5)
 NX, NY, SLOPE = range(3)
 # Kinds of port.
 POINT, ANGLE = range(2)
+# Kinds of row: Phi = 0, or a multiplier that is the torque of a spring or of a damper.
+CONSTRAINT, SPRING, DAMPER = range(3)
 # Rows of Workspace.flex: M_phif, 1/(1 + b omega^2), and B D^-1 of the three rigid rows.
 MPF, DINV, YX, YY, YP = range(5)
 
@@ -78,11 +80,22 @@ PORT = np.dtype(
     align=True,
 )
 EFFORT = np.dtype([("marker", np.int64), ("signal", np.int64), ("sign", np.float64)], align=True)
+LOAD = np.dtype(
+    [
+        ("marker", np.int64),
+        ("fx", np.float64),  # in the ground frame
+        ("fy", np.float64),
+        ("torque", np.float64),
+    ],
+    align=True,
+)
 ROW = np.dtype(
     [
+        ("kind", np.int64),
         ("signal", np.int64),  # prescribed value in time, -1 for none
         ("ground", np.float64),  # what points on the ground contribute to Phi, less the rest angle of a spring
-        ("compliance", np.float64),  # of a spring: its row is angle - rest = compliance * lambda; else zero
+        # Of a spring, angle - rest = compliance * lambda; of a damper, rate = compliance * lambda; else zero.
+        ("compliance", np.float64),
         ("first", np.int64),  # first column of the row in the envelope of the Schur complement
         ("start", np.int64),  # and where that column is stored
     ],
@@ -97,6 +110,7 @@ class PackedSystem(NamedTuple):
     markers: NDArray[np.void]
     ports: NDArray[np.void]
     efforts: NDArray[np.void]
+    loads: NDArray[np.void]
     rows: NDArray[np.void]
     modal: NDArray[np.float64]  # (5, total nf): S2x, S2y, I1, G1 + Jf, omega^2
     I2: NDArray[np.float64]  # nf x nf of every body, row by row
@@ -108,6 +122,7 @@ class PackedSystem(NamedTuple):
     mass_shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every mass point
     mass_weights: NDArray[np.float64]
     total_mass: float
+    gravity: NDArray[np.float64]  # (2,) in the ground frame
 
 
 class Signals(NamedTuple):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 # Why `march` returned.
 PAUSED, FINISHED, NO_CONVERGENCE, SINGULAR, NOT_FINITE, ERROR_TEST = range(6)
 # March.clock
-TIME, STEP, WORK, FACTOR_G, RATE, ENERGY_0, BALANCE, PHI_MAX, DPHI_MAX = range(9)
+TIME, STEP, WORK, FACTOR_G, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX = range(10)
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES = range(8)
 
@@ -78,7 +78,7 @@ class Samples(NamedTuple):
 def make_march(n: int, m: int, stages: int, motors: int) -> March:
     """Allocate the state of a run with n coordinates and m constraint rows."""
     return March(
-        clock=np.zeros(9),
+        clock=np.zeros(10),
         counts=np.zeros(8, dtype=np.int64),
         q=np.zeros(n),
         v=np.zeros(n),

@@ -16,7 +16,7 @@ from math import isfinite
 
 from paraflex.kernel.bodies import body_terms
 from paraflex.kernel.compiling import kernel, routine
-from paraflex.kernel.joints import add_springs, body_efforts, body_joints, start_rows
+from paraflex.kernel.joints import apply_loads, body_efforts, body_joints, start_compliant_rows, start_rows
 from paraflex.kernel.linear import mass_norm, right_hand_side, solve_system
 from paraflex.kernel.signals import evaluate_signal
 
@@ -35,11 +35,12 @@ def equations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
     for k in range(torques.size):
         torques[k] = evaluate_signal(signals, k, t)[0]
     start_rows(p, signals, t, weight_v, weight_q, ws.rows)
-    add_springs(p, lam, ws.rows)
+    start_compliant_rows(p, lam, ws.rows)
     for i in range(p.bodies.size):
         body_terms(p, i, q, v, a, ws.f, ws.points)
         body_joints(p, i, q, v, a, lam, weight_v, weight_q, ws.f, ws.rows)
         body_efforts(p, i, torques, ws.f)
+    apply_loads(p, q, ws.f)
 
 
 @routine

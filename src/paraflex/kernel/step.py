@@ -13,7 +13,7 @@ from math import isfinite
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.bending import note_all_axial_forces, subtract_geometric
 from paraflex.kernel.compiling import routine
-from paraflex.kernel.joints import marker_angle
+from paraflex.kernel.joints import damper_power, load_power, marker_angle
 from paraflex.kernel.linear import (
     factor_bodies,
     factor_system,
@@ -49,8 +49,8 @@ SLOW_AGE = 25
 
 @routine
 def input_power(p, signals, t, q, v, lam, torques):
-    """Power of the motors and of prescribed motion."""
-    total = 0.0
+    """Power of the motors, of prescribed motion and of loads, less what dampers take."""
+    total = load_power(p, q, v) - damper_power(p, lam)
     for k in range(p.efforts.size):
         effort = p.efforts[k]
         total += effort.sign * torques[effort.signal] * marker_angle(p, p.markers[effort.marker], v)
@@ -97,7 +97,7 @@ def filtered_error(p, tableau, h, controls, m, ws, slow):
 
     With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
     (M + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
-    and for springs J eps_v - C mu / b = -J e_q / g, with b = g^2.
+    for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2.
     """
     stages = tableau.c.size
     g = tableau.A[stages - 1, stages - 1] * h

@@ -11,6 +11,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import mesh_beam
 from paraflex.mechanism.bodies import Body, RigidBody
 from paraflex.mechanism.joints import GROUND, PointRef
+from paraflex.mechanism.loads import PointForce
 
 if TYPE_CHECKING:
     from paraflex.mechanism.mechanism import Mechanism
@@ -31,6 +32,7 @@ def check_mechanism(mechanism: Mechanism) -> None:
     check_references(mechanism)
     check_connected(mechanism)
     check_task(mechanism)
+    check_loads(mechanism)
 
 
 def check_names(mechanism: Mechanism) -> None:
@@ -41,6 +43,8 @@ def check_names(mechanism: Mechanism) -> None:
         "motor": mechanism.motors,
         "prescribed": mechanism.prescribed,
         "spring": mechanism.springs,
+        "damper": mechanism.dampers,
+        "load": mechanism.loads,
         "assembly": mechanism.assemblies,
         "mode": mechanism.modes,
     }
@@ -128,6 +132,10 @@ def check_references(mechanism: Mechanism) -> None:
         _known(spring.joint, joints, f"{field}.joint", "joint")
         _positive(spring.stiffness, f"{field}.stiffness", "N m/rad")
         _finite([spring.rest], f"{field}.rest")
+    for damper in mechanism.dampers:
+        field = f"damper.{damper.name}"
+        _known(damper.joint, joints, f"{field}.joint", "joint")
+        _positive(damper.coefficient, f"{field}.coefficient", "N m s/rad")
     for mode in mechanism.modes:
         for name in mode.motors:
             _known(name, motors, f"mode.{mode.name}", "motor")
@@ -184,6 +192,22 @@ def check_task(mechanism: Mechanism) -> None:
             value=list(coordinates),
             remedy='choose from "x", "y", "angle", each once',
         )
+
+
+def check_loads(mechanism: Mechanism) -> None:
+    """Loads are finite and act on bodies; so is gravity."""
+    _finite(mechanism.gravity, "gravity")
+    for load in mechanism.loads:
+        field = f"load.{load.name}"
+        _known_point(mechanism, load.point, f"{field}.point")
+        if load.point.on_ground:
+            raise InputError(
+                "the ground does not move", field=f"{field}.point", value=str(load.point), remedy="name a body's point"
+            )
+        if isinstance(load, PointForce):
+            _finite(load.force, f"{field}.force")
+        else:
+            _finite([load.torque], f"{field}.torque")
 
 
 def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:

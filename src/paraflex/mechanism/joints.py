@@ -95,19 +95,6 @@ class PrescribedAngle:
 
 
 @dataclass(frozen=True)
-class TorsionalSpring:
-    """A linear spring at a revolute joint: torque -stiffness (angle of body b less that of body a, less rest) on b.
-
-    Like a motor it acts on the material at the joint. Stiffness in N m/rad, rest in rad.
-    """
-
-    name: str
-    joint: str
-    stiffness: float
-    rest: float = 0.0
-
-
-@dataclass(frozen=True)
 class Motor:
     """A motor at a revolute joint; positive torque turns body b of the joint relative to body a.
 

@@ -10,7 +10,8 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint, TorsionalSpring
+from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint
+from paraflex.mechanism.loads import Load, TorsionalDamper, TorsionalSpring
 
 TASK_COORDINATES = ("x", "y", "angle")
 # The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
@@ -74,6 +75,10 @@ class Mechanism:
     prescribed : tuple of PrescribedAngle
         Joint angles given in time.
     springs : tuple of TorsionalSpring
+    dampers : tuple of TorsionalDamper
+    loads : tuple of PointForce or AppliedTorque
+    gravity : (x, y)
+        Acceleration of free fall in the ground frame [m/s^2]; none by default.
     end_effector : EndEffector, optional
     assemblies : tuple of Assembly
         The first is the default.
@@ -99,6 +104,9 @@ class Mechanism:
     assemblies: tuple[Assembly, ...] = ()
     modes: tuple[ActuationMode, ...] = ()
     springs: tuple[TorsionalSpring, ...] = ()
+    dampers: tuple[TorsionalDamper, ...] = ()
+    loads: tuple[Load, ...] = ()
+    gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.LINEAR
     description: str = field(default="", compare=False)
 

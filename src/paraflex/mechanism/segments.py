@@ -9,7 +9,8 @@ from math import ceil
 
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody
-from paraflex.mechanism.joints import PointRef, RevoluteJoint, TorsionalSpring
+from paraflex.mechanism.joints import PointRef, RevoluteJoint
+from paraflex.mechanism.loads import TorsionalSpring
 from paraflex.mechanism.mechanism import Mechanism
 
 # Points at which segments hang together.
@@ -101,6 +102,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         bodies=tuple(bodies),
         joints=(*(replace(joint, a=moved(joint.a), b=moved(joint.b)) for joint in mechanism.joints), *joints),
         springs=(*mechanism.springs, *springs),
+        loads=tuple(replace(load, point=moved(load.point)) for load in mechanism.loads),
         end_effector=None if effector is None else replace(effector, point=moved(effector.point)),
         assemblies=tuple(
             replace(assembly, angles={name: assembly.angles[carrier] for name, (carrier, _) in carriers.items()})

@@ -1,0 +1,53 @@
+"""What acts on a mechanism besides its motors: springs and dampers at joints, forces and torques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from paraflex.mechanism.joints import PointRef
+
+
+@dataclass(frozen=True)
+class TorsionalSpring:
+    """A linear spring at a revolute joint: torque -stiffness (angle of body b less that of body a, less rest) on b.
+
+    Like a motor it acts on the material at the joint. Stiffness in N m/rad, rest in rad.
+    """
+
+    name: str
+    joint: str
+    stiffness: float
+    rest: float = 0.0
+
+
+@dataclass(frozen=True)
+class TorsionalDamper:
+    """Viscous friction at a revolute joint: torque -coefficient (rate of body b less that of body a) on b.
+
+    Like a motor it acts on the material at the joint. Coefficient in N m s/rad.
+    """
+
+    name: str
+    joint: str
+    coefficient: float
+
+
+@dataclass(frozen=True)
+class PointForce:
+    """A constant force [N] at a named point of a body, given in the ground frame."""
+
+    name: str
+    point: PointRef
+    force: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class AppliedTorque:
+    """A constant torque [N m] on the material at a named point of a body."""
+
+    name: str
+    point: PointRef
+    torque: float
+
+
+Load = PointForce | AppliedTorque
