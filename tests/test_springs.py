@@ -9,10 +9,8 @@ import scipy.optimize
 from paraflex.dynamics import State, build_system, consistent_state, pack_signals
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions, integrate
-from paraflex.kinematics import Line, follow_path
 from paraflex.mechanism import (
     Assembly,
-    EndEffector,
     FlexibleBeam,
     Material,
     Mechanism,
@@ -38,7 +36,6 @@ def pendulum(stiffness, rest=0.0, other=None, ground_first=True):
         joints=(RevoluteJoint("pin", *(sides if ground_first else sides[::-1])),),
         springs=(TorsionalSpring("spring", "pin", stiffness, rest),),
         assemblies=(Assembly("start", {"arm": 0.5}),),
-        end_effector=EndEffector(PointRef("arm", "B"), ("x",)),
     )
 
 
@@ -144,11 +141,6 @@ def test_springs_are_no_constraints():
     system = build_system(pendulum(30.0))
     assert (system.m, system.n_constraints) == (3, 2)
     assert "spring angle" in system.rows
-
-
-def test_planning_refuses_springs():
-    with pytest.raises(InputError, match="spring: torques along a path do not account for springs yet"):
-        follow_path(pendulum(30.0), Line((0.6, 0.3), (0.5, 0.3), 1.0), [0.0])
 
 
 @pytest.mark.parametrize(

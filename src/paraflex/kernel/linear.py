@@ -292,18 +292,15 @@ def to_ground_frame(p, i, ws, x):
 
 
 @inlined
-def jacobian_times(p, i, ws, x, scale, spring_scale, rows):
-    """Add scale * J x of body i to rows, spring_scale * J x to those of springs, nothing to those of dampers.
-
-    x stands in the body frame.
-    """
+def jacobian_times(p, i, ws, x, scale, spring_scale, damper_scale, rows):
+    """Add J x of body i to rows, times the scale of their kind; x in the body frame."""
     body = p.bodies[i]
     o, width = body.offset, 3 + body.nf
     c, s = ws.frame[i, 0], ws.frame[i, 1]
     for k in range(body.port, body.port_end):
         port = p.ports[k]
         kind = p.rows[port.row].kind
-        factor = port.sign * (scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else 0.0))
+        factor = port.sign * (scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else damper_scale))
         d0, d1 = 0.0, 0.0
         for j in range(width):
             d0 += ws.jac[port.jac + j] * x[o + j]
@@ -346,7 +343,7 @@ def solve_system(p, ws, x, mu):
     for i in range(p.bodies.size):
         to_body_frame(p, i, ws, x)
         solve_body(p, i, ws, ws.dense, x, x, p.bodies[i].offset)
-        jacobian_times(p, i, ws, x, 1.0, 1.0, mu)
+        jacobian_times(p, i, ws, x, 1.0, 1.0, 1.0, mu)
     solve_schur(p, ws, mu)
     for i in range(p.bodies.size):
         subtract_reactions(p, i, ws, mu, x)

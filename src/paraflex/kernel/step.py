@@ -134,8 +134,8 @@ def filter_error(p, g, controls, eq, ev, ws):
         body = p.bodies[i]
         to_body_frame(p, i, ws, ws.x)
         to_body_frame(p, i, ws, ws.f)
-        jacobian_times(p, i, ws, ws.x, 1.0 / scale, 0.0, ws.mu)
-        jacobian_times(p, i, ws, ws.f, -controls.beta * controls.beta * g / scale, -1.0 / g, ws.mu)
+        jacobian_times(p, i, ws, ws.x, 1.0 / scale, 0.0, 0.0, ws.mu)
+        jacobian_times(p, i, ws, ws.f, -controls.beta * controls.beta * g / scale, -1.0 / g, 0.0, ws.mu)
         mass_times(p, i, ws, ws.mass, ws.x)
         e = body.offset + 3
         for j in range(body.nf):

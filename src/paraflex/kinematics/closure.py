@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,10 @@ class RigidMotion:
 
     Attributes
     ----------
+    mechanism : Mechanism
+        Rigid.
     system : System
-        Rigid (RDM): three coordinates a body.
+        Of it, without its springs and dampers: three coordinates a body (RDM).
     path : Path
     t : (k,) array
         [s]
@@ -48,6 +50,7 @@ class RigidMotion:
         Velocities of all coordinates per unit of each task velocity: spans the null space of Phi_q.
     """
 
+    mechanism: Mechanism
     system: System
     path: Path
     t: NDArray[np.float64]
@@ -55,11 +58,6 @@ class RigidMotion:
     v: NDArray[np.float64]
     a: NDArray[np.float64]
     basis: NDArray[np.float64]
-
-    @property
-    def mechanism(self) -> Mechanism:
-        """The rigid mechanism."""
-        return self.system.mechanism
 
     @property
     def desired(self) -> PathMotion:
@@ -103,17 +101,10 @@ def follow_path(
     UnreachablePathError
         The path leaves the workspace or passes a Type I singularity: it names time and position.
     """
-    if mechanism.springs:
-        raise InputError(
-            "torques along a path do not account for springs yet",
-            field="spring",
-            value=mechanism.springs[0].name,
-            remedy="plan the motion of the mechanism without its springs",
-        )
-    system = build_system(mechanism.rigid())
+    rigid = mechanism.rigid()
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
-    closure = _Closure(system, orientation, float(np.max(times, initial=0.0)))
+    closure = _Closure(rigid, orientation, float(np.max(times, initial=0.0)))
     closure.check_degrees_of_freedom()
     chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
     times = np.ascontiguousarray(times, dtype=float)
@@ -127,10 +118,12 @@ def follow_path(
 class _Closure:
     """The rigid system with its task marker, for the functions above."""
 
-    def __init__(self, system: System, orientation: float, end: float) -> None:
-        effector = system.mechanism.end_effector
+    def __init__(self, mechanism: Mechanism, orientation: float, end: float) -> None:
+        effector = mechanism.end_effector
         assert effector is not None
-        self.system = system
+        self.mechanism = mechanism
+        # Springs and dampers do not constrain.
+        self.system = system = build_system(replace(mechanism, springs=(), dampers=()))
         self.orientation = orientation
         self.signals: Signals = pack_signals(
             system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), end + 1.0), end + 1.0
@@ -214,7 +207,9 @@ class _Closure:
             grid = np.concatenate([grid[last:index], between, grid[index:]])
             keep = np.concatenate([keep[last:index], np.zeros(between.size, bool), keep[index:]])
         stretches.append([x[:index][keep[:index]] for x in (grid, *found)])
-        motion = RigidMotion(self.system, path, *(np.concatenate(parts) for parts in zip(*stretches, strict=True)))
+        motion = RigidMotion(
+            self.mechanism, self.system, path, *(np.concatenate(parts) for parts in zip(*stretches, strict=True))
+        )
         if status == CLOSED:
             return motion
         what = (
