@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from conftest import make_five_bar
+from paraflex.engines import check_engine
+from paraflex.engines.exudyn import simulate_exudyn
 from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Line
 from paraflex.mechanism import (
+    AppliedTorque,
     FlexibleBeam,
     LumpedMass,
     Material,
@@ -22,6 +25,8 @@ from paraflex.mechanism import (
     RevoluteJoint,
     SampledAngle,
     Section,
+    TorsionalDamper,
+    TorsionalSpring,
     finite_segments,
     raparm_i,
 )
@@ -142,6 +147,43 @@ def test_a_prescribed_angle_is_refused_by_name(task):
     held = dataclasses.replace(task.mechanism, prescribed=(PrescribedAngle("clamp", "B2", still),))
     with pytest.raises(InputError, match=r"prescribed\.clamp: MuJoCo cannot express a prescribed angle"):
         simulate_mujoco(dataclasses.replace(task, mechanism=held), "++++")
+
+
+@pytest.mark.parametrize("simulate", [simulate_mujoco, simulate_exudyn], ids=["mujoco", "exudyn"])
+def test_weight_bends_a_mechanism_alike(simulate):
+    path = Line((0.0, 0.30), (0.04, 0.27), 20.0)
+    mechanism = dataclasses.replace(soft_five_bar(), gravity=(2.0, -9.81)).with_geometry("second-order")
+    task = plan_tracking(mechanism, path, duration=0.12, samples=25)
+    model = task.in_segments(5) if simulate is simulate_mujoco else task.remodelled(mechanism.refined(2))
+    theirs = simulate(model, "++--")
+    ours = record(model.simulate("++--", options=IntegrationOptions(tolerance=2e-6)))
+    deflection = np.abs(ours.tip).max()
+    light = plan_tracking(soft_five_bar(), path, duration=0.12, samples=25)
+    assert np.abs(deflection / np.abs(record(light.simulate("++--")).tip).max() - 1.0) > 0.1
+    np.testing.assert_allclose(theirs.end_effector.position, ours.end_effector.position, rtol=0, atol=3e-3 * deflection)
+    # Weights do work on the way, and the torques carry them.
+    assert np.abs(theirs.work - ours.work).max() < 2e-3 * np.ptp(ours.work)
+    assert theirs.figures["energy_balance_max"] < 2e-3 * np.ptp(ours.work)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "exudyn"])
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"dampers": (TorsionalDamper("oil", "B1", 0.1),)}, r"damper\.oil: \w+ cannot express a damper"),
+        ({"loads": (AppliedTorque("drag", PointRef("distal1", "C"), 1.0),)}, r"load\.drag: \w+ cannot express a load"),
+    ],
+)
+def test_what_an_adapter_has_not_is_refused_by_name(engine, changes, says):
+    with pytest.raises(InputError, match=says):
+        check_engine(engine, dataclasses.replace(soft_five_bar(), **changes))
+
+
+def test_springs_all_round_a_loop_are_too_many_for_a_tree():
+    springs = tuple(TorsionalSpring(name, name, 1.0) for name in ("A1", "A2", "B1", "B2", "C"))
+    with pytest.raises(InputError, match=r"spring\.C: MuJoCo cannot express a spring where a loop closes"):
+        check_engine("mujoco", dataclasses.replace(soft_five_bar(), springs=springs))
+    check_engine("exudyn", dataclasses.replace(soft_five_bar(), springs=springs))
 
 
 def test_an_engine_that_is_not_installed_names_the_extra(task, monkeypatch):

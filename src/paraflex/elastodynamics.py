@@ -78,7 +78,7 @@ def simulate_ked(
     Raises
     ------
     InputError
-        Springs, a step that is not positive, or a spectral radius outside [0, 1].
+        Springs or dampers, a step that is not positive, or a spectral radius outside [0, 1].
     ActuationError, SingularActuationError
         The mode cannot drive the mechanism along the path.
     IntegrationError
@@ -123,13 +123,14 @@ def simulate_ked(
 
 
 def _check(task: TrackingTask, step: float, spectral_radius: float) -> None:
-    if task.mechanism.springs:
-        raise InputError(
-            "kineto-elastodynamics does not account for springs",
-            field="spring",
-            value=task.mechanism.springs[0].name,
-            remedy="use the task of the mechanism itself, not in segments",
-        )
+    for kind, members in (("spring", task.mechanism.springs), ("damper", task.mechanism.dampers)):
+        for member in members:
+            raise InputError(
+                f"kineto-elastodynamics does not account for {kind}s",
+                field=kind,
+                value=member.name,
+                remedy="leave it out; of finite segments use the task they were cut from",
+            )
     if not (math.isfinite(step) and step > 0.0):
         raise InputError("must be positive", field="step", value=step, remedy="give a time in seconds, say 1e-4")
     if not 0.0 <= spectral_radius <= 1.0:

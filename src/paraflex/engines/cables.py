@@ -153,6 +153,20 @@ class RigidLink:
         """Nothing bends."""
         return np.zeros((history.t.size, 3))
 
+    @property
+    def masses(self) -> tuple[int, ...]:
+        """The engine's objects that have mass along them."""
+        return (self.item,)
+
+    @property
+    def lumped(self) -> list[tuple[dict[str, Any], float]]:
+        """Places and masses of what is lumped besides: nothing."""
+        return []
+
+    def weighted(self, history: History) -> Array:
+        """Sum of mass times position (k, 2) [kg m]."""
+        return self.mass * history.states[0][:, self.columns[:2]]
+
     def kinetic_energy(self, history: History) -> Array:
         """Of the body [J]."""
         return 0.5 * history.states[1][:, self.columns] ** 2 @ [self.mass, self.mass, self.inertia]
@@ -194,7 +208,9 @@ class Cable:
 
     def place(self, point: str) -> dict[str, Any]:
         """Where a named point is, in the words of Exudyn's markers."""
-        node = self.points[point]
+        return self._at(self.points[point])
+
+    def _at(self, node: int) -> dict[str, Any]:
         element = min(node, self.mesh.n_elements - 1)
         along = float(self.mesh.nodes[node] - self.mesh.nodes[element])
         return {"bodyNumber": self.items[element], "localPosition": [along, 0.0, 0.0]}
@@ -222,6 +238,22 @@ class Cable:
         c, s = np.cos(phi), np.sin(phi)
         slope = self._tangent(-1, history).angle - phi
         return np.column_stack([c * x + s * y - self.mesh.length, c * y - s * x, slope])
+
+    @property
+    def masses(self) -> tuple[int, ...]:
+        """The engine's objects that have mass along them."""
+        return self.items
+
+    @property
+    def lumped(self) -> list[tuple[dict[str, Any], float]]:
+        """Places and masses of the lumps."""
+        return [(self._at(node), float(mass)) for node, (mass, _) in enumerate(self.lumps) if mass > 0.0]
+
+    def weighted(self, history: History) -> Array:
+        """Sum of mass times position (k, 2) [kg m]."""
+        q = history.states[0][:, self.columns]
+        weights, rows = self._quadrature(_MASS_POINTS, 0)
+        return self.span.mass_per_length * (weights @ (rows @ q)) + self.lumps[:, 0] @ q[:, ::2]
 
     def kinetic_energy(self, history: History) -> Array:
         """1/2 int rho A |r_t|^2 dx, and the lumps' 1/2 m |r_t|^2 + 1/2 J |r'_t|^2 [J]."""

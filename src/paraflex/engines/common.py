@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 
@@ -26,6 +27,15 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     """
     for prescribed in mechanism.prescribed:
         refuse(_PRINTED[name], "a prescribed angle", f"prescribed.{prescribed.name}")
+    for damper in mechanism.dampers:
+        refuse(_PRINTED[name], "a damper", f"damper.{damper.name}")
+    for load in mechanism.loads:
+        refuse(_PRINTED[name], "a load", f"load.{load.name}")
+    if name == "mujoco":
+        closing = {joint.name for joint in spanning_tree(mechanism).closing}
+        for spring in mechanism.springs:
+            if spring.joint in closing:
+                refuse("MuJoCo", "a spring where a loop closes", f"spring.{spring.name}")
     import_engine(name)
 
 
@@ -46,7 +56,7 @@ def import_engine(name: str) -> Any:
 
 
 def refuse(engine: str, what: str, field: str) -> NoReturn:
-    """Say that an engine cannot express a part of a mechanism.
+    """Say that an engine, as we drive it, cannot express a part of a mechanism.
 
     Raises
     ------

@@ -187,9 +187,24 @@ def _build(engine: _Engine, task: TrackingTask, refinement: int) -> _Model:
     loads = [_add_motor(engine, linkage, mechanism.joint(motor.joint)) for motor in mechanism.motors]
     for spring in mechanism.springs:
         _add_spring(engine, linkage, mechanism.joint(spring.joint), spring)
+    _add_gravity(engine, linkage, mechanism)
     engine.mbs.Assemble()
     rows = [engine.mbs.systemData.GetObjectLTGAE(joint) for joint in joints]
     return _Model(linkage, loads, np.array(rows, dtype=np.int64).reshape(-1, 2))
+
+
+def _add_gravity(engine: _Engine, linkage: Linkage, mechanism: Mechanism) -> None:
+    if not any(mechanism.gravity):
+        return
+    field = [*mechanism.gravity, 0.0]
+    for link in linkage.bodies.values():
+        for item in link.masses:
+            marker = engine.mbs.AddMarker(engine.items.MarkerBodyMass(bodyNumber=item))
+            engine.mbs.AddLoad(engine.items.LoadMassProportional(markerNumber=marker, loadVector=field))
+        for place, mass in link.lumped:
+            marker = engine.mbs.AddMarker(engine.items.MarkerBodyPosition(**place))
+            force = [mass * component for component in field]
+            engine.mbs.AddLoad(engine.items.LoadForceVector(markerNumber=marker, loadVector=force))
 
 
 def _add_body(engine: _Engine, task: TrackingTask, body: Body) -> Link:
@@ -387,6 +402,7 @@ def _record(
     strain += _spring_energy(linkage, mechanism, samples)
     work = _work(linkage, mechanism, torques, steps)[::substeps]
     gaps = np.array([linkage.gap(joint, samples) for joint in mechanism.joints])
+    work += np.sum([link.weighted(samples) - link.weighted(samples)[:1] for link in links], axis=0) @ mechanism.gravity
     balance = kinetic + strain - work
     return Record(
         task=task,

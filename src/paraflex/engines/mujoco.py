@@ -22,6 +22,7 @@ from paraflex.engines.common import check_engine, import_engine, steps_between
 from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
+from paraflex.kernel.bodies import weight_work
 from paraflex.mechanism import GROUND, ActuationMode, Mechanism, RevoluteJoint
 from paraflex.results.record import Record, record
 from paraflex.simulate import TrackingRun, TrackingTask
@@ -105,7 +106,7 @@ def _model(mujoco: Any, system: System, tree: Tree, step: float) -> Any:
     spec = mujoco.MjSpec()
     spec.option.timestep = step
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.gravity = [0.0, 0.0, 0.0]
+    spec.option.gravity = [*system.mechanism.gravity, 0.0]
     spec.option.tolerance = _SOLVER_TOLERANCE
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
@@ -228,8 +229,11 @@ def _solution(
     still = constant_signals([0.0] * len(task.mechanism.motors), float(times[-1]))
     signals, _ = pack_signals(task.mechanism, still, float(times[-1]))
     gaps = [system.constraints(signals, t, *state) for t, *state in zip(times, q, v, strict=False)]
-    kinetic, potential = motion.energy[:, 1], motion.energy[:, 0]
-    balance = kinetic + potential - kinetic[:1] - potential[:1] - motion.work
+    # MuJoCo counts weight as potential energy; here it does work.
+    weight = np.array([weight_work(system.packed, state, None) for state in q])
+    kinetic, strain = motion.energy[:, 1], motion.energy[:, 0] + weight
+    work = motion.work + weight - weight[:1]
+    balance = kinetic + strain - kinetic[:1] - strain[:1] - work
     reached = times[: motion.samples]
     return Solution(
         t=reached,
@@ -238,8 +242,8 @@ def _solution(
         a=a,
         multipliers=np.full((q.shape[0], system.m), np.nan),
         kinetic_energy=kinetic,
-        strain_energy=potential,
-        work=motion.work,
+        strain_energy=strain,
+        work=work,
         status="failed" if motion.trouble else "complete",
         message=motion.trouble,
         steps=count * (motion.samples - 1),
