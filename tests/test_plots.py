@@ -102,12 +102,22 @@ def models_of(data: xr.Dataset) -> xr.Dataset:
     return both.assign_attrs(reference="second-order")
 
 
+def motion_of(data: xr.Dataset) -> xr.Dataset:
+    """A run of the arm without a path: what `results.motion_dataset` gives."""
+    run = data.isel(mode=0)[["angle", "angular_velocity"]]
+    for k, name in enumerate(("kinetic_energy", "strain_energy", "work")):
+        run[name] = ("time", -120.0 * np.cos((k + 1) * 10.0 * data["time"].values))
+    return run
+
+
 def figure_of(name: str, data: xr.Dataset, mode: str = FULL) -> Figure:
     draw: Callable[..., Figure] = getattr(plots, name)
     if name in COMPARED:
         return draw(models_of(data), mode, ("second-order", "segments"))
     if name == "model_distances":
         return draw(models_of(data))
+    if name == "motion_overview":
+        return draw(motion_of(data))
     return draw(data, mode) if name in SINGLE else draw(data)
 
 
@@ -143,6 +153,7 @@ same = partial(np.testing.assert_allclose, rtol=1e-12, atol=0.0)
         ("compared_links", {"rad", "rad/s", "s"}),
         ("compared_paths", {"mm"}),
         ("model_distances", {"mm", "s"}),
+        ("motion_overview", {"rad", "rad/s", "J", "s"}),
     ],
 )
 def test_every_axis_label_names_its_unit(data: xr.Dataset, name: str, units: set[str]) -> None:

@@ -103,7 +103,7 @@ def describe(source: str) -> dict[str, Any]:
         "flexible_coordinates": system.n_flexible,
         "constraints": system.n_constraints,
         "redundant_constraints": redundant,
-        "degrees_of_freedom": rigid.n - rigid.m + len(redundant),
+        "degrees_of_freedom": rigid.n - rigid.n_constraints + len(redundant),
         "assembly_closes": closed,
         "total_mass": system.total_mass,
         "assemblies": [assembly.name for assembly in mechanism.assemblies],

@@ -10,6 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from paraflex.cli.motion import run_motion
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
@@ -27,7 +28,7 @@ from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
+from paraflex.mechanism import ActuationMode, Geometry, Mechanism, finite_segments, proportional_segments
 from paraflex.results import save_results, summary
 from paraflex.simulate import TrackingTask
 from paraflex.studies import Simulator, StudyResult, run_study
@@ -50,13 +51,15 @@ def run_command(request: RunRequest) -> int:
     """Run a study and write its results; the exit code."""
     console = plain_console(stderr=True)
     model = load(request.mechanism)
-    path, path_name = find_path(model, request.path)
-    options = _options(request)
-    modes = find_modes(model, request.modes)
+    options = integration_options(request)
     _check_fidelity(request)
+    if not model.paths and request.path is None:
+        return run_motion(request, model, _without_path(model, request), options, console)
+    path, path_name = find_path(model, request.path)
+    modes = find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     folder = results_folder(request.out)
-    mechanism = _mechanism(model, request)
+    mechanism = asked_mechanism(model, request)
     stiff = request.rigid or request.ked or request.segments is not None
     compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
     began = time.perf_counter()
@@ -81,7 +84,8 @@ def run_command(request: RunRequest) -> int:
     return COMPLETE if result.complete else TROUBLE
 
 
-def _options(request: RunRequest) -> IntegrationOptions:
+def integration_options(request: RunRequest) -> IntegrationOptions:
+    """The options of the command line; errors name the flag."""
     given = {
         "tolerance": request.tolerance,
         "alpha": request.alpha,
@@ -93,6 +97,15 @@ def _options(request: RunRequest) -> IntegrationOptions:
         return IntegrationOptions(**{key: value for key, value in given.items() if value is not None})
     except InputError as error:
         raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
+
+
+def _without_path(model: Model, request: RunRequest) -> Mechanism:
+    if request.ked:
+        raise InputError("the model has no path to prescribe", field="--ked", remedy="add a [path.NAME] table")
+    mechanism = asked_mechanism(model, request)
+    if request.segments is None:
+        return mechanism
+    return finite_segments(mechanism, proportional_segments(mechanism, request.segments)).mechanism
 
 
 def _check_fidelity(request: RunRequest) -> None:
@@ -121,7 +134,8 @@ def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
     return f"{mechanism.geometry.value} geometry" if request.segments is None else "finite segments"
 
 
-def _mechanism(model: Model, request: RunRequest) -> Mechanism:
+def asked_mechanism(model: Model, request: RunRequest) -> Mechanism:
+    """The mechanism at the fidelity asked for."""
     mechanism = model.mechanism.rigid() if request.rigid else model.mechanism
     if request.geometry is None:
         return mechanism

@@ -81,6 +81,8 @@ class StudyDefaults:
     samples : int
     assembly : str or None
         The first of the mechanism where None.
+    torques : mapping of str to float
+        Constant motor torques of a run without a path [N m].
     """
 
     path: str | None = None
@@ -88,6 +90,7 @@ class StudyDefaults:
     duration: float | None = None
     samples: int = 701
     assembly: str | None = None
+    torques: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -206,6 +209,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
         duration=table.study.duration,
         samples=table.study.samples,
         assembly=table.study.assembly,
+        torques=table.study.torques,
     )
     _check_study(mechanism, paths, study)
     return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data)
@@ -221,6 +225,10 @@ def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDe
             parse_mode(mechanism, mode)
         except InputError as error:
             raise InputError(error.problem, field="study.modes", value=error.value, remedy=error.remedy) from error
+    motors = [motor.name for motor in mechanism.motors]
+    for name in study.torques:
+        if name not in motors:
+            raise InputError("unknown motor", field="study.torques", value=name, remedy=suggestion(name, motors))
     if study.assembly is not None and study.assembly not in {a.name for a in mechanism.assemblies}:
         raise InputError(
             "unknown assembly",

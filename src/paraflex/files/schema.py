@@ -172,6 +172,7 @@ class StudyTable(_Table):
     duration: Number | None = Field(default=None, description="the duration in s, dwell included")
     samples: Count = Field(default=701, description="the number of samples kept")
     assembly: Text | None = Field(default=None, description="the name of an [assembly.NAME] table")
+    torques: dict[str, Number] = Field(default={}, description="constant torques of motors in N m, without a path")
 
 
 class ModelTable(_Table):

@@ -2,8 +2,9 @@
 
 from paraflex.plots.agreement import compared_links, compared_paths, model_distances
 from paraflex.plots.modes import motor_torques, tracking_errors
+from paraflex.plots.overview import motion_overview
 from paraflex.plots.phase import phase_diagrams
-from paraflex.plots.save import save_agreement_figures, save_figures
+from paraflex.plots.save import save_agreement_figures, save_figures, save_overview
 from paraflex.plots.time_series import end_effector_motion, link_motions, tip_deflections
 from paraflex.plots.workspace import desired_path, end_effector_path
 
@@ -15,10 +16,12 @@ __all__ = [
     "end_effector_path",
     "link_motions",
     "model_distances",
+    "motion_overview",
     "motor_torques",
     "phase_diagrams",
     "save_agreement_figures",
     "save_figures",
+    "save_overview",
     "tip_deflections",
     "tracking_errors",
 ]

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from paraflex.errors import OutputError
 from paraflex.plots.agreement import compared_links, compared_paths, model_distances, prototype_pair
 from paraflex.plots.modes import motor_torques, tracking_errors
+from paraflex.plots.overview import motion_overview
 from paraflex.plots.phase import phase_diagrams
 from paraflex.plots.runs import default_mode
 from paraflex.plots.style import journal_style
@@ -89,6 +90,17 @@ def save_agreement_figures(data: xr.Dataset, folder: str | Path) -> list[Path]:
             figures[f"fig23_paths_{mode}"] = partial(compared_paths, data, mode, pair)
     figures["model_distances"] = partial(model_distances, data)
     return _save(figures, Path(folder))
+
+
+def save_overview(data: xr.Dataset, folder: str | Path) -> list[Path]:
+    """Write the overview of a run without a path as PNG and SVG.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    return _save({"motion_overview": partial(motion_overview, data)}, Path(folder))
 
 
 def _save(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:

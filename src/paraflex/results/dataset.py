@@ -18,7 +18,7 @@ from paraflex.results.record import FIGURES, Record, record
 from paraflex.simulate import TrackingRun
 
 SCHEMA = 1
-_UNITS = {
+UNITS = {
     "time": ("time", "s"),
     "end_effector": ("end-effector position", "m"),
     "end_effector_velocity": ("end-effector velocity", "m/s"),
@@ -116,7 +116,7 @@ def tracking_dataset(
     out["rms_torque"] = rms_torque(out)
     out["residual_vibration"] = residual_vibration(out, task.path.duration)
     for name in out.variables:
-        label, unit = _UNITS.get(str(name).removesuffix("_desired"), (None, None))
+        label, unit = UNITS.get(str(name).removesuffix("_desired"), (None, None))
         if label is not None:
             twin = "desired " if str(name).endswith("_desired") else ""
             out[name].attrs = {"long_name": twin + label, "units": unit}

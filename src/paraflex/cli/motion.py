@@ -1,0 +1,125 @@
+"""`paraflex run` of a mechanism without a path: left to its loads, prescribed angles and constant torques."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import xarray as xr
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, StudyRequest, results_folder, write_json
+from paraflex.cli.tables import plain_console
+from paraflex.compilation import compile_kernels
+from paraflex.errors import AssemblyError, InputError, IntegrationError
+from paraflex.files import Model
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import Geometry, Mechanism
+from paraflex.motion import MotionRun, simulate_motion
+from paraflex.results import motion_dataset, motion_summary, save_results
+
+
+def run_motion(
+    request: StudyRequest, model: Model, mechanism: Mechanism, options: IntegrationOptions, console: Console
+) -> int:
+    """Run a mechanism's own motion and write its results; the exit code."""
+    duration = model.study.duration if request.duration is None else request.duration
+    if duration is None:
+        raise InputError(
+            "the model has no path: how long is it to run?", field="--duration", remedy="give it in seconds"
+        )
+    if request.modes:
+        raise InputError(
+            "the model has no path, torques are constant", field="--mode", value=request.modes[0],
+            remedy="add a [path.NAME] table, or give torques in [study]",
+        )  # fmt: skip
+    samples = model.study.samples if request.samples is None else request.samples
+    folder = results_folder(request.out)
+    bent = any(getattr(body, "flexible", False) for body in mechanism.bodies)
+    compile_kernels(mechanism.geometry if bent else Geometry.LINEAR, console.print)
+    began = time.perf_counter()
+    run = _simulate(console, model, mechanism, duration, samples, request, options)
+    parameters = {
+        "model": dict(model.parameters),
+        "run": {"mechanism": model.source, "duration": duration, "samples": samples, "tolerance": options.tolerance},
+    }
+    data = motion_dataset(run, options=options, parameters=parameters)
+    figures = motion_summary(data)
+    _write(data, figures, folder)
+    if request.json:
+        print(json.dumps(figures, indent=2))
+    else:
+        _report(figures, data)
+        console.print(f"{time.perf_counter() - began:.1f} s; results and figures in {folder}")
+    if run.solution.status != "complete":
+        console.print(f"error: {run.solution.message}", soft_wrap=True)
+    return {"complete": COMPLETE, "interrupted": INTERRUPTED}.get(run.solution.status, TROUBLE)
+
+
+def _simulate(
+    console: Console,
+    model: Model,
+    mechanism: Mechanism,
+    duration: float,
+    samples: int,
+    request: StudyRequest,
+    options: IntegrationOptions,
+) -> MotionRun:
+    columns = (TextColumn(mechanism.name, markup=False), BarColumn(), TimeElapsedColumn())
+    progress = Progress(*columns, console=console, transient=not console.is_terminal)
+    bar = progress.add_task("", total=duration)
+
+    def report(reached: float) -> None:
+        # Not before there is something to tell: an error is one line.
+        progress.start()
+        progress.update(bar, completed=reached)
+
+    try:
+        return simulate_motion(
+            mechanism,
+            duration,
+            samples=samples,
+            assembly=request.assembly or model.study.assembly,
+            torques=model.study.torques,
+            options=options,
+            on_progress=report,
+        )
+    except IntegrationError as error:
+        return error.partial
+    except AssemblyError as error:
+        raise InputError(
+            str(error), field="assembly", remedy="correct its angles or the lengths", source=model.source
+        ) from error
+    except InputError as error:
+        flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly"}
+        if error.field in flags:
+            raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
+        raise error.in_file(model.source) from None
+    finally:
+        if progress.live.is_started:
+            progress.stop()
+
+
+def _report(figures: dict, data: xr.Dataset) -> None:
+    out = plain_console()
+    final = figures["final"]
+    out.print(f"{figures['mechanism']}: {figures['status']} at t = {final['time']:g} s, {figures['steps']} steps")
+    for point, position in final["point_position"].items():
+        # Points that segments made by the program hang together at are left out.
+        if None not in position and "._" not in point:
+            out.print(f"  {point}: ({position[0]:.6g}, {position[1]:.6g}) m")
+    out.print(
+        f"largest violation of constraints {figures['constraint_position_max']:.1e} m, "
+        f"imbalance of energy {figures['energy_balance_max']:.1e} J"
+    )
+
+
+def _write(data: xr.Dataset, figures: dict, folder: Path) -> None:
+    from paraflex.plots import save_overview
+
+    folder.mkdir(parents=True, exist_ok=True)
+    save_results(data, folder / "results.nc")
+    write_json(figures, folder / "summary.json")
+    save_overview(data, folder / "figures")

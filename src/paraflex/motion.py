@@ -1,0 +1,99 @@
+"""A mechanism left to itself: no path, but loads, prescribed angles and constant motor torques."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import State, System, build_system, consistent_state, constant_signals, pack_signals
+from paraflex.errors import InputError, IntegrationError, suggestion
+from paraflex.integrators import IntegrationOptions, Solution, integrate
+from paraflex.mechanism import Mechanism
+
+
+@dataclass(frozen=True)
+class MotionRun:
+    """A mechanism's own motion.
+
+    Attributes
+    ----------
+    system : System
+    times : (k,) array
+        At which results are kept [s].
+    torques : mapping of str to float
+        Of each motor, constant [N m].
+    solution : Solution
+    """
+
+    system: System
+    times: NDArray[np.float64]
+    torques: Mapping[str, float]
+    solution: Solution
+
+
+def simulate_motion(
+    mechanism: Mechanism,
+    duration: float,
+    *,
+    samples: int = 701,
+    assembly: str | None = None,
+    torques: Mapping[str, float] | None = None,
+    start: State | None = None,
+    options: IntegrationOptions | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> MotionRun:
+    """Integrate a mechanism under what acts on it.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    duration : float
+        [s]
+    samples : int
+        Times at which results are kept, evenly spaced, both ends among them.
+    assembly : str, optional
+        Where it starts, at rest and undeformed; the first by default.
+    torques : mapping of str to float, optional
+        Constant torque of each motor by name [N m]; zero for the others.
+    start : State, optional
+        In place of the assembly: see `dynamics.consistent_state`.
+    options : IntegrationOptions, optional
+    on_progress : callable, optional
+        Told the time reached [s].
+
+    Raises
+    ------
+    InputError
+        A duration or number of samples that makes no sense, an unknown motor, or neither an assembly nor a start.
+    AssemblyError
+        The loops do not close.
+    IntegrationError
+        The run could not be finished; it carries a MotionRun with what was computed.
+    """
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
+    if samples < 2:
+        raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+    names = [motor.name for motor in mechanism.motors]
+    for name, torque in (torques or {}).items():
+        if name not in names:
+            raise InputError("unknown motor", field="torques", value=name, remedy=suggestion(name, names))
+        if not np.isfinite(torque):
+            raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
+    values = {name: float((torques or {}).get(name, 0.0)) for name in names}
+    system = build_system(mechanism)
+    state = consistent_state(system, mechanism.assembly(assembly)) if start is None else start
+    times = np.linspace(state.time, state.time + duration, samples)
+    end = float(times[-1])
+    signals, knots = pack_signals(mechanism, constant_signals(list(values.values()), end), end)
+    try:
+        solution = integrate(
+            system, signals, state, times, knots=np.array(knots), options=options, on_progress=on_progress
+        )
+    except IntegrationError as error:
+        error.partial = MotionRun(system, times, values, error.partial)
+        raise
+    return MotionRun(system, times, values, solution)

@@ -1,0 +1,151 @@
+"""The labelled dataset of a run without a path: coordinates, points, joint forces, energies."""
+
+from __future__ import annotations
+
+import json
+import math
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import PointRef
+from paraflex.motion import MotionRun
+from paraflex.results.dataset import SCHEMA, UNITS
+from paraflex.results.motion import point_motion, tip_deflection
+from paraflex.results.record import FIGURES
+
+_OWN_UNITS = {
+    "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
+    "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
+    "multiplier": ("multiplier of a constraint row, or torque of a spring or damper", "N, N m"),
+    "point_velocity": ("velocity of a named point", "m/s"),
+    "applied_torque": ("constant motor torque", "N m"),
+}
+
+
+def motion_dataset(
+    run: MotionRun, *, options: IntegrationOptions | None = None, parameters: dict | None = None
+) -> xr.Dataset:
+    """A run without a path, labelled.
+
+    Parameters
+    ----------
+    run : MotionRun
+        One that did not finish holds NaN after its last sample and says so in `status`.
+    options : IntegrationOptions, optional
+        Kept as provenance.
+    parameters : dict, optional
+        Kept as provenance: the model as read, and what was asked for.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions time, coordinate, body, point, joint, row, axis, motor; units in the attributes of every variable.
+    """
+    system, solution, mechanism = run.system, run.solution, run.system.mechanism
+    q, v, a = solution.q, solution.v, solution.a
+    points = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
+    motions = [point_motion(system, point, q, v, a) for point in points]
+    angles = [body.angle for body in system.bodies]
+    tips = np.stack([tip_deflection(system, body.name, q) for body in system.bodies], axis=1)
+    rows = [[system.rows.index(f"{joint.name} {axis}") for axis in ("x", "y")] for joint in mechanism.joints]
+    values: dict[str, tuple[tuple[str, ...], NDArray[np.float64]]] = {
+        "coordinate_value": (("coordinate",), q),
+        "coordinate_rate": (("coordinate",), v),
+        "angle": (("body",), q[:, angles]),
+        "angular_velocity": (("body",), v[:, angles]),
+        "angular_acceleration": (("body",), a[:, angles]),
+        "tip_axial": (("body",), tips[:, :, 0]),
+        "tip_transverse": (("body",), tips[:, :, 1]),
+        "tip_slope": (("body",), tips[:, :, 2]),
+        "point_position": (("point", "axis"), _stacked([motion.position for motion in motions], len(q))),
+        "point_velocity": (("point", "axis"), _stacked([motion.velocity for motion in motions], len(q))),
+        # Phi = p_b - p_a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
+        "joint_force": (("joint", "axis"), -solution.multipliers[:, np.array(rows, dtype=int).reshape(-1, 2)]),
+        "multiplier": (("row",), solution.multipliers),
+        "kinetic_energy": ((), solution.kinetic_energy),
+        "strain_energy": ((), solution.strain_energy),
+        "work": ((), solution.work),
+    }
+    data: dict[str, Any] = {name: (("time", *dims), _full(array, run)) for name, (dims, array) in values.items()}
+    data |= {name: getattr(solution, name) for name in FIGURES}
+    data["applied_torque"] = (("motor",), np.array(list(run.torques.values())))
+    out = xr.Dataset(
+        data,
+        coords={
+            "time": run.times,
+            "coordinate": _coordinate_names(run),
+            "body": [body.name for body in system.bodies],
+            "point": [str(point) for point in points],
+            "joint": [joint.name for joint in mechanism.joints],
+            "row": list(system.rows),
+            "axis": ["x", "y"],
+            "motor": list(run.torques),
+        },
+    )
+    units = UNITS | _OWN_UNITS
+    for name in out.variables:
+        if name in units:
+            out[name].attrs = {"long_name": units[str(name)][0], "units": units[str(name)][1]}
+    options = options or IntegrationOptions()
+    out.attrs = {
+        "mechanism": mechanism.name,
+        "kind": "motion",
+        "tolerance": options.tolerance,
+        "method": "TR-BDF2",
+        "parameters": json.dumps(parameters or {}, sort_keys=True),
+        "paraflex_version": version("paraflex"),
+        "schema": SCHEMA,
+    }
+    return out
+
+
+def motion_summary(data: xr.Dataset) -> dict[str, Any]:
+    """The run's figures as plain numbers; None for what it did not reach."""
+    last = data.isel(time=-1)
+    figures: dict[str, Any] = {name: data[name].item() for name in FIGURES}
+    figures = {key: None if isinstance(x, float) and not math.isfinite(x) else x for key, x in figures.items()}
+    return {
+        "mechanism": data.attrs["mechanism"],
+        **figures,
+        "final": {
+            "time": float(last["time"]),
+            "angle": _numbers(last["angle"], "body"),
+            "point_position": {
+                str(point): [_number(x) for x in last["point_position"].sel(point=point).values]
+                for point in data["point"].values
+            },
+        },
+        "parameters": json.loads(data.attrs["parameters"]),
+        "version": data.attrs["paraflex_version"],
+    }
+
+
+def _coordinate_names(run: MotionRun) -> list[str]:
+    return [
+        f"{body.name}.{part}"
+        for body in run.system.bodies
+        for part in ("x", "y", "phi", *(f"eta{k + 1}" for k in range(body.nf)))
+    ]
+
+
+def _stacked(parts: list[NDArray[np.float64]], samples: int) -> NDArray[np.float64]:
+    return np.stack(parts, axis=1) if parts else np.zeros((samples, 0, 2))
+
+
+def _full(array: NDArray[np.float64], run: MotionRun) -> NDArray[np.float64]:
+    out = np.full((run.times.size, *array.shape[1:]), np.nan)
+    out[: array.shape[0]] = array
+    return out
+
+
+def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:
+    return {str(name): _number(values.sel({dim: name}).item()) for name in values[dim].values}
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
