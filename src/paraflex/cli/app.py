@@ -171,6 +171,27 @@ def info(source: Source = "raparm_i", json: Json = False) -> None:
     info_command(source, json)
 
 
+@app.command()
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the file to write, NAME.toml.")],
+    template: Annotated[
+        str, typer.Option("--from", metavar="NAME", help="Library mechanism to start from.")
+    ] = "five_bar",
+) -> None:
+    """Write a commented model file to edit."""
+    from paraflex.cli.create import new_command
+
+    new_command(name, template)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of model files, for editors to complete and check them."""
+    from paraflex.cli.create import schema_command
+
+    schema_command()
+
+
 def main() -> None:
     """Run the command line; every error that is ours becomes one line."""
     try:

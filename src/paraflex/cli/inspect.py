@@ -14,7 +14,7 @@ from paraflex.cli.tables import plain_console
 from paraflex.dynamics import build_system, consistent_state
 from paraflex.dynamics.state import redundant_rows
 from paraflex.errors import ActuationError, NumericalError
-from paraflex.files import load
+from paraflex.files import library_names, load
 from paraflex.mechanism import FlexibleBeam
 from paraflex.simulate import plan_tracking
 
@@ -62,6 +62,7 @@ def info_command(source: str, as_json: bool) -> None:
             link["name"], link["kind"], length, f"{link['mass']:.4f}", elements, str(link["coordinates"]), lowest
         )
     console.print(links)
+    console.print(f"library: {', '.join(library_names())}; paraflex new NAME --from one of them")
 
 
 def describe(source: str) -> dict[str, Any]:

@@ -6,7 +6,7 @@ checked once, in `mechanism.checks` and by the paths themselves.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -206,6 +206,12 @@ class ModelTable(_Table):
     mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
     path: dict[str, PathTable] = {}
     study: StudyTable = StudyTable()
+
+
+def model_schema() -> dict[str, Any]:
+    """JSON Schema of a model file, for editors."""
+    schema = ModelTable.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "paraflex model"}
 
 
 class PathFile(_Table):

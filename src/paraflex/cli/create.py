@@ -1,0 +1,40 @@
+"""`paraflex new` and `paraflex schema`: a file to start from, and what editors need to complete and check it."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from paraflex.cli.tables import plain_console
+from paraflex.errors import InputError, OutputError, suggestion
+from paraflex.files import library_file, library_names, model_schema
+
+
+def new_command(name: str, template: str) -> None:
+    """Write a commented model file of this name, to edit."""
+    if template not in library_names():
+        raise InputError(
+            "no library mechanism", field="--from", value=template, remedy=suggestion(template, library_names())
+        )
+    path = Path(name if name.endswith(".toml") else f"{name}.toml")
+    if path.exists():
+        raise OutputError("there is one already", field=str(path), remedy="choose another name, or remove it")
+    text = library_file(template).read_text(encoding="utf-8")
+    text = re.sub(r'^name = ".*"$', lambda _: f"name = {json.dumps(path.stem)}", text, count=1, flags=re.MULTILINE)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written ({(error.strerror or str(error)).lower()})",
+            field=str(path),
+            remedy="choose another folder",
+        ) from error
+    console = plain_console()
+    console.print(f"{path}: a copy of {template} to edit. Then", soft_wrap=True)
+    console.print(f"  paraflex info {path}\n  paraflex run --mechanism {path}", soft_wrap=True)
+
+
+def schema_command() -> None:
+    """Print the JSON Schema of model files."""
+    print(json.dumps(model_schema(), indent=2))

@@ -1,0 +1,87 @@
+"""A newcomer's way: a file to start from, edited, checked, run; and the schema editors check it by."""
+
+import json
+import tomllib
+
+import pytest
+
+from paraflex.files import library_file, library_names, load
+from test_cli import FAST, paraflex
+
+
+def test_a_newcomers_five_bar(tmp_path):
+    done = paraflex("new", "my_fivebar", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "paraflex info my_fivebar.toml" in done.stdout
+    file = tmp_path / "my_fivebar.toml"
+    assert load(file).mechanism.name == "my_fivebar"
+    # Longer arms, as one would make them: both proximal links and their points.
+    text = file.read_text()
+    for side in "12":
+        text = text.replace(
+            f"points = {{ A{side} = 0.0, B{side} = 0.250 }}", f"points = {{ A{side} = 0.0, B{side} = 0.280 }}"
+        )
+    parts = text.split("[body.")
+    text = "[body.".join(
+        part.replace("length = 0.250", "length = 0.280") if part.startswith("prox") else part for part in parts
+    )
+    file.write_text(text)
+    assert load(file).mechanism.body("proximal1").length == 0.28
+    assert "my_fivebar" in paraflex("info", "my_fivebar.toml", cwd=tmp_path).stdout
+    done = paraflex("run", "--mechanism", "my_fivebar.toml", *FAST, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["modes"]["++"]["status"] == "complete"
+
+
+def test_a_link_too_short_is_said_so(tmp_path):
+    paraflex("new", "short", cwd=tmp_path)
+    file = tmp_path / "short.toml"
+    short = file.read_text().replace("length = 0.250", "length = 0.060").replace("= 0.250 }", "= 0.060 }")
+    file.write_text(short)
+    done = paraflex("run", "--mechanism", "short.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "short.toml: path.square: " in done.stderr
+    assert "gap of" in done.stderr
+
+
+def test_nothing_is_written_over(tmp_path):
+    (tmp_path / "mine.toml").write_text("precious")
+    done = paraflex("new", "mine.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == "error: mine.toml: there is one already; choose another name, or remove it\n"
+    assert (tmp_path / "mine.toml").read_text() == "precious"
+
+
+def test_a_template_that_is_none(tmp_path):
+    done = paraflex("new", "mine", "--from", "raparm", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "--from: no library mechanism (got 'raparm'); did you mean \"raparm_i\"?" in done.stderr
+    done = paraflex("new", "no/such/folder/mine", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "no/such/folder/mine.toml: cannot be written" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_every_library_mechanism_is_sound_and_makes_a_template(name, tmp_path):
+    model = load(name)
+    assert model.paths or model.study.duration
+    done = paraflex("new", "copy", "--from", name, cwd=tmp_path)
+    assert done.returncode == 0
+    assert load(tmp_path / "copy.toml").mechanism.bodies == model.mechanism.bodies
+    facts = json.loads(paraflex("info", name, "--json").stdout)
+    assert facts["assembly_closes"] is True
+    assert facts["redundant_constraints"] == []
+    assert facts["degrees_of_freedom"] == {"pendulum": 1}.get(name, 2)
+
+
+def test_the_schema_names_every_table_of_the_library_and_its_fields():
+    schema = json.loads(paraflex("schema").stdout)
+    assert schema["title"] == "paraflex model"
+    for name in library_names():
+        content = tomllib.loads(library_file(name).read_text(encoding="utf-8"))
+        assert set(content) <= set(schema["properties"])
+    beam = schema["$defs"]["BeamTable"]
+    assert beam["properties"]["length"]["description"] == "the length in m"
+    assert beam["additionalProperties"] is False
+    assert "length" in beam["required"]
