@@ -15,17 +15,8 @@ def test_a_newcomers_five_bar(tmp_path):
     assert "paraflex info my_fivebar.toml" in done.stdout
     file = tmp_path / "my_fivebar.toml"
     assert load(file).mechanism.name == "my_fivebar"
-    # Longer arms, as one would make them: both proximal links and their points.
-    text = file.read_text()
-    for side in "12":
-        text = text.replace(
-            f"points = {{ A{side} = 0.0, B{side} = 0.250 }}", f"points = {{ A{side} = 0.0, B{side} = 0.280 }}"
-        )
-    parts = text.split("[body.")
-    text = "[body.".join(
-        part.replace("length = 0.250", "length = 0.280") if part.startswith("prox") else part for part in parts
-    )
-    file.write_text(text)
+    # Longer arms: one number.
+    file.write_text(file.read_text().replace("l1 = 0.250 ", "l1 = 0.280 "))
     assert load(file).mechanism.body("proximal1").length == 0.28
     assert "my_fivebar" in paraflex("info", "my_fivebar.toml", cwd=tmp_path).stdout
     done = paraflex("run", "--mechanism", "my_fivebar.toml", *FAST, "--json", cwd=tmp_path)
@@ -36,7 +27,7 @@ def test_a_newcomers_five_bar(tmp_path):
 def test_a_link_too_short_is_said_so(tmp_path):
     paraflex("new", "short", cwd=tmp_path)
     file = tmp_path / "short.toml"
-    short = file.read_text().replace("length = 0.250", "length = 0.060").replace("= 0.250 }", "= 0.060 }")
+    short = file.read_text().replace("l1 = 0.250 ", "l1 = 0.060 ").replace("l2 = 0.250 ", "l2 = 0.060 ")
     file.write_text(short)
     done = paraflex("run", "--mechanism", "short.toml", cwd=tmp_path)
     assert done.returncode == 2

@@ -40,7 +40,12 @@ BROKEN = [
     ("length = 0.250 # m\n", "", "body.link1.length: is missing", "give the length in m"),
     ("length = 0.250 # m", "length = -0.25", "body.link1.length: must be positive (got -0.25)", "in m"),
     ("length = 0.250 # m", "length = 0", "body.link1.length: must be positive", "in m"),
-    ("length = 0.250 # m", 'length = "250 mm"', "body.link1.length: should be a valid number (got '250 mm')", "in m"),
+    (
+        "length = 0.250 # m",
+        'length = "250 mm"',
+        "body.link1.length: neither a number nor an expression (got '250 mm')",
+        "in m",
+    ),
     ("length = 0.250 # m", "length = true", "body.link1.length", "give the length in m"),
     ("length = 0.250 # m", "length = inf", "body.link1.length: should be a finite number", "in m"),
     ("length = 0.250 # m", "length =", "not valid TOML", "line 38"),

@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from paraflex.errors import InputError
+from paraflex.files.expressions import evaluate_parameters
 
 # A mechanism written by hand is some kilobytes; far more is a wrong file, and parsing it would only take long.
 _LARGEST_FILE = 5_000_000
@@ -47,15 +48,20 @@ def read_toml(path: Path, source: str) -> dict[str, Any]:
 
 
 def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
-    """Check parsed data against a schema.
+    """Check parsed data against a schema; numbers may be expressions of the data's [parameters].
 
     Raises
     ------
     InputError
         The first field that does not fit.
     """
+    table = data.get("parameters", {})
     try:
-        return schema.model_validate(data)
+        parameters = evaluate_parameters(table if isinstance(table, dict) else {})
+    except InputError as error:
+        raise error.in_file(source) from None
+    try:
+        return schema.model_validate(data, context={"parameters": parameters})
     except ValidationError as error:
         raise _first_problem(schema, data, error, source) from None
 
@@ -77,6 +83,10 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
         tags = problem.get("ctx", {}).get("expected_tags", "")
         got = value.get("type") if isinstance(value, dict) else value
         return InputError("unknown type", field=f"{field}.type", value=got, remedy=f"use {tags}", source=source)
+    if kind == "expression":
+        said = problem.get("ctx", {})
+        remedy = f"give {description}; {said.get('remedy')}"
+        return InputError(said.get("problem", ""), field=field, value=value, remedy=remedy, source=source)
     message = problem["msg"].removeprefix("Input ").replace(" after validation", "")
     text = message[0].lower() + message[1:]
     return InputError(text, field=field, value=value, remedy=f"give {description}", source=source)

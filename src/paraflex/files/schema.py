@@ -8,9 +8,28 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic_core import PydanticCustomError
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+from paraflex.files.expressions import ExpressionError, evaluate
+
+
+def _number(value: Any, info: ValidationInfo) -> Any:
+    """An expression's value; what is no text is left to the type."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return evaluate(value, (info.context or {}).get("parameters", {}))
+    except ExpressionError as error:
+        raise PydanticCustomError(
+            "expression", "{problem}", {"problem": error.problem, "remedy": error.remedy}
+        ) from None
+
+
+# A number, or an expression of parameters in quotes.
+Number = Annotated[
+    float, Field(strict=True, allow_inf_nan=False), BeforeValidator(_number, json_schema_input_type=float | str)
+]
 Count = Annotated[int, Field(strict=True)]
 Text = Annotated[str, Field(strict=True)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
@@ -183,6 +202,7 @@ class ModelTable(_Table):
     geometry: Literal["linear", "second-order"] = Field(
         default="linear", description='the shape of beams: "linear" or "second-order"'
     )
+    parameters: dict[str, Any] = Field(default={}, description="numbers by name, for expressions of them in quotes")
     section: dict[str, SectionTable | GeneralSectionTable] = {}
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}
