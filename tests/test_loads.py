@@ -8,6 +8,7 @@ import scipy.special
 
 from conftest import make_five_bar
 from paraflex.dynamics import State, build_system, consistent_state, pack_signals
+from paraflex.dynamics.state import point_position
 from paraflex.errors import InputError
 from paraflex.fem.element import TRANSVERSE
 from paraflex.files import library_file, load
@@ -19,6 +20,7 @@ from paraflex.mechanism import (
     Assembly,
     FlexibleBeam,
     Geometry,
+    LinearSpring,
     LumpedMass,
     Material,
     Mechanism,
@@ -114,8 +116,12 @@ def test_generalised_weights_and_loads_are_derivatives_of_their_work(geometry):
             PointForce("push", PointRef("two", "C"), tuple(force)),
             AppliedTorque("twist", PointRef("one", "B"), torque),
         ),
+        linear_springs=(
+            LinearSpring("rope", PointRef("one", "B"), PointRef("two", "C"), 130.0, 0.2),
+            LinearSpring("stay", PointRef("block", "P"), PointRef("ground", "O"), 70.0, 0.1),
+        ),
     )
-    plain = build_system(dataclasses.replace(mechanism, gravity=(0.0, 0.0), loads=()))
+    plain = build_system(dataclasses.replace(mechanism, gravity=(0.0, 0.0), loads=(), linear_springs=()))
     system = build_system(mechanism)
     q, _, _ = random_state(system, 5)
     points, still = system.workspace().points, np.zeros((1, system.n))
@@ -125,15 +131,18 @@ def test_generalised_weights_and_loads_are_derivatives_of_their_work(geometry):
         motion_forces(built.packed, q[None], still, still, out, points)
         return out[0]
 
-    place, slope = system.marker(PointRef("two", "C")), system.marker(PointRef("one", "B")).slope
+    slope = system.marker(PointRef("one", "B")).slope
+
+    def at(q, name, point):
+        return point_position(system, q, PointRef(name, point))
 
     def work(q):
-        two, one = system.body("two"), system.body("one")
-        c, s = np.cos(q[two.angle]), np.sin(q[two.angle])
-        x, y = place.place(q[two.flexible])
-        at = q[two.position] + [c * x - s * y, s * x + c * y]
+        one = system.body("one")
         turn = q[one.angle] + slope @ q[one.flexible]
-        return weight_work(system.packed, q, points) + force @ at + torque * turn
+        rope = np.linalg.norm(at(q, "two", "C") - at(q, "one", "B")) - 0.2
+        stay = np.linalg.norm(at(q, "block", "P") - [0.1, -0.2]) - 0.1
+        done = weight_work(system.packed, q, points) + force @ at(q, "two", "C") + torque * turn
+        return done - 0.5 * 130.0 * rope**2 - 0.5 * 70.0 * stay**2
 
     h = 1e-6
     expected = [(work(q + h * unit) - work(q - h * unit)) / (2 * h) for unit in np.eye(system.n)]
@@ -161,6 +170,10 @@ def test_energy_is_work_under_all_loads(geometry):
         ),
         springs=(TorsionalSpring("soft", "elbow", 2.0, 0.1),),
         dampers=(TorsionalDamper("oil", "elbow", 0.05), TorsionalDamper("grease", "tip", 0.01)),
+        linear_springs=(
+            LinearSpring("rope", PointRef("one", "B"), PointRef("block", "P"), 20.0, 0.3, 0.4),
+            LinearSpring("stay", PointRef("ground", "O"), PointRef("two", "C"), 10.0, 0.5, 0.2),
+        ),
     )
     worst = []
     for tolerance in (1e-3, 1e-4):
@@ -222,6 +235,7 @@ def test_torques_of_the_rigid_mechanism_carry_weight_loads_springs_and_dampers(g
         ),
         springs=(TorsionalSpring("return", "B1", 2.0, -1.0), TorsionalSpring("base", "A2", 1.5)),
         dampers=(TorsionalDamper("oil", "C", 0.02), TorsionalDamper("base oil", "A1", 0.05)),
+        linear_springs=(LinearSpring("stay", PointRef("ground", "A1"), PointRef("distal2", "C"), 40.0, 0.2, 3.0),),
     )
     task = plan_tracking(mechanism, Line((0.0, 0.30), (0.04, 0.27), 20.0), duration=0.2, samples=41)
     run = task.simulate("++", options=IntegrationOptions(tolerance=1e-7))
@@ -246,6 +260,11 @@ gravity = [0.0, -9.81]
 [damper.oil]
 joint = "B1"
 coefficient = 0.1
+[linear_spring.rope]
+points = ["ground.A1", "link4.C"]
+stiffness = 50.0
+length = 0.3
+damping = 0.5
 [load.push]
 type = "force"
 point = "link4.C"
@@ -271,6 +290,7 @@ def test_a_model_file_may_have_all_of_them(tmp_path):
         raparm_i(),
         gravity=(0.0, -9.81),
         dampers=(TorsionalDamper("oil", "B1", 0.1),),
+        linear_springs=(LinearSpring("rope", PointRef("ground", "A1"), PointRef("link4", "C"), 50.0, 0.3, 0.5),),
         loads=(
             PointForce("push", PointRef("link4", "C"), (1.0, 2.0)),
             AppliedTorque("twist", PointRef("link1", "B1"), -0.5),
@@ -283,8 +303,11 @@ def test_a_model_file_may_have_all_of_them(tmp_path):
     [
         ('joint = "B1"', 'joint = "B9"', "damper.oil.joint: unknown joint (got 'B9')"),
         ("coefficient = 0.1", "coefficient = -0.1", "damper.oil.coefficient: must be positive"),
-        ('"link4.C"', '"link4.D"', "load.push.point: unknown point (got 'link4.D')"),
-        ('"link4.C"', '"ground.A1"', "load.push.point: the ground does not move"),
+        ('point = "link4.C"', 'point = "link4.D"', "load.push.point: unknown point (got 'link4.D')"),
+        ('point = "link4.C"', 'point = "ground.A1"', "load.push.point: the ground does not move"),
+        ('"link4.C"]', '"link9.C"]', "linear_spring.rope.points: unknown body (got 'link9')"),
+        ('"link4.C"]', '"ground.D1"]', "linear_spring.rope.points: a spring needs two different bodies"),
+        ("stiffness = 50.0", "stiffness = -50.0", "linear_spring.rope.stiffness: must not be negative"),
         ("force = [1.0, 2.0]", "force = [1.0]", "load.push"),
         ('type = "torque"', 'type = "moment"', "load.twist"),
         ("torque = -0.5", "torque = nan", "load.twist"),

@@ -15,6 +15,7 @@ from paraflex.kernel.packed import (
     CONSTRAINT,
     DAMPER,
     EFFORT,
+    LINE,
     LOAD,
     MARKER,
     MASS,
@@ -120,6 +121,18 @@ def pack_system(
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
             if not ref.on_ground:
                 efforts[index[ref.body]].append({"marker": add_marker(ref), "signal": k, "sign": sign})
+    lines = [
+        {
+            "a": -1 if spring.a.on_ground else add_marker(spring.a),
+            "b": -1 if spring.b.on_ground else add_marker(spring.b),
+            **_ground_place(mechanism, spring.a, "a"),
+            **_ground_place(mechanism, spring.b, "b"),
+            "stiffness": spring.stiffness,
+            "length": spring.length,
+            "damping": spring.damping,
+        }
+        for spring in mechanism.linear_springs
+    ]
     loads = [_load_record(load) | {"marker": add_marker(load.point)} for load in mechanism.loads]
 
     packed = PackedSystem(
@@ -128,6 +141,7 @@ def pack_system(
         ports=_port_records(bodies, ports),
         efforts=_records(EFFORT, [effort for group in efforts for effort in group]),
         loads=_records(LOAD, loads),
+        lines=_records(LINE, lines),
         rows=_row_records(kinds, signals, ground, compliance, ports),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
@@ -141,6 +155,11 @@ def pack_system(
         gravity=np.array(mechanism.gravity, dtype=float),
     )
     return packed, tuple(labels)
+
+
+def _ground_place(mechanism: Mechanism, ref: PointRef, end: str) -> dict[str, float]:
+    x, y = mechanism.ground[ref.point] if ref.on_ground else (0.0, 0.0)
+    return {f"{end}x": x, f"{end}y": y}
 
 
 def _load_record(load: Load) -> dict[str, float]:

@@ -23,6 +23,8 @@ CLOSED = 1e-12
 DEPENDENT = 1e-9
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
 _POSITION_STIFFNESS = 1.0
+# The same for a start in motion: rates of deflection are to be none beside those of links.
+_VELOCITY_STIFFNESS = 1e3
 
 
 @dataclass(frozen=True)
@@ -137,11 +139,19 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
 
 
 def project_velocity(
-    system: System, signals: Signals, t: float, q: NDArray[np.float64], v: NDArray[np.float64]
+    system: System,
+    signals: Signals,
+    t: float,
+    q: NDArray[np.float64],
+    v: NDArray[np.float64],
+    stiffness: float = 0.0,
 ) -> NDArray[np.float64]:
-    """The nearest velocities, in the metric of mass, at which the constraints' first derivative vanishes."""
+    """The nearest velocities, in the metric of mass, at which the constraints' first derivative vanishes.
+
+    That is what a blow does. With a weight of stiffness [s^2] against mass links move and do not begin to bend.
+    """
     _, rate = system.constraints(signals, t, q, v)
-    return v - _least_change(system, q, rate)
+    return v - _least_change(system, q, rate, stiffness)
 
 
 def _least_change(
@@ -176,7 +186,8 @@ def consistent_state(
         Nodal coordinates of a body (4 a node, then separate curvatures if any); what its mesh's reference condition
         allows of them is kept.
     velocity : (n,) array, optional
-        Projected on the constraints; zero by default.
+        Projected on the constraints as by a blow. By default at rest, or where angles are prescribed moving with them,
+        links unbent.
     time : float
         [s], for prescribed joint angles.
 
@@ -193,5 +204,6 @@ def consistent_state(
         system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), time + 1.0), time + 1.0
     )
     q = project_position(system, signals, time, q)
-    start = np.zeros(system.n) if velocity is None else velocity
-    return State(time, q, project_velocity(system, signals, time, q, start))
+    if velocity is not None:
+        return State(time, q, project_velocity(system, signals, time, q, velocity))
+    return State(time, q, project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS))

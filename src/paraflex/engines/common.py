@@ -29,6 +29,8 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
         refuse(_PRINTED[name], "a prescribed angle", f"prescribed.{prescribed.name}")
     for damper in mechanism.dampers:
         refuse(_PRINTED[name], "a damper", f"damper.{damper.name}")
+    for spring in mechanism.linear_springs:
+        refuse(_PRINTED[name], "a spring between points", f"linear_spring.{spring.name}")
     for load in mechanism.loads:
         refuse(_PRINTED[name], "a load", f"load.{load.name}")
     if name == "mujoco":

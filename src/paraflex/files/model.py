@@ -19,6 +19,7 @@ from paraflex.files.schema import (
     CircleTable,
     ForceTable,
     GeneralSectionTable,
+    LinearSpringTable,
     LineTable,
     ModelTable,
     PathFile,
@@ -37,6 +38,7 @@ from paraflex.mechanism import (
     EndEffector,
     FlexibleBeam,
     Geometry,
+    LinearSpring,
     Load,
     LumpedMass,
     Material,
@@ -263,6 +265,7 @@ def _mechanism(table: ModelTable) -> Mechanism:
             TorsionalSpring(name, entry.joint, entry.stiffness, entry.rest) for name, entry in table.spring.items()
         ),
         dampers=tuple(TorsionalDamper(name, entry.joint, entry.coefficient) for name, entry in table.damper.items()),
+        linear_springs=tuple(_linear_spring(name, entry) for name, entry in table.linear_spring.items()),
         loads=tuple(_load(name, load) for name, load in table.load.items()),
         gravity=(table.gravity[0], table.gravity[1]),
         end_effector=None
@@ -271,6 +274,11 @@ def _mechanism(table: ModelTable) -> Mechanism:
         assemblies=tuple(Assembly(name, angles) for name, angles in table.assembly.items()),
         modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
     )
+
+
+def _linear_spring(name: str, entry: LinearSpringTable) -> LinearSpring:
+    a, b = (PointRef.parse(point, f"linear_spring.{name}.points") for point in entry.points)
+    return LinearSpring(name, a, b, entry.stiffness, entry.length, entry.damping)
 
 
 def _load(name: str, load: ForceTable | TorqueTable) -> Load:

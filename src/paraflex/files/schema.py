@@ -120,6 +120,15 @@ class DamperTable(_Table):
     coefficient: Number = Field(description="the coefficient in N m s/rad")
 
 
+class LinearSpringTable(_Table):
+    """A spring and damper between two points."""
+
+    points: Annotated[list[Text], Field(min_length=2, max_length=2)] = Field(description='["body.point", "body.point"]')
+    stiffness: Number = Field(description="the stiffness in N/m")
+    length: Number = Field(default=0.0, description="the free length in m")
+    damping: Number = Field(default=0.0, description="the damping in N s/m")
+
+
 class ForceTable(_Table):
     """A constant force."""
 
@@ -217,6 +226,7 @@ class ModelTable(_Table):
     prescribed: dict[str, PrescribedTable] = {}
     spring: dict[str, SpringTable] = {}
     damper: dict[str, DamperTable] = {}
+    linear_spring: dict[str, LinearSpringTable] = {}
     load: dict[str, Annotated[ForceTable | TorqueTable, Field(discriminator="type")]] = {}
     gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
     end_effector: EndEffectorTable | None = None

@@ -9,7 +9,7 @@ from math import cos, sin
 
 from paraflex.kernel.bending import bent_energy, bent_equations, bent_shortening
 from paraflex.kernel.compiling import inlined, kernel
-from paraflex.kernel.joints import apply_loads
+from paraflex.kernel.joints import apply_lines, apply_loads
 from paraflex.kernel.packed import GJ, I1, OMEGA2, S2X, S2Y
 
 
@@ -87,6 +87,7 @@ def motion_forces(p, q, v, a, f, points):
         for i in range(p.bodies.size):
             body_terms(p, i, q[k], v[k], a[k], f[k], points)
         apply_loads(p, q[k], f[k])
+        apply_lines(p, q[k], v[k], f[k])
 
 
 @kernel

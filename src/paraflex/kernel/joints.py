@@ -8,7 +8,7 @@ lose f/2, f'/2 and f''/2 along x.
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, sin, sqrt
 
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.compiling import inlined, kernel, routine
@@ -184,6 +184,55 @@ def apply_loads(p, q, f):
         _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
         apply_force(p, marker, q, -load.fx, -load.fy, rx, ry, f)
         apply_torque(p, marker, -load.torque, f)
+
+
+@inlined
+def line_end(p, marker, x, y, q, v):
+    """Position and velocity of an end of a line spring, and R s there: (px, py, vx, vy, rx, ry)."""
+    if marker < 0:
+        return x, y, 0.0, 0.0, 0.0, 0.0
+    px, py, vx, vy, _, _, rx, ry = marker_motion(p, p.markers[marker], q, v, v)
+    return px, py, vx, vy, rx, ry
+
+
+@routine
+def line_state(p, k, q, v):
+    """Stretch, its rate, and the unit vector from a to b of line spring k; zero length has no direction."""
+    line = p.lines[k]
+    ax, ay, vax, vay, _, _ = line_end(p, line.a, line.ax, line.ay, q, v)
+    bx, by, vbx, vby, _, _ = line_end(p, line.b, line.bx, line.by, q, v)
+    dx, dy = bx - ax, by - ay
+    length = sqrt(dx * dx + dy * dy)
+    if length == 0.0:
+        return -line.length, 0.0, 0.0, 0.0
+    ex, ey = dx / length, dy / length
+    return length - line.length, ex * (vbx - vax) + ey * (vby - vay), ex, ey
+
+
+@routine
+def apply_lines(p, q, v, f):
+    """Subtract the generalised forces of springs and dampers between points from f."""
+    for k in range(p.lines.size):
+        line = p.lines[k]
+        stretch, rate, ex, ey = line_state(p, k, q, v)
+        pull = line.stiffness * stretch + line.damping * rate
+        if line.a >= 0:
+            _, _, _, _, rx, ry = line_end(p, line.a, line.ax, line.ay, q, v)
+            apply_force(p, p.markers[line.a], q, -pull * ex, -pull * ey, rx, ry, f)
+        if line.b >= 0:
+            _, _, _, _, rx, ry = line_end(p, line.b, line.bx, line.by, q, v)
+            apply_force(p, p.markers[line.b], q, pull * ex, pull * ey, rx, ry, f)
+
+
+@routine
+def line_energy(p, q, v):
+    """Energy of the springs between points, and the power their dampers take."""
+    energy, power = 0.0, 0.0
+    for k in range(p.lines.size):
+        stretch, rate, _, _ = line_state(p, k, q, v)
+        energy += 0.5 * p.lines[k].stiffness * stretch * stretch
+        power += p.lines[k].damping * rate * rate
+    return energy, power
 
 
 @routine

@@ -5,7 +5,7 @@ from __future__ import annotations
 from paraflex.kernel.arrays import copy
 from paraflex.kernel.bodies import system_energy, weight_work
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import constraint_values, spring_energy
+from paraflex.kernel.joints import constraint_values, line_energy, spring_energy
 from paraflex.kernel.linear import factor_system, right_hand_side, solve_system
 from paraflex.kernel.run_state import (
     AGE,
@@ -70,7 +70,7 @@ def write_samples(p, tableau, t, h, m, ws, out):
         for r in range(m.stage_lam.shape[1]):
             out.lam[i, r] = (1.0 - x) * m.stage_lam[s0, r] + x * m.stage_lam[s1, r]
         out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i], ws.points)
-        out.energy[i, 1] += spring_energy(p, out.lam[i])
+        out.energy[i, 1] += spring_energy(p, out.lam[i]) + line_energy(p, out.q[i], out.v[i])[0]
         # Work by the trapezoidal rule within the step: the sum over whole steps is the scheme's own quadrature.
         done = (time - t) / h
         out.energy[i, 2] = m.clock[WORK] + h * done * (
@@ -111,7 +111,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     copy(m.v, m.stage_v[0])
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques)
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
-    strain += spring_energy(p, lam)
+    strain += spring_energy(p, lam) + line_energy(p, m.q, m.v)[0]
     m.clock[ENERGY_0] = kinetic + strain
     m.clock[WEIGHT_0] = weight_work(p, m.q, ws.points)
     note_constraints(p, signals, t, m, ws)
@@ -156,7 +156,7 @@ def accept(p, signals, tableau, t, h, m, ws, out):
     m.counts[AGE] += 1
     m.counts[FAILURES] = 0
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
-    strain += spring_energy(p, m.stage_lam[0])
+    strain += spring_energy(p, m.stage_lam[0]) + line_energy(p, m.q, m.v)[0]
     done = m.clock[WORK] + weight_work(p, m.q, ws.points) - m.clock[WEIGHT_0]
     balance = abs(kinetic + strain - m.clock[ENERGY_0] - done)
     m.clock[BALANCE] = max(m.clock[BALANCE], balance)

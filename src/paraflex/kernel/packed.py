@@ -89,6 +89,20 @@ LOAD = np.dtype(
     ],
     align=True,
 )
+LINE = np.dtype(
+    [
+        ("a", np.int64),  # markers of its ends, -1 on the ground
+        ("b", np.int64),
+        ("ax", np.float64),  # places of ends on the ground
+        ("ay", np.float64),
+        ("bx", np.float64),
+        ("by", np.float64),
+        ("stiffness", np.float64),
+        ("length", np.float64),
+        ("damping", np.float64),
+    ],
+    align=True,
+)
 ROW = np.dtype(
     [
         ("kind", np.int64),
@@ -111,6 +125,7 @@ class PackedSystem(NamedTuple):
     ports: NDArray[np.void]
     efforts: NDArray[np.void]
     loads: NDArray[np.void]
+    lines: NDArray[np.void]  # springs and dampers between points
     rows: NDArray[np.void]
     modal: NDArray[np.float64]  # (5, total nf): S2x, S2y, I1, G1 + Jf, omega^2
     I2: NDArray[np.float64]  # nf x nf of every body, row by row

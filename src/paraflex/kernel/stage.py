@@ -16,7 +16,7 @@ from math import isfinite
 
 from paraflex.kernel.bodies import body_terms
 from paraflex.kernel.compiling import kernel, routine
-from paraflex.kernel.joints import apply_loads, body_efforts, body_joints, start_compliant_rows, start_rows
+from paraflex.kernel.joints import apply_lines, apply_loads, body_efforts, body_joints, start_compliant_rows, start_rows
 from paraflex.kernel.linear import mass_norm, right_hand_side, solve_system
 from paraflex.kernel.signals import evaluate_signal
 
@@ -41,6 +41,7 @@ def equations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
         body_joints(p, i, q, v, a, lam, weight_v, weight_q, ws.f, ws.rows)
         body_efforts(p, i, torques, ws.f)
     apply_loads(p, q, ws.f)
+    apply_lines(p, q, v, ws.f)
 
 
 @routine

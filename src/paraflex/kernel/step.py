@@ -13,7 +13,7 @@ from math import isfinite
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.bending import note_all_axial_forces, subtract_geometric
 from paraflex.kernel.compiling import routine
-from paraflex.kernel.joints import damper_power, load_power, marker_angle
+from paraflex.kernel.joints import damper_power, line_energy, load_power, marker_angle
 from paraflex.kernel.linear import (
     factor_bodies,
     factor_system,
@@ -50,7 +50,7 @@ SLOW_AGE = 25
 @routine
 def input_power(p, signals, t, q, v, lam, torques):
     """Power of the motors, of prescribed motion and of loads, less what dampers take."""
-    total = load_power(p, q, v) - damper_power(p, lam)
+    total = load_power(p, q, v) - damper_power(p, lam) - line_energy(p, q, v)[1]
     for k in range(p.efforts.size):
         effort = p.efforts[k]
         total += effort.sign * torques[effort.signal] * marker_angle(p, p.markers[effort.marker], v)

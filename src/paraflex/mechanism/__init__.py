@@ -11,7 +11,7 @@ from paraflex.mechanism.joints import (
     RevoluteJoint,
     SampledAngle,
 )
-from paraflex.mechanism.loads import AppliedTorque, Load, PointForce, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.loads import AppliedTorque, LinearSpring, Load, PointForce, TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import (
     ActuationMode,
     Assembly,
@@ -39,6 +39,7 @@ __all__ = [
     "EndEffector",
     "FlexibleBeam",
     "Geometry",
+    "LinearSpring",
     "Load",
     "LumpedMass",
     "Material",

@@ -44,6 +44,7 @@ def check_names(mechanism: Mechanism) -> None:
         "prescribed": mechanism.prescribed,
         "spring": mechanism.springs,
         "damper": mechanism.dampers,
+        "linear_spring": mechanism.linear_springs,
         "load": mechanism.loads,
         "assembly": mechanism.assemblies,
         "mode": mechanism.modes,
@@ -197,6 +198,20 @@ def check_task(mechanism: Mechanism) -> None:
 def check_loads(mechanism: Mechanism) -> None:
     """Loads are finite and act on bodies; so is gravity."""
     _finite(mechanism.gravity, "gravity")
+    for spring in mechanism.linear_springs:
+        field = f"linear_spring.{spring.name}"
+        _known_point(mechanism, spring.a, f"{field}.points")
+        _known_point(mechanism, spring.b, f"{field}.points")
+        if spring.a.body == spring.b.body:
+            raise InputError(
+                "a spring needs two different bodies",
+                field=f"{field}.points",
+                value=f"{spring.a}, {spring.b}",
+                remedy="one end must be on another body or on the ground",
+            )
+        _not_negative(spring.stiffness, f"{field}.stiffness", "N/m")
+        _not_negative(spring.length, f"{field}.length", "m")
+        _not_negative(spring.damping, f"{field}.damping", "N s/m")
     for load in mechanism.loads:
         field = f"load.{load.name}"
         _known_point(mechanism, load.point, f"{field}.point")

@@ -33,6 +33,33 @@ class TorsionalDamper:
 
 
 @dataclass(frozen=True)
+class LinearSpring:
+    """A spring with a damper between two points, at most one of them on the ground.
+
+    It pulls with stiffness (distance - length) + damping (rate of the distance). Explicit in Newton's iteration: very
+    stiff ones dictate the step.
+
+    Attributes
+    ----------
+    name : str
+    a, b : PointRef
+    stiffness : float
+        [N/m]
+    length : float
+        Free length [m].
+    damping : float
+        [N s/m]
+    """
+
+    name: str
+    a: PointRef
+    b: PointRef
+    stiffness: float
+    length: float = 0.0
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
 class PointForce:
     """A constant force [N] at a named point of a body, given in the ground frame."""
 

@@ -11,7 +11,7 @@ from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint
-from paraflex.mechanism.loads import Load, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.loads import LinearSpring, Load, TorsionalDamper, TorsionalSpring
 
 TASK_COORDINATES = ("x", "y", "angle")
 # The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
@@ -76,6 +76,7 @@ class Mechanism:
         Joint angles given in time.
     springs : tuple of TorsionalSpring
     dampers : tuple of TorsionalDamper
+    linear_springs : tuple of LinearSpring
     loads : tuple of PointForce or AppliedTorque
     gravity : (x, y)
         Acceleration of free fall in the ground frame [m/s^2]; none by default.
@@ -105,6 +106,7 @@ class Mechanism:
     modes: tuple[ActuationMode, ...] = ()
     springs: tuple[TorsionalSpring, ...] = ()
     dampers: tuple[TorsionalDamper, ...] = ()
+    linear_springs: tuple[LinearSpring, ...] = ()
     loads: tuple[Load, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.LINEAR

@@ -102,6 +102,9 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         bodies=tuple(bodies),
         joints=(*(replace(joint, a=moved(joint.a), b=moved(joint.b)) for joint in mechanism.joints), *joints),
         springs=(*mechanism.springs, *springs),
+        linear_springs=tuple(
+            replace(spring, a=moved(spring.a), b=moved(spring.b)) for spring in mechanism.linear_springs
+        ),
         loads=tuple(replace(load, point=moved(load.point)) for load in mechanism.loads),
         end_effector=None if effector is None else replace(effector, point=moved(effector.point)),
         assemblies=tuple(
