@@ -26,7 +26,7 @@ _BELOW_ROW = 2.2
 _NUMBER_PAD = 1.8
 _TIME_NUMBERS = 4.0
 _AXIS_LABEL = 3.3
-_RIGHT = 2.5
+_RIGHT = 3.4  # half of a number such as 0.030
 
 # Widths of the letters of numbers [em] in DejaVu Sans, and its size on the axes [mm].
 _DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838}
