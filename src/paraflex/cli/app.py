@@ -29,6 +29,9 @@ PathOption = Annotated[
 MechanismOption = Annotated[
     str, typer.Option("--mechanism", "-m", metavar="NAME|FILE", help="A library mechanism or a TOML file.")
 ]
+DurationOption = Annotated[float | None, typer.Option(metavar="S", help="Duration, dwell included.")]
+SamplesOption = Annotated[int | None, typer.Option(metavar="N", help="Samples kept.")]
+AssemblyOption = Annotated[str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")]
 Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
 
 
@@ -61,11 +64,9 @@ def run(
         ),
     ] = None,
     tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance of the integration.")] = None,
-    duration: Annotated[float | None, typer.Option(metavar="S", help="Duration, dwell included.")] = None,
-    samples: Annotated[int | None, typer.Option(metavar="N", help="Samples kept.")] = None,
-    assembly: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")
-    ] = None,
+    duration: DurationOption = None,
+    samples: SamplesOption = None,
+    assembly: AssemblyOption = None,
     alpha: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient alpha.")] = None,
     beta: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient beta.")] = None,
     max_steps: Annotated[int | None, typer.Option(metavar="N", help="Steps before a run is given up.")] = None,
@@ -127,11 +128,9 @@ def verify(
     ] = None,
     tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance of runs with error control.")] = None,
     segments: Annotated[int | None, typer.Option(metavar="N", help="Finite segments on the longest beam.")] = None,
-    duration: Annotated[float | None, typer.Option(metavar="S", help="Duration, dwell included.")] = None,
-    samples: Annotated[int | None, typer.Option(metavar="N", help="Samples compared.")] = None,
-    assembly: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")
-    ] = None,
+    duration: DurationOption = None,
+    samples: SamplesOption = None,
+    assembly: AssemblyOption = None,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder for numbers and figures.")] = "verification",
     json: Json = False,
 ) -> None:
