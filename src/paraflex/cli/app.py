@@ -84,7 +84,10 @@ def run(
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder for results and figures.")] = "results",
     json: Json = False,
 ) -> None:
-    """Simulate a path in several actuation modes; write summary.json, results.nc and figures/."""
+    """Simulate a path in several actuation modes, or a model without a path on its own.
+
+    Writes summary.json, results.nc and figures/.
+    """
     from paraflex.cli.run import RunRequest, run_command
 
     request = RunRequest(
