@@ -8,7 +8,7 @@ import scipy.special
 
 from paraflex import plots
 from paraflex.errors import InputError, IntegrationError
-from paraflex.files import load
+from paraflex.files import library_file, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import (
     Assembly,
@@ -166,6 +166,30 @@ def test_finite_segments_of_it_swing_alike(tmp_path):
         ends.append(points["beam_12.tip" if extra else "beam.tip"])
     # A beam without stretch, hinged twelve times, swung through 90 degrees.
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-3)
+
+
+def test_balanced_it_hangs_still(tmp_path):
+    source = library_file("pendulum").read_text(encoding="utf-8").replace("beam = 0.0 }", "beam = -1.2 }")
+    file = tmp_path / "low.toml"
+    file.write_text(source)
+    done = paraflex("run", "-m", str(file), "--balanced", "--duration", "0.5", "--json", "--out", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["final"]["angle"]["beam"] == pytest.approx(-np.pi / 2, abs=1e-9)
+
+
+def test_a_path_may_start_from_equilibrium(tmp_path):
+    source = library_file("five_bar").read_text(encoding="utf-8").replace("\n[", "\ngravity = [0.0, -9.81]\n[", 1)
+    file = tmp_path / "heavy.toml"
+    file.write_text(source)
+    steps = {}
+    for extra in ([], ["--balanced"]):
+        done = paraflex("run", "-m", str(file), *extra, "--duration", "0.1", "--samples", "11", "--json",
+                        "--out", str(tmp_path / "out"))  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        summary = json.loads(done.stdout)
+        steps[bool(extra)] = summary["modes"]["++"]["steps"]
+        assert summary["parameters"]["run"]["balanced"] is bool(extra)
+    assert steps[True] < steps[False]
 
 
 @pytest.mark.parametrize(

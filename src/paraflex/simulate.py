@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
-from paraflex.dynamics import State, System, build_system, pack_signals
+from paraflex.dynamics import State, System, build_system, pack_signals, static_equilibrium
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution, integrate
 from paraflex.kinematics import Path, RigidMotion, follow_path
@@ -102,6 +102,23 @@ class TrackingTask:
             whole=self,
             carriers=segmented.carriers,
         )
+
+    def balanced(self, mode: str | ActuationMode) -> TrackingTask:
+        """The same task, starting from static equilibrium with the active motors of a mode held where the path begins.
+
+        Under weight or loads links sag before they move; started undeformed they would ring about that.
+
+        Raises
+        ------
+        InputError
+            The path does not start at rest.
+        AssemblyError
+            No equilibrium is found.
+        """
+        if np.any(self.motion.v[0]):
+            raise InputError("the path does not start at rest", field="path", remedy="start undeformed")
+        joints = [motor.joint for motor in self.mechanism.motors if motor.name in self.mode(mode).motors]
+        return replace(self, start=static_equilibrium(self.system, self.start, joints))
 
     def simulate(self, mode: str | ActuationMode, *, options: IntegrationOptions | None = None) -> TrackingRun:
         """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""

@@ -81,6 +81,9 @@ def run(
     ked: Annotated[
         bool, typer.Option("--ked", help="Kineto-elastodynamics: active motors held on the rigid motion.")
     ] = False,
+    balanced: Annotated[
+        bool, typer.Option("--balanced", help="Start from static equilibrium, active motors held; else undeformed.")
+    ] = False,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder for results and figures.")] = "results",
     json: Json = False,
 ) -> None:
@@ -107,6 +110,7 @@ def run(
         geometry=geometry,
         segments=segments,
         ked=ked,
+        balanced=balanced,
     )
     raise typer.Exit(run_command(request))
 

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, StudyRequest, results_folder, write_json
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels
+from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.errors import AssemblyError, InputError, IntegrationError
 from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
@@ -76,13 +77,19 @@ def _simulate(
         progress.start()
         progress.update(bar, completed=reached)
 
+    assembly, start = request.assembly or model.study.assembly, None
     try:
+        if request.balanced:
+            system = build_system(mechanism)
+            undeformed = consistent_state(system, mechanism.assembly(assembly))
+            start = static_equilibrium(system, undeformed, [motor.joint for motor in mechanism.motors])
         return simulate_motion(
             mechanism,
             duration,
             samples=samples,
-            assembly=request.assembly or model.study.assembly,
+            assembly=assembly,
             torques=model.study.torques,
+            start=start,
             options=options,
             on_progress=report,
         )

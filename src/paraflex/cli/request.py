@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ class StudyRequest:
     assembly: str | None
     out: str
     json: bool
+    balanced: bool = field(default=False, kw_only=True)
 
 
 def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:

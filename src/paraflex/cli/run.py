@@ -30,7 +30,7 @@ from paraflex.files import Model, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, finite_segments, proportional_segments
 from paraflex.results import save_results, summary
-from paraflex.simulate import TrackingTask
+from paraflex.simulate import TrackingRun, TrackingTask, simulate
 from paraflex.studies import Simulator, StudyResult, run_study
 
 
@@ -67,7 +67,7 @@ def run_command(request: RunRequest) -> int:
     if request.segments is not None:
         task = task.in_segments(proportional_segments(mechanism, request.segments))
     parameters = _parameters(model, path_name, modes, task, options, request)
-    result = _simulate(console, task, modes, options, parameters, simulate_ked if request.ked else None)
+    result = _simulate(console, task, modes, options, parameters, _method(request, options))
     if result.data is None:
         failures(console, result)
         return INTERRUPTED if result.interrupted else TROUBLE
@@ -99,6 +99,19 @@ def integration_options(request: RunRequest) -> IntegrationOptions:
         raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
 
 
+def _method(request: RunRequest, options: IntegrationOptions) -> Simulator | None:
+    """How each mode is run where it is not by the study's own way."""
+    if request.ked:
+        return simulate_ked
+    if not request.balanced:
+        return None
+
+    def from_equilibrium(task: TrackingTask, mode: str | ActuationMode, *, on_progress=None) -> TrackingRun:
+        return simulate(task.balanced(mode), mode, options=options, on_progress=on_progress)
+
+    return from_equilibrium
+
+
 def _without_path(model: Model, request: RunRequest) -> Mechanism:
     if request.ked:
         raise InputError("the model has no path to prescribe", field="--ked", remedy="add a [path.NAME] table")
@@ -121,9 +134,12 @@ def _check_fidelity(request: RunRequest) -> None:
         raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
-    for flag, value in (("--tol", request.tolerance), ("--max-steps", request.max_steps)):
+    given = {"--tol": request.tolerance, "--max-steps": request.max_steps, "--balanced": request.balanced or None}
+    for flag, value in given.items():
         if request.ked and value is not None:
-            raise InputError("means nothing with --ked", field=flag, value=value, remedy="its steps are fixed")
+            raise InputError(
+                "means nothing with --ked", field=flag, value=value, remedy="its steps are fixed, its start undeformed"
+            )
 
 
 def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
@@ -167,6 +183,7 @@ def _parameters(
             "rigid": request.rigid,
             "segments": request.segments,
             "ked": request.ked,
+            "balanced": request.balanced,
             "geometry": task.mechanism.geometry.value,
         },
     }

@@ -1,0 +1,105 @@
+"""Static equilibrium: where a mechanism stands still under weight, loads and springs, some joints held."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics.signals import constant_signals, pack_signals
+from paraflex.dynamics.state import State
+from paraflex.dynamics.system import System
+from paraflex.errors import AssemblyError, Moment
+from paraflex.kernel.packed import CONSTRAINT
+from paraflex.kernel.stage import equations
+
+_MAX_ITERATIONS = 50
+# Newton's iteration has converged when it moves links by less than this [m, rad] ...
+_SMALLEST_MOVE = 1e-10
+# ... and what is left of the forces is less than this fraction of the largest.
+_BALANCED = 1e-6
+# Differences that the Jacobian is taken by; forces are linear in multipliers and nearly so in small displacements.
+_DIFFERENCE = 1e-6
+# A pose that moves by more than this in one iteration has left the neighbourhood of the start [m, rad].
+_LONGEST_STEP = 0.3
+
+
+def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -> State:
+    """The state of rest nearest a start: all forces balance, joints closed, the angles of held joints kept.
+
+    Newton's iteration on forces and constraints, with the Jacobian by differences. Motors that hold may do so with any
+    torque; those that do not hold give none. A mechanism that nothing holds in some direction must be held there by
+    its weight or springs.
+
+    Parameters
+    ----------
+    system : System
+    start : State
+        Its q is where the search begins; its v does not matter.
+    held : sequence of str
+        Joints whose angles, slopes of beams included, stay as they are.
+
+    Raises
+    ------
+    AssemblyError
+        No equilibrium is found near the start.
+    """
+    rows = np.array([angle_row(system, joint) for joint in held]).reshape(-1, system.n)
+    kept = rows @ start.q
+    n, m, size = system.n, system.m, system.n + system.m + len(held)
+    residual = _Residual(system, start.time, rows, kept)
+    z = np.concatenate([start.q, np.zeros(m + len(held))])
+    # Stiffness spans ten powers of ten: modes are scaled to a stiffness of one.
+    scale = np.ones(size)
+    for body in system.bodies:
+        scale[body.flexible] = 1.0 / np.maximum(body.modes.omega, 1.0)
+    for _ in range(_MAX_ITERATIONS):
+        value = scale * residual(z)
+        jacobian = np.column_stack(
+            [(scale * residual(z + _DIFFERENCE * unit) - value) / _DIFFERENCE for unit in np.diag(scale)]
+        )
+        # Dependent rows and motors that hold one another leave multipliers open: those of least norm.
+        change = scale * np.linalg.lstsq(jacobian, -value, rcond=1e-12)[0]
+        reach = max(np.max(np.abs(change[body.offset : body.offset + 3])) for body in system.bodies)
+        z += change * min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
+        if reach <= _SMALLEST_MOVE and np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_force:
+            return State(start.time, z[:n], np.zeros(n))
+    raise AssemblyError("no static equilibrium near the start: hold more joints", Moment(start.time, 0), partial=z[:n])
+
+
+class _Residual:
+    """Forces, constraints and held angles at (q, multipliers, holding torques), at rest."""
+
+    def __init__(self, system: System, time: float, rows: NDArray[np.float64], kept: NDArray[np.float64]) -> None:
+        mechanism = system.mechanism
+        still = constant_signals([0.0] * len(mechanism.motors), time + 1.0)
+        self.system, self.time, self.rows, self.kept = system, time, rows, kept
+        self.signals, _ = pack_signals(mechanism, still, time + 1.0)
+        self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
+        self.still = np.zeros(system.n)
+        self.largest_force = 0.0
+
+    def __call__(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        system, ws, still = self.system, self.workspace, self.still
+        q, lam, torque = np.split(z, [system.n, system.n + system.m])
+        q, lam = np.ascontiguousarray(q), np.ascontiguousarray(lam)
+        equations(system.packed, self.signals, self.time, 0.0, 0.0, q, still, still, lam, self.torques, ws)
+        phi, _ = system.constraints(self.signals, self.time, q, still)
+        # Rows of springs have no second derivatives in them, those of dampers hold no force at rest.
+        closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
+        holding = self.rows.T @ torque
+        self.largest_force = max(np.max(np.abs(lam), initial=0.0), np.max(np.abs(holding), initial=0.0))
+        return np.concatenate([ws.f + holding, closed, self.rows @ q - self.kept])
+
+
+def angle_row(system: System, joint: str) -> NDArray[np.float64]:
+    """Row (n,) of the angle of a joint, slopes of beams included: side b less side a."""
+    row = np.zeros(system.n)
+    sides = system.mechanism.joint(joint)
+    for ref, sign in ((sides.a, -1.0), (sides.b, 1.0)):
+        if not ref.on_ground:
+            body = system.body(ref.body)
+            row[body.angle] += sign
+            row[body.flexible] += sign * system.marker(ref).slope
+    return row
