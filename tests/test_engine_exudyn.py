@@ -1,7 +1,10 @@
 """The Exudyn engine: another formulation and another integrator must tell the same story."""
 
 import dataclasses
+import os
+import signal
 import sys
+import threading
 
 import exudyn
 import numpy as np
@@ -275,3 +278,15 @@ def test_a_run_prints_nothing_and_leaves_nothing_behind(bar, capfd, tmp_path, mo
 def test_options_that_make_no_sense(options, says):
     with pytest.raises(InputError, match=says):
         ExudynOptions(**options)
+
+
+def test_ctrl_c_in_the_middle_is_no_divergence(raparm, square):
+    """The signal arrives while the engine steps; it must come out as what it is."""
+    task = plan_tracking(raparm, square, duration=0.7, samples=71)
+    timer = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            simulate_exudyn(task, "++++", ExudynOptions(step=1e-5))
+    finally:
+        timer.cancel()

@@ -1,7 +1,10 @@
 """MuJoCo on the same mechanisms, torques and start: another formulation, other code, the same motion."""
 
 import dataclasses
+import os
+import signal
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -210,3 +213,20 @@ def test_a_joint_may_name_the_ground_second():
     tree = spanning_tree(soft_five_bar())
     link = next(link for link in tree.links if link.name == "proximal2")
     assert (link.sign, link.own, link.parent) == (-1.0, PointRef("proximal2", "A2"), "ground")
+
+
+def test_ctrl_c_in_the_middle_is_no_divergence(raparm, square):
+    task = plan_tracking(raparm, square, duration=0.7, samples=71)
+    timer = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            simulate_mujoco(task, "++++", MuJoCoOptions(step=1e-5))
+    finally:
+        timer.cancel()
+
+
+def test_by_default_segments_are_of_one_length(square):
+    """Eight on every link of RAParM-I would make those of its short ones too stiff for the default step."""
+    task = plan_tracking(raparm_i(), square, duration=0.01, samples=3)
+    assert simulate_mujoco(task, "++++").figures["status"] == "complete"

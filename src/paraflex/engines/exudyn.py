@@ -7,6 +7,8 @@ frame, no assumption of small slopes.
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -169,6 +171,19 @@ def _silent(exu: Any) -> Iterator[None]:
         exu.config.printToConsole, exu.config.suppressWarnings = before
 
 
+@contextmanager
+def _noted(interrupts: list[bool]) -> Iterator[None]:
+    """Ctrl-C is noted instead of raised: raised in a function that Exudyn calls it would pass for a failure of that."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, lambda *_: interrupts.append(True))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 class _Model(NamedTuple):
     """What was built: the links; for each motor its loads and their signs; the multipliers of each joint."""
 
@@ -293,9 +308,11 @@ class _Recorder:
     torques: Array
     states: list[tuple[Array, Array, Array]] = field(default_factory=list)
     multipliers: list[Array] = field(default_factory=list)
+    interrupts: list[bool] = field(default_factory=list)
     finite: bool = True
 
     def before(self, mbs: Any, _: float) -> bool:
+        """Set the torques of the step that begins."""
         for torque, sides in zip(self.torques[len(self.states)], self.loads, strict=True):
             for load, sign in sides:
                 mbs.SetLoadParameter(load, "loadVector", [0.0, 0.0, sign * torque])
@@ -309,7 +326,7 @@ class _Recorder:
         if self.finite:
             self.states.append(state)
             self.multipliers.append(data.GetAECoordinates())
-        return self.finite
+        return self.finite and not self.interrupts
 
     def verdict(self) -> str:
         """Why a run that raised nothing stopped early; nothing if it did not."""
@@ -336,14 +353,17 @@ def _run(
     mbs.SetPreStepUserFunction(recorder.before)
     mbs.SetPostStepUserFunction(recorder.after)
     try:
-        if solver.InitializeSolver(mbs, settings):
-            solver.SolveSteps(mbs, settings)
-        solver.FinalizeSolver(mbs, settings)
+        with _noted(recorder.interrupts):
+            if solver.InitializeSolver(mbs, settings):
+                solver.SolveSteps(mbs, settings)
+            solver.FinalizeSolver(mbs, settings)
     except engine.exu.ExudynError as error:
         cause = next((line.strip() for line in str(error).splitlines() if line.strip()), "ExudynError")
     finally:
         mbs.SetPreStepUserFunction(0)
         mbs.SetPostStepUserFunction(0)
+    if recorder.interrupts:
+        raise KeyboardInterrupt
     cause, k = cause or recorder.verdict(), len(recorder.states)
     states = np.reshape(recorder.states, (k, 3, reference.size)).swapaxes(0, 1)
     # Exudyn 1.13 has a method for the sum, GetODE2CoordinatesTotal, which corrupts memory.

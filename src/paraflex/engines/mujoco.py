@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +23,7 @@ from paraflex.engines.tree import Tree, body_motion, joint_state, place, spannin
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
-from paraflex.mechanism import GROUND, ActuationMode, Mechanism, RevoluteJoint
+from paraflex.mechanism import GROUND, ActuationMode, Mechanism, RevoluteJoint, proportional_segments
 from paraflex.results.record import Record, record
 from paraflex.simulate import TrackingRun, TrackingTask
 
@@ -46,12 +46,12 @@ class MuJoCoOptions:
     ----------
     step : float
         Longest time step [s]; it is cut to divide the time between samples.
-    segments : int or mapping of str to int
-        Per flexible beam, where the task is not of segments already.
+    segments : int
+        On the longest flexible beam, others by their length, where the task is not of segments already.
     """
 
     step: float = 1.0 / 30000.0
-    segments: int | Mapping[str, int] = 8
+    segments: int = 8
 
 
 def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJoCoOptions | None = None) -> Record:
@@ -80,7 +80,7 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
     mujoco = import_engine("mujoco")
     options = options or MuJoCoOptions()
     began = time.perf_counter()
-    task = task if task.whole is not None else task.in_segments(options.segments)
+    task = task if task.whole is not None else task.in_segments(proportional_segments(task.mechanism, options.segments))
     torques = task.torques(mode)
     tree = spanning_tree(task.mechanism)
     count = steps_between(task.motion.t, options.step)
