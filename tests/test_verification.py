@@ -172,6 +172,20 @@ def test_ctrl_c_keeps_the_models_that_are_done(square):
     assert agreement(verification)["interrupted"]
 
 
+def test_ctrl_c_in_a_later_mode_keeps_the_modes_that_are_done(square):
+    task = plan_tracking(raparm_i(), square, duration=0.01, samples=3)
+
+    def stop(what, number, total):
+        if what.startswith("+-+-"):
+            raise KeyboardInterrupt
+
+    options = VerificationOptions(tolerance=1e-3)
+    verification = verify(task, ["++++", "+-+-"], models=("rigid", "linear"), options=options, on_progress=stop)
+    data = verification.dataset()
+    assert list(data["mode"].values) == ["++++"]
+    assert list(data["model"].values) == ["rigid", "linear"]
+
+
 def test_a_rigid_mechanism_is_the_same_in_every_model():
     """A five-bar without beams, every model of it: only MuJoCo's and Exudyn's own errors are left."""
     path = Line((0.0, 0.30), (0.04, 0.27), 20.0)

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
-from paraflex.dynamics import BodyCoordinates, System, angle_row, pack_signals
+from paraflex.dynamics import BodyCoordinates, System, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
 from paraflex.integrators.generalised_alpha import Block, GeneralisedAlpha, Response, march
@@ -201,7 +201,7 @@ def _nominal(task: TrackingTask, times: Array) -> _Motion:
 def _angle_rows(system: System, mode: ActuationMode) -> Array:
     """Rows (motors, n) of the angles of a mode's motors, slopes of the beams included: side b less side a."""
     active = [motor for motor in system.mechanism.motors if motor.name in mode.motors]
-    return np.array([angle_row(system, motor.joint) for motor in active]).reshape(-1, system.n)
+    return np.array([system.angle_row(motor.joint) for motor in active]).reshape(-1, system.n)
 
 
 def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array:

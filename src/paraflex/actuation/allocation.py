@@ -50,34 +50,19 @@ def required_effort(motion: RigidMotion) -> Effort:
     forces = np.zeros_like(motion.q)
     motion_forces(system.packed, motion.q, motion.v, motion.a, forces, make_point_scratch(system.packed))
     _add_springs_and_dampers(motion, forces)
-    selection = np.zeros((system.n, len(system.mechanism.motors)))
-    for column, motor in enumerate(system.mechanism.motors):
-        joint = system.mechanism.joint(motor.joint)
-        for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
-            if not ref.on_ground:
-                selection[system.body(ref.body).angle, column] += sign
+    selection = np.array([system.angle_row(motor.joint) for motor in system.mechanism.motors]).reshape(-1, system.n).T
     transposed = np.swapaxes(motion.basis, 1, 2)
     return Effort(motion, np.einsum("kij,kj->ki", transposed, forces), transposed @ selection)
 
 
 def _add_springs_and_dampers(motion: RigidMotion, forces: NDArray[np.float64]) -> None:
     """What springs and dampers at joints ask for besides inertia, into forces (k, n)."""
-    mechanism, system = motion.mechanism, motion.system
-
-    def relative(values: NDArray[np.float64], joint: str) -> NDArray[np.float64]:
-        a, b = mechanism.joint(joint).a, mechanism.joint(joint).b
-        turns = [np.zeros(len(values)) if ref.on_ground else values[:, system.body(ref.body).angle] for ref in (a, b)]
-        return turns[1] - turns[0]
-
-    torques = [
-        *((s.joint, s.stiffness * (relative(motion.q, s.joint) - s.rest)) for s in mechanism.springs),
-        *((d.joint, d.coefficient * relative(motion.v, d.joint)) for d in mechanism.dampers),
-    ]
-    for name, torque in torques:
-        joint = mechanism.joint(name)
-        for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
-            if not ref.on_ground:
-                forces[:, system.body(ref.body).angle] += sign * torque
+    for spring in motion.mechanism.springs:
+        row = motion.system.angle_row(spring.joint)
+        forces += np.outer(spring.stiffness * (motion.q @ row - spring.rest), row)
+    for damper in motion.mechanism.dampers:
+        row = motion.system.angle_row(damper.joint)
+        forces += np.outer(damper.coefficient * (motion.v @ row), row)
 
 
 def actuation_condition(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:

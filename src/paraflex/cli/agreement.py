@@ -42,8 +42,8 @@ def print_agreement(console: Console, figures: dict[str, Any], mode: str) -> Non
         console.print(title, soft_wrap=True)
         console.print(table)
 
-    print_mode = f"{figures['mechanism']}, mode {mode}"
-    show(f"{print_mode}: tracking error, and distance from the path of {_SHORT[reference]}", _errors(models, reference))
+    where = f"{figures['mechanism']}, mode {mode}"
+    show(f"{where}: tracking error, and distance from the path of {_SHORT[reference]}", _errors(models, reference))
     show("Largest distance between the paths of two models [m]", _distances(told, distances))
     show("Change of the path with a finer step and mesh, imbalance of energy, constraint violation", _soundness(told))
     for key, what in _LINKS.items() if compared else ():

@@ -10,7 +10,7 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, StudyRequest, results_folder, write_json
+from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, StudyRequest, at_fault, results_folder, write_json
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
@@ -100,10 +100,7 @@ def _simulate(
             str(error), field="assembly", remedy="correct its angles or the lengths", source=model.source
         ) from error
     except InputError as error:
-        flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly"}
-        if error.field in flags:
-            raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
-        raise error.in_file(model.source) from None
+        raise at_fault(error, model) from None
     finally:
         if progress.live.is_started:
             progress.stop()

@@ -76,10 +76,15 @@ def plan_study(
             source=model.source,
         ) from error  # fmt: skip
     except InputError as error:
-        flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly"}
-        if error.field in flags:
-            raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
-        raise error.in_file(model.source) from None
+        raise at_fault(error, model) from None
+
+
+def at_fault(error: InputError, model: Model) -> InputError:
+    """The same error, naming the option it came from or else the model's file."""
+    flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly"}
+    if error.field in flags:
+        return InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy)
+    return error.in_file(model.source)
 
 
 def _with_dwell(model: Model, path: EndEffectorPath) -> float:

@@ -1,7 +1,7 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
-from paraflex.dynamics.equilibrium import angle_row, static_equilibrium
+from paraflex.dynamics.equilibrium import static_equilibrium
 from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.state import (
     State,
@@ -20,7 +20,6 @@ __all__ = [
     "Marker",
     "State",
     "System",
-    "angle_row",
     "build_system",
     "consistent_state",
     "constant_signals",

@@ -45,7 +45,7 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
     AssemblyError
         No equilibrium is found near the start.
     """
-    rows = np.array([angle_row(system, joint) for joint in held]).reshape(-1, system.n)
+    rows = np.array([system.angle_row(joint) for joint in held]).reshape(-1, system.n)
     kept = rows @ start.q
     n, m, size = system.n, system.m, system.n + system.m + len(held)
     residual = _Residual(system, start.time, rows, kept)
@@ -91,15 +91,3 @@ class _Residual:
         holding = self.rows.T @ torque
         self.largest_force = max(np.max(np.abs(lam), initial=0.0), np.max(np.abs(holding), initial=0.0))
         return np.concatenate([ws.f + holding, closed, self.rows @ q - self.kept])
-
-
-def angle_row(system: System, joint: str) -> NDArray[np.float64]:
-    """Row (n,) of the angle of a joint, slopes of beams included: side b less side a."""
-    row = np.zeros(system.n)
-    sides = system.mechanism.joint(joint)
-    for ref, sign in ((sides.a, -1.0), (sides.b, 1.0)):
-        if not ref.on_ground:
-            body = system.body(ref.body)
-            row[body.angle] += sign
-            row[body.flexible] += sign * system.marker(ref).slope
-    return row

@@ -72,6 +72,17 @@ class System:
         """The material point of that name."""
         return make_marker(self.mechanism, self.bodies, self.index, ref)
 
+    def angle_row(self, joint: str) -> NDArray[np.float64]:
+        """Row (n,) of the angle of a joint, slopes of beams included: side b less side a."""
+        row = np.zeros(self.n)
+        sides = self.mechanism.joint(joint)
+        for ref, sign in ((sides.a, -1.0), (sides.b, 1.0)):
+            if not ref.on_ground:
+                body = self.body(ref.body)
+                row[body.angle] += sign
+                row[body.flexible] += sign * self.marker(ref).slope
+        return row
+
     def workspace(self) -> Workspace:
         """A fresh workspace for the kernels."""
         return make_workspace(self.packed)

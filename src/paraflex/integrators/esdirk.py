@@ -123,7 +123,7 @@ class Solution:
     multipliers : (k, m) array
         Constraint forces [N, N m], one a constraint row of the system.
     kinetic_energy, strain_energy, work : (k,) arrays
-        [J]; work is that of the motors and of prescribed motion.
+        [J]; work is that of motors, prescribed motion, weight and loads, less what dampers take.
     status : str
         "complete", "interrupted" or "failed".
     message : str

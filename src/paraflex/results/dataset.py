@@ -36,7 +36,7 @@ UNITS = {
     "joint_force": ("force of the joint on its second body, ground frame", "N"),
     "kinetic_energy": ("kinetic energy", "J"),
     "strain_energy": ("strain energy", "J"),
-    "work": ("work of motors and prescribed motion", "J"),
+    "work": ("work of motors, prescribed motion, weight and loads, less what dampers take", "J"),
     "actuation_condition": ("condition number of the actuation matrix", "1"),
     "status": ("how the run ended", "1"),
     "message": ("why it is not complete", "1"),

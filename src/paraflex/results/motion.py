@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +58,13 @@ def marker_motion(
         v[:, body.position] + turned(w * quarter(local) + rate),
         a[:, body.position] + turned(dw * quarter(local) - w**2 * local + 2.0 * w * quarter(rate) + second),
     )
+
+
+def joint_forces(system: System, names: Sequence[str], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Forces (k, joints, 2) of joints by name on their second bodies in the ground frame [N]."""
+    rows = [[system.rows.index(f"{name} {axis}") for axis in ("x", "y")] for name in names]
+    # Phi = p_b - p_a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
+    return -multipliers[:, np.array(rows, dtype=int).reshape(-1, 2)]
 
 
 def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from importlib.metadata import version
 from typing import Any
 
@@ -15,8 +14,9 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.dataset import SCHEMA, UNITS
-from paraflex.results.motion import point_motion, tip_deflection
+from paraflex.results.motion import joint_forces, point_motion, tip_deflection
 from paraflex.results.record import FIGURES
+from paraflex.results.summary import finite_or_none
 
 _OWN_UNITS = {
     "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
@@ -49,10 +49,10 @@ def motion_dataset(
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v, a = solution.q, solution.v, solution.a
     points = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
+    joints = [joint.name for joint in mechanism.joints]
     motions = [point_motion(system, point, q, v, a) for point in points]
     angles = [body.angle for body in system.bodies]
     tips = np.stack([tip_deflection(system, body.name, q) for body in system.bodies], axis=1)
-    rows = [[system.rows.index(f"{joint.name} {axis}") for axis in ("x", "y")] for joint in mechanism.joints]
     values: dict[str, tuple[tuple[str, ...], NDArray[np.float64]]] = {
         "coordinate_value": (("coordinate",), q),
         "coordinate_rate": (("coordinate",), v),
@@ -64,8 +64,7 @@ def motion_dataset(
         "tip_slope": (("body",), tips[:, :, 2]),
         "point_position": (("point", "axis"), _stacked([motion.position for motion in motions], len(q))),
         "point_velocity": (("point", "axis"), _stacked([motion.velocity for motion in motions], len(q))),
-        # Phi = p_b - p_a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
-        "joint_force": (("joint", "axis"), -solution.multipliers[:, np.array(rows, dtype=int).reshape(-1, 2)]),
+        "joint_force": (("joint", "axis"), joint_forces(system, joints, solution.multipliers)),
         "multiplier": (("row",), solution.multipliers),
         "kinetic_energy": ((), solution.kinetic_energy),
         "strain_energy": ((), solution.strain_energy),
@@ -81,7 +80,7 @@ def motion_dataset(
             "coordinate": _coordinate_names(run),
             "body": [body.name for body in system.bodies],
             "point": [str(point) for point in points],
-            "joint": [joint.name for joint in mechanism.joints],
+            "joint": joints,
             "row": list(system.rows),
             "axis": ["x", "y"],
             "motor": list(run.torques),
@@ -108,7 +107,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     """The run's figures as plain numbers; None for what it did not reach."""
     last = data.isel(time=-1)
     figures: dict[str, Any] = {name: data[name].item() for name in FIGURES}
-    figures = {key: None if isinstance(x, float) and not math.isfinite(x) else x for key, x in figures.items()}
+    figures = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in figures.items()}
     return {
         "mechanism": data.attrs["mechanism"],
         **figures,
@@ -116,7 +115,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
             "time": float(last["time"]),
             "angle": _numbers(last["angle"], "body"),
             "point_position": {
-                str(point): [_number(x) for x in last["point_position"].sel(point=point).values]
+                str(point): [finite_or_none(x) for x in last["point_position"].sel(point=point).values]
                 for point in data["point"].values
             },
         },
@@ -144,8 +143,4 @@ def _full(array: NDArray[np.float64], run: MotionRun) -> NDArray[np.float64]:
 
 
 def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:
-    return {str(name): _number(values.sel({dim: name}).item()) for name in values[dim].values}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}

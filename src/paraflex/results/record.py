@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System, node_marker
 from paraflex.mechanism import FIRST_END, LAST_END, FlexibleBeam, PointRef
-from paraflex.results.motion import PointMotion, marker_motion, point_motion, tip_deflection
+from paraflex.results.motion import PointMotion, joint_forces, marker_motion, point_motion, tip_deflection
 from paraflex.simulate import TrackingRun, TrackingTask
 
 # How a run went: names of the figures every record has.
@@ -96,7 +96,6 @@ def record(run: TrackingRun) -> Record:
     parts = _parts(task)
     first = [system.body(names[0]).angle for names in parts]
     chords = [_chord(system, names, q, v) for names in parts]
-    joints = [[system.rows.index(f"{joint.name} {axis}") for axis in ("x", "y")] for joint in whole.mechanism.joints]
     points = [
         point_motion(system, PointRef(_owner(task, names, point), point), q, v, a).position
         for body, names in zip(whole.mechanism.bodies, parts, strict=True)
@@ -116,8 +115,7 @@ def record(run: TrackingRun) -> Record:
         chord_rate=np.stack([rate for _, rate in chords], axis=1),
         tip=np.stack([_tip(system, names, q) for names in parts], axis=1),
         points=np.stack(points, axis=1) if points else np.zeros((q.shape[0], 0, 2)),
-        # Phi = p_b - p_a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
-        joint_force=-solution.multipliers[:, np.array(joints, dtype=int).reshape(-1, 2)],
+        joint_force=joint_forces(system, [joint.name for joint in whole.mechanism.joints], solution.multipliers),
         kinetic_energy=solution.kinetic_energy,
         strain_energy=solution.strain_energy,
         work=solution.work,

@@ -42,12 +42,12 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         figures: dict[str, Any] = {"status": str(run["status"].item())}
         if figures["status"] != "complete":
             figures["message"] = str(run["message"].item())
-        figures |= {key: _number(run[key].item()) for key in _FIGURES}
+        figures |= {key: finite_or_none(run[key].item()) for key in _FIGURES}
         figures |= {key: int(run[key].item()) for key in _COUNTS}
         for key in ("peak_torque", "rms_torque"):
-            figures[key] = {str(m): _number(run[key].sel(motor=m).item()) for m in run["motor"].values}
-        figures["end_effector_final"] = [_number(x) for x in run["end_effector"].isel(time=-1).values]
-        figures["actuation_condition_max"] = _number(np.max(run["actuation_condition"].values))
+            figures[key] = {str(m): finite_or_none(run[key].sel(motor=m).item()) for m in run["motor"].values}
+        figures["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
+        figures["actuation_condition_max"] = finite_or_none(np.max(run["actuation_condition"].values))
         modes[str(name)] = figures
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}
@@ -59,5 +59,6 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     }
 
 
-def _number(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
+    """A number as JSON can hold it."""
     return float(value) if math.isfinite(value) else None

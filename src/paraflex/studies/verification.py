@@ -107,21 +107,19 @@ class Verification:
     def dataset(self, *, parameters: dict | None = None) -> xr.Dataset:
         """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
 
-        Modes in which a model did not start are left out of it as a whole.
+        Modes that every model began; where there is none, models that every mode begun has.
         """
-        names = [
-            name
-            for name in self.models
-            if all(Refinement.NONE in by_model[name].records for by_model in self.runs.values() if name in by_model)
-            and all(name in by_model for by_model in self.runs.values())
-        ]
+        begun = {
+            mode: {name: runs.records[Refinement.NONE] for name, runs in by_model.items() if runs.records}
+            for mode, by_model in self.runs.items()
+        }
+        begun = {mode: records for mode, records in begun.items() if records}
+        kept = {mode: records for mode, records in begun.items() if len(records) == len(self.models)} or begun
+        names = [name for name in self.models if kept and all(name in records for records in kept.values())]
         if not names:
             raise InputError("no run to keep", field="models", remedy="see why the runs failed")
         parts = [
-            tracking_dataset(
-                [by_model[name].records[Refinement.NONE] for by_model in self.runs.values()], parameters=parameters
-            )
-            for name in names
+            tracking_dataset([records[name] for records in kept.values()], parameters=parameters) for name in names
         ]
         methods = [part.attrs.pop("method") for part in parts]
         data = xr.concat(parts, xr.Variable("model", names), combine_attrs="drop_conflicts", join="exact")
