@@ -2,6 +2,7 @@
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
 from paraflex.dynamics.equilibrium import static_equilibrium
+from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate
 from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.state import (
     State,
@@ -17,12 +18,15 @@ from paraflex.dynamics.system import System, build_system
 __all__ = [
     "BodyCoordinates",
     "InputSignals",
+    "JointCoordinate",
     "Marker",
     "State",
     "System",
+    "axis_angle",
     "build_system",
     "consistent_state",
     "constant_signals",
+    "joint_coordinate",
     "momentum",
     "node_marker",
     "pack_signals",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ class BodyCoordinates:
         None for a rigid body.
     points : MassPoints or None
         In modal coordinates, of a flexible beam of second-order geometry.
+    damping : (nf,) array
+        Of the modes [1/s].
     """
 
     name: str
@@ -51,6 +53,7 @@ class BodyCoordinates:
     modes: ModalBasis
     mesh: BeamMesh | None
     points: MassPoints | None = None
+    damping: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def nf(self) -> int:
@@ -152,7 +155,8 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordin
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf:
         points = mass_points(mesh, spans, lumps, integrals.D)
-    return BodyCoordinates(body.name, offset, integrals, modes, mesh, points)
+    damping = np.zeros(integrals.nf) if body.damping is None else body.damping.coefficients(modes.omega)
+    return BodyCoordinates(body.name, offset, integrals, modes, mesh, points, damping)
 
 
 def make_marker(

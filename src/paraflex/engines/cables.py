@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.fem import BeamMesh, SpanProperties
-from paraflex.mechanism import PointRef, RevoluteJoint
+from paraflex.mechanism import Joint, PointRef
 from paraflex.results.motion import PointMotion
 
 Array = NDArray[np.float64]
@@ -314,11 +314,11 @@ class Linkage:
         """Of a named point."""
         return self.part(ref).motion(ref.point, history)
 
-    def gap(self, joint: RevoluteJoint, history: History) -> Array:
+    def gap(self, joint: Joint, history: History) -> Array:
         """From side a of a joint to side b, with two derivatives (3, k, 2)."""
         return np.subtract(self.motion(joint.b, history), self.motion(joint.a, history))
 
-    def joint_turn(self, joint: RevoluteJoint, history: History) -> Turn:
+    def joint_turn(self, joint: Joint, history: History) -> Turn:
         """Of the material at side b of a joint against that at side a."""
         a, b = (self.part(ref).turn(ref.point, history) for ref in (joint.a, joint.b))
         return Turn(*np.subtract(b, a))

@@ -24,7 +24,7 @@ from paraflex.engines.cables import Array, Cable, Columns, Ground, History, Link
 from paraflex.engines.common import check_engine, import_engine, steps_between
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.fem import SpanProperties
-from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Mechanism, PointRef, RevoluteJoint, TorsionalSpring
+from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
 from paraflex.results.record import Record
 from paraflex.simulate import TrackingTask
 
@@ -150,7 +150,7 @@ class _Engine:
         """On position and turn of the material at a point."""
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(**linkage.part(ref).place(ref.point)))
 
-    def markers(self, linkage: Linkage, joint: RevoluteJoint) -> list[int]:
+    def markers(self, linkage: Linkage, joint: Joint) -> list[int]:
         return [self.marker(linkage, ref) for ref in (joint.a, joint.b)]
 
 
@@ -271,7 +271,7 @@ def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: Pose) -> Cable:
     return Cable(mesh, span, tuple(items), np.reshape(columns, (-1, 2)), lumps, pose.phi)
 
 
-def _add_motor(engine: _Engine, linkage: Linkage, joint: RevoluteJoint) -> list[tuple[int, float]]:
+def _add_motor(engine: _Engine, linkage: Linkage, joint: Joint) -> list[tuple[int, float]]:
     """Loads on the material at both sides of a joint, as numbers with signs."""
     return [
         (engine.mbs.AddLoad(engine.items.LoadTorqueVector(markerNumber=engine.marker(linkage, ref))), sign)
@@ -280,7 +280,7 @@ def _add_motor(engine: _Engine, linkage: Linkage, joint: RevoluteJoint) -> list[
     ]
 
 
-def _add_spring(engine: _Engine, linkage: Linkage, joint: RevoluteJoint, spring: TorsionalSpring) -> None:
+def _add_spring(engine: _Engine, linkage: Linkage, joint: Joint, spring: TorsionalSpring) -> None:
     """A spring between the material at both sides of a joint."""
     # Exudyn counts the angle on from its start, and starts within half a turn of zero.
     turns = 2.0 * np.pi * np.round((linkage.part(joint.b).start - linkage.part(joint.a).start) / (2.0 * np.pi))

@@ -17,8 +17,10 @@ from paraflex.files.read import read_toml, validate
 from paraflex.files.schema import (
     BeamTable,
     CircleTable,
+    DampingTable,
     ForceTable,
     GeneralSectionTable,
+    JointTable,
     LinearSpringTable,
     LineTable,
     ModelTable,
@@ -35,23 +37,31 @@ from paraflex.mechanism import (
     Assembly,
     Body,
     Curvature,
+    Damping,
     EndEffector,
     FlexibleBeam,
     Geometry,
+    Joint,
+    JointFriction,
     LinearSpring,
     Load,
     LumpedMass,
     Material,
     Mechanism,
+    ModalDamping,
     Motor,
     PointForce,
     PointRef,
     PrescribedAngle,
+    PrismaticJoint,
+    RayleighDamping,
     RevoluteJoint,
     RigidBody,
     Section,
+    SlotJoint,
     TorsionalDamper,
     TorsionalSpring,
+    WeldJoint,
     parse_mode,
 )
 
@@ -252,10 +262,7 @@ def _mechanism(table: ModelTable) -> Mechanism:
         geometry=Geometry(table.geometry),
         ground={name: (point[0], point[1]) for name, point in table.ground.items()},
         bodies=tuple(_body(name, body, table) for name, body in table.body.items()),
-        joints=tuple(
-            RevoluteJoint(name, *(PointRef.parse(side, f"joint.{name}") for side in sides))
-            for name, sides in table.joint.items()
-        ),
+        joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
         motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
         prescribed=tuple(
             PrescribedAngle(name, entry.joint, ConstantSpeed(entry.angle, entry.speed))
@@ -265,6 +272,9 @@ def _mechanism(table: ModelTable) -> Mechanism:
             TorsionalSpring(name, entry.joint, entry.stiffness, entry.rest) for name, entry in table.spring.items()
         ),
         dampers=tuple(TorsionalDamper(name, entry.joint, entry.coefficient) for name, entry in table.damper.items()),
+        frictions=tuple(
+            JointFriction(name, entry.joint, entry.limit, entry.speed) for name, entry in table.friction.items()
+        ),
         linear_springs=tuple(_linear_spring(name, entry) for name, entry in table.linear_spring.items()),
         loads=tuple(_load(name, load) for name, load in table.load.items()),
         gravity=(table.gravity[0], table.gravity[1]),
@@ -274,6 +284,40 @@ def _mechanism(table: ModelTable) -> Mechanism:
         assemblies=tuple(Assembly(name, angles) for name, angles in table.assembly.items()),
         modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
     )
+
+
+def _joint(name: str, entry: list[str] | JointTable) -> Joint:
+    points = entry if isinstance(entry, list) else entry.points
+    a, b = (PointRef.parse(point, f"joint.{name}") for point in points)
+    if isinstance(entry, list):
+        return RevoluteJoint(name, a, b)
+    # A field of another kind of joint would be read and not obeyed.
+    known = {"revolute": (), "slot": ("direction",), "weld": ("angle",), "prismatic": ("direction", "angle")}
+    given = {key: getattr(entry, key) for key in ("direction", "angle") if key in entry.model_fields_set}
+    for key, value in given.items():
+        if key not in known[entry.type]:
+            raise InputError(
+                f"a {entry.type} joint has no {key}", field=f"joint.{name}.{key}", value=value, remedy="leave it out"
+            )
+    return _JOINTS[entry.type](name, a, b, **given)
+
+
+_JOINTS = {"revolute": RevoluteJoint, "prismatic": PrismaticJoint, "slot": SlotJoint, "weld": WeldJoint}
+
+
+def _damping(table: DampingTable | None, name: str) -> Damping | None:
+    if table is None:
+        return None
+    if "ratios" not in table.model_fields_set:
+        return RayleighDamping(table.mass, table.stiffness)
+    if table.model_fields_set != {"ratios"}:
+        raise InputError(
+            "ratios and Rayleigh's coefficients exclude each other",
+            field=f"body.{name}.damping",
+            value=sorted(table.model_fields_set),
+            remedy="give ratios alone, or mass and stiffness",
+        )
+    return ModalDamping(tuple(table.ratios))
 
 
 def _linear_spring(name: str, entry: LinearSpringTable) -> LinearSpring:
@@ -319,6 +363,7 @@ def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:
         reference=ReferenceCondition(body.reference),
         curvature=Curvature(body.curvature),
         modes=body.modes,
+        damping=_damping(body.damping, name),
         flexible=body.flexible,
     )
 

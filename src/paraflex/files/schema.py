@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from paraflex.files.expressions import ExpressionError, evaluate
@@ -67,6 +67,14 @@ class LumpTable(_Table):
     inertia: Number = Field(default=0.0, description="the moment of inertia in kg m^2")
 
 
+class DampingTable(_Table):
+    """Structural damping of a beam: in proportion to mass and stiffness, or by a ratio for each mode."""
+
+    mass: Number = Field(default=0.0, description="the part in proportion to mass in 1/s")
+    stiffness: Number = Field(default=0.0, description="the part in proportion to stiffness in s")
+    ratios: list[Number] = Field(default=[], description="the damping ratio of each mode; the last serves the rest")
+
+
 class BeamTable(_Table):
     """A flexible beam along its x axis."""
 
@@ -84,6 +92,7 @@ class BeamTable(_Table):
         default="shared", description='curvature at lumped moments of inertia: "shared" or "separate"'
     )
     modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
+    damping: DampingTable | None = Field(default=None, description="a damping table")
     flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid beam")
 
 
@@ -95,6 +104,27 @@ class RigidTable(_Table):
     inertia: Number = Field(description="the moment of inertia about the centre of mass in kg m^2")
     centre_of_mass: Pair = Field(default=[0.0, 0.0], description="[x, y] in the body frame in m")
     points: dict[str, Pair] = Field(default={}, description="[x, y] of each named point in the body frame in m")
+
+
+TwoPoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
+
+
+class JointTable(_Table):
+    """A joint of any kind between two points."""
+
+    type: Literal["revolute", "prismatic", "slot", "weld"] = Field(
+        description='"revolute", "prismatic", "slot" or "weld"'
+    )
+    points: TwoPoints = Field(description='["body.point", "body.point"]')
+    direction: Number = Field(default=0.0, description="the angle of its axis against the first body in rad")
+    angle: Number = Field(default=0.0, description="the angle of the second body against the first in rad")
+
+
+# A revolute joint may be written as its two points alone. Tags are such that errors do not show them.
+JointEntry = Annotated[
+    Annotated[TwoPoints, Tag("list[point]")] | Annotated[JointTable, Tag("JointTable")],
+    Discriminator(lambda value: "JointTable" if isinstance(value, dict) else "list[point]"),
+]
 
 
 class PrescribedTable(_Table):
@@ -111,6 +141,14 @@ class SpringTable(_Table):
     joint: Text = Field(description="the name of a joint")
     stiffness: Number = Field(description="the stiffness in N m/rad")
     rest: Number = Field(default=0.0, description="the joint's angle at which the spring is free in rad")
+
+
+class FrictionTable(_Table):
+    """Dry friction at a joint, regularised: -limit tanh(rate / speed)."""
+
+    joint: Text = Field(description="the name of a joint")
+    limit: Number = Field(description="the friction torque in N m, or force in N")
+    speed: Number = Field(description="the speed below which it acts as a damper in rad/s or m/s")
 
 
 class DamperTable(_Table):
@@ -219,13 +257,14 @@ class ModelTable(_Table):
     body: dict[str, Annotated[BeamTable | RigidTable, Field(discriminator="type")]] = Field(
         description="at least one [body.NAME] table"
     )
-    joint: dict[str, Annotated[list[Text], Field(min_length=2, max_length=2)]] = Field(
-        default={}, description='["body.point", "body.point"] for each joint'
+    joint: dict[str, JointEntry] = Field(
+        default={}, description='["body.point", "body.point"] for each revolute joint, a table for others'
     )
     motor: dict[str, Text] = Field(default={}, description="the joint of each motor")
     prescribed: dict[str, PrescribedTable] = {}
     spring: dict[str, SpringTable] = {}
     damper: dict[str, DamperTable] = {}
+    friction: dict[str, FrictionTable] = {}
     linear_spring: dict[str, LinearSpringTable] = {}
     load: dict[str, Annotated[ForceTable | TorqueTable, Field(discriminator="type")]] = {}
     gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")

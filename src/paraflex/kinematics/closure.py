@@ -40,7 +40,7 @@ class RigidMotion:
     mechanism : Mechanism
         Rigid.
     system : System
-        Of it, without its springs and dampers: three coordinates a body (RDM).
+        Of it, without springs, dampers and friction at its joints: three coordinates a body (RDM).
     path : Path
     t : (k,) array
         [s]
@@ -122,8 +122,8 @@ class _Closure:
         effector = mechanism.end_effector
         assert effector is not None
         self.mechanism = mechanism
-        # Springs and dampers do not constrain.
-        self.system = system = build_system(replace(mechanism, springs=(), dampers=()))
+        # Springs, dampers and friction do not constrain.
+        self.system = system = build_system(replace(mechanism, springs=(), dampers=(), frictions=()))
         self.orientation = orientation
         self.signals: Signals = pack_signals(
             system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), end + 1.0), end + 1.0

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from paraflex.fem import BeamMesh, ReferenceCondition, mesh_beam
 
 
@@ -45,8 +48,8 @@ class Curvature(Enum):
         The paper's element: one value for both sides, zero at the tip. Converges with the first power of the element
         there.
     SEPARATE
-        A value on either side, and a free one at the tip. Converges with the eighth power; one coordinate more for
-        each such node.
+        A value on either side of such a node, and a free one at the tip, where a weld, a motor or a lump may bring in
+        a moment. Converges with the eighth power; one coordinate more for each such node and for the tip.
     """
 
     SHARED = "shared"
@@ -60,6 +63,41 @@ class LumpedMass:
     point: str
     mass: float
     inertia: float = 0.0
+
+
+@dataclass(frozen=True)
+class RayleighDamping:
+    """Structural damping in proportion to mass and stiffness: D = mass M_ff + stiffness K.
+
+    Attributes
+    ----------
+    mass : float
+        [1/s]
+    stiffness : float
+        [s]
+    """
+
+    mass: float = 0.0
+    stiffness: float = 0.0
+
+    def coefficients(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of mass-normalised modes of these angular frequencies [1/s]."""
+        return self.mass + self.stiffness * omega**2
+
+
+@dataclass(frozen=True)
+class ModalDamping:
+    """Structural damping by a ratio for each mode of a beam in its frame; the last serves all that follow."""
+
+    ratios: tuple[float, ...]
+
+    def coefficients(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+        """2 ratio omega of each mode [1/s]."""
+        last = len(self.ratios) - 1
+        return 2.0 * omega * np.array([self.ratios[min(k, last)] for k in range(omega.size)])
+
+
+Damping = RayleighDamping | ModalDamping
 
 
 @dataclass(frozen=True)
@@ -108,6 +146,8 @@ class FlexibleBeam:
         At nodes with a lumped moment of inertia; the paper's is shared.
     modes : int, optional
         Modes of lowest frequency kept as flexible coordinates, in its frame; all by default.
+    damping : RayleighDamping or ModalDamping, optional
+        Of its material; none by default.
     flexible : bool
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
@@ -122,6 +162,7 @@ class FlexibleBeam:
     reference: ReferenceCondition = ReferenceCondition.CANTILEVER
     curvature: Curvature = Curvature.SHARED
     modes: int | None = None
+    damping: Damping | None = None
     flexible: bool = True
 
     @property
@@ -135,7 +176,8 @@ class FlexibleBeam:
         """
         mesh = mesh_beam(self.length, self.points, self.elements)
         if self.curvature is Curvature.SEPARATE:
-            mesh = mesh.with_separate_curvature(mesh.points[lump.point] for lump in self.lumps if lump.inertia > 0.0)
+            jumps = [mesh.points[lump.point] for lump in self.lumps if lump.inertia > 0.0]
+            mesh = mesh.with_separate_curvature([*jumps, mesh.n_elements])
         return mesh
 
     def as_rigid(self) -> FlexibleBeam:

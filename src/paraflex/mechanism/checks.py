@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import mesh_beam
-from paraflex.mechanism.bodies import Body, RigidBody
-from paraflex.mechanism.joints import GROUND, PointRef
+from paraflex.mechanism.bodies import Body, Damping, ModalDamping, RayleighDamping, RigidBody
+from paraflex.mechanism.joints import GROUND, PointRef, WeldJoint
 from paraflex.mechanism.loads import PointForce
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def check_names(mechanism: Mechanism) -> None:
         "prescribed": mechanism.prescribed,
         "spring": mechanism.springs,
         "damper": mechanism.dampers,
+        "friction": mechanism.frictions,
         "linear_spring": mechanism.linear_springs,
         "load": mechanism.loads,
         "assembly": mechanism.assemblies,
@@ -94,6 +95,7 @@ def check_body(body: Body) -> None:
             )
         _not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
         _not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
+    _check_damping(body.damping, f"{field}.damping")
     if body.modes is not None and not 1 <= body.modes <= body.mesh.n_flexible:
         raise InputError(
             "no such number of modes",
@@ -101,6 +103,17 @@ def check_body(body: Body) -> None:
             value=body.modes,
             remedy=f"from 1 to {body.mesh.n_flexible}, or leave it out for all",
         )
+
+
+def _check_damping(damping: Damping | None, field: str) -> None:
+    if isinstance(damping, RayleighDamping):
+        _not_negative(damping.mass, f"{field}.mass", "1/s")
+        _not_negative(damping.stiffness, f"{field}.stiffness", "s")
+    if isinstance(damping, ModalDamping):
+        if not damping.ratios:
+            raise InputError("no damping ratio", field=f"{field}.ratios", value=[], remedy="give one, say [0.01]")
+        for ratio in damping.ratios:
+            _not_negative(ratio, f"{field}.ratios", "parts of critical damping, say 0.01")
 
 
 def check_ground(mechanism: Mechanism) -> None:
@@ -124,19 +137,30 @@ def check_references(mechanism: Mechanism) -> None:
                 value=f"{joint.a}, {joint.b}",
                 remedy="one side must lie on another body or on the ground",
             )
-    for motor in mechanism.motors:
-        _known(motor.joint, joints, f"motor.{motor.name}.joint", "joint")
-    for prescribed in mechanism.prescribed:
-        _known(prescribed.joint, joints, f"prescribed.{prescribed.name}.joint", "joint")
+        _finite([getattr(joint, "direction", 0.0)], f"joint.{joint.name}.direction")
+        _finite([getattr(joint, "angle", 0.0)], f"joint.{joint.name}.angle")
+    groups = {
+        "motor": mechanism.motors,
+        "prescribed": mechanism.prescribed,
+        "spring": mechanism.springs,
+        "damper": mechanism.dampers,
+        "friction": mechanism.frictions,
+    }
+    for kind, members in groups.items():
+        for member in members:
+            field = f"{kind}.{member.name}.joint"
+            _known(member.joint, joints, field, "joint")
+            if isinstance(mechanism.joint(member.joint), WeldJoint):
+                raise InputError("a weld does not move", field=field, value=member.joint, remedy="name another joint")
     for spring in mechanism.springs:
         field = f"spring.{spring.name}"
-        _known(spring.joint, joints, f"{field}.joint", "joint")
-        _positive(spring.stiffness, f"{field}.stiffness", "N m/rad")
+        _positive(spring.stiffness, f"{field}.stiffness", "N m/rad, or N/m")
         _finite([spring.rest], f"{field}.rest")
     for damper in mechanism.dampers:
-        field = f"damper.{damper.name}"
-        _known(damper.joint, joints, f"{field}.joint", "joint")
-        _positive(damper.coefficient, f"{field}.coefficient", "N m s/rad")
+        _positive(damper.coefficient, f"damper.{damper.name}.coefficient", "N m s/rad, or N s/m")
+    for friction in mechanism.frictions:
+        _positive(friction.limit, f"friction.{friction.name}.limit", "N m, or N")
+        _positive(friction.speed, f"friction.{friction.name}.speed", "rad/s, or m/s")
     for mode in mechanism.modes:
         for name in mode.motors:
             _known(name, motors, f"mode.{mode.name}", "motor")

@@ -10,8 +10,8 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint
-from paraflex.mechanism.loads import LinearSpring, Load, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.joints import Joint, Motor, PointRef, PrescribedAngle
+from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
 
 TASK_COORDINATES = ("x", "y", "angle")
 # The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
@@ -69,13 +69,14 @@ class Mechanism:
     ground : mapping
         Named points fixed in the ground frame [m].
     bodies : tuple of RigidBody or FlexibleBeam
-    joints : tuple of RevoluteJoint
+    joints : tuple of RevoluteJoint, PrismaticJoint, SlotJoint or WeldJoint
     motors : tuple of Motor
         Their order is that of the signs in a mode such as "+-+-".
     prescribed : tuple of PrescribedAngle
         Joint angles given in time.
     springs : tuple of TorsionalSpring
     dampers : tuple of TorsionalDamper
+    frictions : tuple of JointFriction
     linear_springs : tuple of LinearSpring
     loads : tuple of PointForce or AppliedTorque
     gravity : (x, y)
@@ -98,7 +99,7 @@ class Mechanism:
     name: str
     ground: Mapping[str, tuple[float, float]]
     bodies: tuple[Body, ...]
-    joints: tuple[RevoluteJoint, ...]
+    joints: tuple[Joint, ...]
     motors: tuple[Motor, ...] = ()
     prescribed: tuple[PrescribedAngle, ...] = ()
     end_effector: EndEffector | None = None
@@ -106,6 +107,7 @@ class Mechanism:
     modes: tuple[ActuationMode, ...] = ()
     springs: tuple[TorsionalSpring, ...] = ()
     dampers: tuple[TorsionalDamper, ...] = ()
+    frictions: tuple[JointFriction, ...] = ()
     linear_springs: tuple[LinearSpring, ...] = ()
     loads: tuple[Load, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
@@ -119,7 +121,7 @@ class Mechanism:
         """The body of that name."""
         return next(body for body in self.bodies if body.name == name)
 
-    def joint(self, name: str) -> RevoluteJoint:
+    def joint(self, name: str) -> Joint:
         """The joint of that name."""
         return next(joint for joint in self.joints if joint.name == name)
 

@@ -8,9 +8,9 @@ from itertools import pairwise
 from math import ceil
 
 from paraflex.errors import InputError, suggestion
-from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody
+from paraflex.mechanism.bodies import Body, FlexibleBeam, RayleighDamping, RigidBody
 from paraflex.mechanism.joints import PointRef, RevoluteJoint
-from paraflex.mechanism.loads import TorsionalSpring
+from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import Mechanism
 
 # Points at which segments hang together.
@@ -70,6 +70,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
     bodies: list[Body] = []
     joints: list[RevoluteJoint] = []
     springs: list[TorsionalSpring] = []
+    dampers: list[TorsionalDamper] = []
     carriers: dict[str, tuple[str, float]] = {}
     places: dict[tuple[str, str], str] = {}
     for body in mechanism.bodies:
@@ -78,7 +79,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
             carriers[body.name] = (body.name, 0.0)
             continue
         assert isinstance(body, FlexibleBeam)
-        n = counts[body.name]
+        n, lag = counts[body.name], _stiffness_damping(body)
         length = body.length / n
         stiffness = body.material.youngs_modulus * body.section.second_moment / length
         names = [f"{body.name}_{i + 1}" for i in range(n)]
@@ -90,6 +91,8 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
             hinge = f"{a}-{b}"
             joints.append(RevoluteJoint(hinge, PointRef(a, LAST_END), PointRef(b, FIRST_END)))
             springs.append(TorsionalSpring(hinge, hinge, stiffness))
+            if lag:
+                dampers.append(TorsionalDamper(hinge, hinge, lag * stiffness))
         places |= {(body.name, point): names[i] for point, i in owners.items()}
 
     def moved(ref: PointRef) -> PointRef:
@@ -102,6 +105,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         bodies=tuple(bodies),
         joints=(*(replace(joint, a=moved(joint.a), b=moved(joint.b)) for joint in mechanism.joints), *joints),
         springs=(*mechanism.springs, *springs),
+        dampers=(*mechanism.dampers, *dampers),
         linear_springs=tuple(
             replace(spring, a=moved(spring.a), b=moved(spring.b)) for spring in mechanism.linear_springs
         ),
@@ -126,6 +130,20 @@ def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, in
         if name not in counts:
             raise InputError("no number of segments", field="segments", value=name, remedy="give one for every beam")
     return counts
+
+
+def _stiffness_damping(beam: FlexibleBeam) -> float:
+    """Coefficient of stiffness-proportional damping [s]: all that hinges can have."""
+    if beam.damping is None:
+        return 0.0
+    if isinstance(beam.damping, RayleighDamping) and beam.damping.mass == 0.0:
+        return beam.damping.stiffness
+    raise InputError(
+        "finite segments can be damped in proportion to stiffness only",
+        field=f"body.{beam.name}.damping",
+        value=beam.damping,
+        remedy="give damping = { stiffness = ... }, or none",
+    )
 
 
 def _segment(beam: FlexibleBeam, name: str, i: int, length: float, owners: Mapping[str, int]) -> RigidBody:

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import Marker, System
+from paraflex.dynamics import Marker, System, axis_angle
 from paraflex.fem import node_weights
 from paraflex.fem.element import AXIAL, SLOPE, TRANSVERSE
-from paraflex.mechanism import PointRef
+from paraflex.mechanism import PointRef, PrismaticJoint, SlotJoint
 
 
 class PointMotion(NamedTuple):
@@ -60,11 +60,25 @@ def marker_motion(
     )
 
 
-def joint_forces(system: System, names: Sequence[str], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Forces (k, joints, 2) of joints by name on their second bodies in the ground frame [N]."""
-    rows = [[system.rows.index(f"{name} {axis}") for axis in ("x", "y")] for name in names]
-    # Phi = p_b - p_a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
-    return -multipliers[:, np.array(rows, dtype=int).reshape(-1, 2)]
+def joint_forces(
+    system: System, names: Sequence[str], q: NDArray[np.float64], multipliers: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Forces (k, joints, 2) of joints by name on their second bodies in the ground frame [N].
+
+    Those of a prismatic joint or slot are normal to its axis.
+    """
+    row = {label: i for i, label in enumerate(system.rows)}
+    forces = np.zeros((len(q), len(names), 2))
+    for i, name in enumerate(names):
+        joint = system.mechanism.joint(name)
+        # Phi is of b less of a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
+        if isinstance(joint, PrismaticJoint | SlotJoint):
+            along = axis_angle(system, joint, q)
+            normal = np.column_stack([-np.sin(along), np.cos(along)])
+            forces[:, i] = -multipliers[:, row[f"{name} normal"], None] * normal
+        else:
+            forces[:, i] = -multipliers[:, [row[f"{name} x"], row[f"{name} y"]]]
+    return forces
 
 
 def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -115,7 +115,7 @@ def record(run: TrackingRun) -> Record:
         chord_rate=np.stack([rate for _, rate in chords], axis=1),
         tip=np.stack([_tip(system, names, q) for names in parts], axis=1),
         points=np.stack(points, axis=1) if points else np.zeros((q.shape[0], 0, 2)),
-        joint_force=joint_forces(system, [joint.name for joint in whole.mechanism.joints], solution.multipliers),
+        joint_force=joint_forces(system, [joint.name for joint in whole.mechanism.joints], q, solution.multipliers),
         kinetic_energy=solution.kinetic_energy,
         strain_energy=solution.strain_energy,
         work=solution.work,
