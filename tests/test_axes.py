@@ -44,6 +44,7 @@ from paraflex.mechanism import (
     RigidBody,
     SampledAngle,
     Section,
+    SlidingJoint,
     SlotJoint,
     TorsionalDamper,
     TorsionalSpring,
@@ -82,11 +83,12 @@ def make_sliders(geometry=Geometry.LINEAR):
     )
     block = RigidBody("block", 0.2, 3e-3, (0.1, 0.04), {"B": (-0.02, 0.01), "S": (0.03, -0.05)})
     plate = RigidBody("plate", 0.1, 1e-3, (-0.05, 0.02), {"W": (0.0, 0.1), "T": (0.2, 0.03)})
+    bob = RigidBody("bob", 0.05, 2e-4, (0.01, 0.0), {"C": (0.02, -0.01)})
     swing = SampledAngle(lambda t: 0.2 * t**2 - t, lambda t: 0.4 * t - 1, lambda t: 0.4 + 0 * t)
     return Mechanism(
         name="sliders",
         ground={"O": (-0.2, 0.1), "G": (0.5, -0.15)},
-        bodies=(crank, rod, block, plate),
+        bodies=(crank, rod, block, plate, bob),
         joints=(
             RevoluteJoint("O", ref("ground.O"), ref("crank.O")),
             PrismaticJoint("guide", ref("crank.M"), ref("block.B"), direction=0.4, angle=0.2),
@@ -94,8 +96,10 @@ def make_sliders(geometry=Geometry.LINEAR):
             WeldJoint("weld", ref("rod.W"), ref("plate.W"), angle=0.3),
             SlotJoint("rail", ref("ground.G"), ref("plate.T"), direction=1.1),
             SlotJoint("pin", ref("plate.W"), ref("ground.G"), direction=0.3),
+            SlidingJoint("bead", ref("rod.R"), ref("bob.C")),
+            SlidingJoint("trolley", ref("crank.P"), ref("ground.G")),
         ),
-        motors=(Motor("screw", "guide"), Motor("turn", "O"), Motor("push", "pin")),
+        motors=(Motor("screw", "guide"), Motor("turn", "O"), Motor("push", "pin"), Motor("pull", "bead")),
         prescribed=(PrescribedAngle("drive", "slot", swing),),
         springs=(TorsionalSpring("soft", "guide", 30.0, 0.1), TorsionalSpring("twist", "O", 3.0, 0.2)),
         dampers=(TorsionalDamper("oil", "rail", 2.0),),
@@ -127,6 +131,19 @@ def angle(system, point, q):
     return 0.0 if point.on_ground else twins.angle_row(system.marker(point)) @ q[system.body(point.body).all]
 
 
+def in_frame(system, joint, q):
+    """Point b of a sliding joint in the frame of its beam."""
+    body = system.body(joint.a.body)
+    return twins.rotation(q[body.angle]).T @ (place(system, joint.b, q) - q[body.position])
+
+
+def above_beam(system, joint, q):
+    """How far point b of a sliding joint is above the bent beam, by the shape functions where it stands."""
+    body = system.body(joint.a.body)
+    s = in_frame(system, joint, q)
+    return s[1] - twins.beam_shape(body.mesh.nodes, s[0])[1] @ body.integrals.D @ q[body.flexible]
+
+
 def along_axis(system, joint, q, turned=0.0):
     """Component of p_b - p_a along the joint's axis, or along the axis turned."""
     theta = angle(system, joint.a, q) + joint.direction + turned
@@ -136,6 +153,8 @@ def along_axis(system, joint, q, turned=0.0):
 
 def coordinate(system, name, q):
     joint = system.mechanism.joint(name)
+    if isinstance(joint, SlidingJoint):
+        return in_frame(system, joint, q)[0] - system.mechanism.body(joint.a.body).points[joint.a.point]
     if isinstance(joint, PrismaticJoint | SlotJoint):
         return along_axis(system, joint, q)
     return angle(system, joint.b, q) - angle(system, joint.a, q)
@@ -148,7 +167,9 @@ def row_values(system, t, q):
         gap = place(system, joint.b, q) - place(system, joint.a, q)
         turn = angle(system, joint.b, q) - angle(system, joint.a, q) - getattr(joint, "angle", 0.0)
         out |= {f"{joint.name} x": gap[0], f"{joint.name} y": gap[1], f"{joint.name} angle": turn}
-        if hasattr(joint, "direction"):
+        if isinstance(joint, SlidingJoint):
+            out[f"{joint.name} normal"] = above_beam(system, joint, q)
+        elif hasattr(joint, "direction"):
             out[f"{joint.name} normal"] = along_axis(system, joint, q, np.pi / 2)
     mechanism = system.mechanism
     for member in (*mechanism.prescribed, *mechanism.springs, *mechanism.dampers, *mechanism.frictions):
@@ -176,18 +197,32 @@ def terms(system, q, v, a, lam, torques, weights=(0.0, 0.0), noted=None):
     return ws.f.copy(), ws.rows.copy()
 
 
+def random_state(system, seed):
+    """Far from rest, but with sliding points within the lengths of their beams."""
+    q, v, a = twins.random_state(system, seed)
+    for name, stand in (("trolley", (0.17, 0.02)), ("bead", (0.31, -0.03))):
+        joint = system.mechanism.joint(name)
+        miss = np.array(stand) - in_frame(system, joint, q)
+        shift = twins.rotation(q[system.body(joint.a.body).angle]) @ miss
+        if joint.b.on_ground:
+            q[system.body(joint.a.body).position] -= shift
+        else:
+            q[system.body(joint.b.body).position] += shift
+    return q, v, a
+
+
 # --- Kernels --------------------------------------------------------------------------------------------------------
 
 
 def test_rows_are_named_by_joint_and_what_they_hold(sliders):
     joints = ["O x", "O y", "guide normal", "guide angle", "slot normal", "weld x", "weld y", "weld angle"]
-    joints += ["rail normal", "pin normal"]
+    joints += ["rail normal", "pin normal", "bead normal", "trolley normal"]
     others = ["drive travel", "soft travel", "twist angle", "oil travel", "dry travel", "rub angle"]
     assert sorted(sliders.rows) == sorted(joints + others)
 
 
 def test_constraints_their_rate_and_jacobian(sliders):
-    q, v, _ = twins.random_state(sliders, 41)
+    q, v, _ = random_state(sliders, 41)
     phi, rate = sliders.constraints(twins.still_signals(sliders), TIME, q, v)
     rigid = kinds(sliders, CONSTRAINT)
     np.testing.assert_allclose(phi[rigid], row_values(sliders, TIME, q)[rigid], rtol=0, atol=1e-12)
@@ -200,9 +235,9 @@ def test_constraints_their_rate_and_jacobian(sliders):
 
 
 def test_acceleration_rows_are_second_derivatives_along_a_motion(sliders):
-    q0, v0, a0 = twins.random_state(sliders, 42)
+    q0, v0, a0 = random_state(sliders, 42)
     weight_v, weight_q = 40.0, 400.0
-    torques = np.zeros(3)
+    torques = np.zeros(4)
     # Baumgarte's weights are 2 alpha and beta^2.
     _, rows = terms(sliders, q0, v0, a0, np.zeros(sliders.m), torques, (20.0, 20.0))
 
@@ -222,9 +257,9 @@ def test_acceleration_rows_are_second_derivatives_along_a_motion(sliders):
 
 
 def test_rows_of_springs_dampers_and_friction(sliders):
-    q, v, a = twins.random_state(sliders, 43)
+    q, v, a = random_state(sliders, 43)
     lam = np.random.default_rng(44).normal(size=sliders.m)
-    _, rows = terms(sliders, q, v, a, lam, np.zeros(3))
+    _, rows = terms(sliders, q, v, a, lam, np.zeros(4))
     value = row_values(sliders, TIME, q)
     rate = numeric_jacobian(sliders, q) @ v
     row = {name: i for i, name in enumerate(sliders.rows)}
@@ -241,11 +276,11 @@ def test_rows_of_springs_dampers_and_friction(sliders):
 
 
 def test_forces_are_the_transposed_jacobian_times_multipliers_and_motor_forces(sliders):
-    q, v, a = twins.random_state(sliders, 45)
+    q, v, a = random_state(sliders, 45)
     rng = np.random.default_rng(46)
-    lam, torques = rng.normal(size=sliders.m), rng.normal(size=3)
+    lam, torques = rng.normal(size=sliders.m), rng.normal(size=4)
     f, _ = terms(sliders, q, v, a, lam, torques)
-    free, _ = terms(sliders, q, v, a, np.zeros(sliders.m), np.zeros(3))
+    free, _ = terms(sliders, q, v, a, np.zeros(sliders.m), np.zeros(4))
     expected = numeric_jacobian(sliders, q).T @ lam
     for motor, torque in zip(sliders.mechanism.motors, torques, strict=True):
         rows = [twins.along(lambda q, j=motor.joint: coordinate(sliders, j, q), q, e) for e in np.eye(sliders.n)]
@@ -254,8 +289,8 @@ def test_forces_are_the_transposed_jacobian_times_multipliers_and_motor_forces(s
 
 
 def test_joint_coordinates_with_their_rates_and_rows(sliders):
-    q, v, _ = twins.random_state(sliders, 47)
-    for name in ("O", "guide", "slot", "rail", "pin"):
+    q, v, _ = random_state(sliders, 47)
+    for name in ("O", "guide", "slot", "rail", "pin", "bead", "trolley"):
         found = joint_coordinate(sliders, name, q[None], v[None])
         assert found.value[0] == pytest.approx(coordinate(sliders, name, q), abs=1e-12)
         rows = np.array([twins.along(lambda q, j=name: coordinate(sliders, j, q), q, e) for e in np.eye(sliders.n)])
@@ -267,7 +302,7 @@ def test_joint_coordinates_with_their_rates_and_rows(sliders):
 def test_the_factored_system_solves_the_dense_one(g):
     # Linear geometry: M has a closed form in the twins.
     system = build_system(make_sliders())
-    q, v, _ = twins.random_state(system, 48)
+    q, v, _ = random_state(system, 48)
     rng = np.random.default_rng(49)
     ws = system.workspace()
     note_friction(system.packed, q, v, ws.mu, ws.compliance)
@@ -293,13 +328,13 @@ def test_the_factored_system_solves_the_dense_one(g):
 
 
 def test_damping_is_that_of_the_modes(sliders):
-    q, v, a = twins.random_state(sliders, 50)
+    q, v, a = random_state(sliders, 50)
     slow = np.zeros_like(v)
-    f, _ = terms(sliders, q, v, a, np.zeros(sliders.m), np.zeros(3), noted=slow)
+    f, _ = terms(sliders, q, v, a, np.zeros(sliders.m), np.zeros(4), noted=slow)
     undamped = build_system(make_sliders(sliders.mechanism.geometry).with_bodies(
         [replace(sliders.mechanism.body(name), damping=None) for name in ("crank", "rod")]
     ))  # fmt: skip
-    free, _ = terms(undamped, q, v, a, np.zeros(sliders.m), np.zeros(3), noted=slow)
+    free, _ = terms(undamped, q, v, a, np.zeros(sliders.m), np.zeros(4), noted=slow)
     crank, rod = sliders.body("crank"), sliders.body("rod")
     expected = np.zeros(sliders.n)
     expected[crank.flexible] = (0.7 + 2e-4 * crank.modes.omega**2) * v[crank.flexible]
@@ -434,6 +469,39 @@ def test_a_scotch_yoke_moves_as_the_cosine_of_its_crank():
     np.testing.assert_allclose(force[:, 1], 0.0, rtol=0, atol=1e-4)
 
 
+def test_a_mass_hung_on_a_beam_slides_where_the_beam_bends():
+    """A bead on a stiff beam that its own weight bends: it stays on the static deflection line to first order."""
+    section, material = Section.rectangle(width=0.02, thickness=0.004), Material(70e9, 2700.0)
+    beam = FlexibleBeam("beam", 1.0, section, material, points={"A": 0.0, "B": 1.0}, elements=4)
+    bead = RigidBody("bead", 0.2, 1e-5, points={"C": (0.0, 0.0)})
+    mechanism = Mechanism(
+        name="bead",
+        ground={"A": (0.0, 0.0), "B": (1.0, 0.0)},
+        bodies=(beam, bead),
+        joints=(
+            RevoluteJoint("A", ref("ground.A"), ref("beam.A")),
+            SlotJoint("B", ref("ground.B"), ref("beam.B")),
+            SlidingJoint("wire", ref("beam.A"), ref("bead.C")),
+        ),
+        prescribed=(PrescribedAngle("haul", "wire", SampledAngle(
+            lambda t: 0.1 + 0.08 * t, lambda t: 0.08 + 0 * t, lambda t: 0 * t)),),
+        assemblies=(Assembly("start", {"beam": 0.0, "bead": 0.0}),),
+        gravity=(0.0, -G),
+    )  # fmt: skip
+    system = build_system(mechanism)
+    start = static_equilibrium(system, consistent_state(system, mechanism.assembly()))
+    EI, line = 70e9 * 0.02 * 0.004**3 / 12.0, 2700.0 * 0.02 * 0.004 * G
+
+    def sag(x):
+        # A simply supported beam under a load W at x, where it stands, and its own weight.
+        return 0.2 * G * x**2 * (1 - x) ** 2 / (3 * EI) + line * x * (1 - 2 * x**2 + x**3) / (24 * EI)
+
+    data = motion_dataset(simulate_motion(mechanism, 10.0, samples=21, start=start))
+    C = data["point_position"].sel(point="bead.C").values
+    np.testing.assert_allclose(C[:, 0], 0.1 + 0.08 * data["time"], rtol=0, atol=2e-4)
+    np.testing.assert_allclose(C[:, 1], -sag(C[:, 0]), rtol=0, atol=0.02 * sag(0.5))
+
+
 def test_a_prescribed_travel_is_kept():
     law = SampledAngle(
         lambda t: 0.1 * np.sin(7 * t), lambda t: 0.7 * np.cos(7 * t), lambda t: -4.9 * np.sin(7 * t)
@@ -512,7 +580,7 @@ def test_everything_at_once_keeps_its_energy_balance():
     solution = run.solution
     scale = np.max(solution.kinetic_energy + solution.strain_energy)
     assert solution.energy_balance_max < 1e-4 * scale
-    assert solution.constraint_position_max < 1e-6
+    assert solution.constraint_position_max < 1e-5
 
 
 # --- What makes no sense --------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,3 +183,20 @@ def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
     N, slope = mesh.shape_at(x)
     bending = points.bending(node_weights(mesh, node)) if points is not None and node > 0 else None
     return Marker(index, np.array([x, 0.0]), N @ body.integrals.D, slope @ body.integrals.D, bending)
+
+
+def transverse_pieces(body: BodyCoordinates) -> NDArray[np.float64]:
+    """Transverse displacement of a beam's centre line per modal coordinate: (elements, 6, nf).
+
+    Coefficients of ascending powers of the distance from the element's first node.
+    """
+    mesh = body.mesh
+    assert mesh is not None
+    z = np.linspace(0.0, 1.0, 6)
+    pieces = []
+    for a, b in pairwise(mesh.nodes):
+        # Six values settle a quintic; at a node the shape is the same from either side.
+        rows = np.array([mesh.shape_at(a + x * (b - a))[0][1] for x in z])
+        powers = np.linalg.solve(np.vander(z, increasing=True), rows)
+        pieces.append(powers / ((b - a) ** np.arange(6))[:, None] @ body.integrals.D)
+    return np.array(pieces)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
 from paraflex.kernel.packed import (
     ANGLE,
     AXIS,
@@ -26,6 +27,7 @@ from paraflex.kernel.packed import (
     PORT,
     ROW,
     SPRING,
+    TRACK,
     PackedSystem,
 )
 from paraflex.mechanism import (
@@ -36,6 +38,7 @@ from paraflex.mechanism import (
     PointRef,
     PrismaticJoint,
     RevoluteJoint,
+    SlidingJoint,
     SlotJoint,
     WeldJoint,
 )
@@ -64,6 +67,9 @@ class Constraint:
         What the value is compared with: of a spring at rest, of an angle held.
     direction : float
         Of an axis against body a [rad].
+    carrier : str
+        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
+        origin on.
     """
 
     name: str
@@ -77,6 +83,7 @@ class Constraint:
     limit: float = 0.0
     rest: float = 0.0
     direction: float = 0.0
+    carrier: str = "material"
 
 
 def _joint_constraints(joint: Joint) -> list[Constraint]:
@@ -88,15 +95,24 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
     if isinstance(joint, PrismaticJoint | SlotJoint):
         normal = joint.direction + 0.5 * np.pi
         parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=normal))
+    if isinstance(joint, SlidingJoint):
+        parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=0.5 * np.pi, carrier="track"))
     if isinstance(joint, PrismaticJoint | WeldJoint):
         parts.append(Constraint(name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
     return parts
 
 
+def _axis_of(joint: PrismaticJoint | SlotJoint | SlidingJoint) -> dict[str, Any]:
+    """Direction and carrier of the axis that a joint's travel is measured on."""
+    if isinstance(joint, SlidingJoint):
+        return {"direction": 0.0, "carrier": "frame"}
+    return {"direction": joint.direction, "carrier": "material"}
+
+
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    if isinstance(joint, PrismaticJoint | SlotJoint):
-        keywords["direction"] = joint.direction
+    if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+        keywords |= _axis_of(joint)
         return Constraint(name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
     return Constraint(name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
 
@@ -159,6 +175,7 @@ def pack_system(
     ]
     loads = [_load_record(load) | {"marker": packer.add_marker(load.point)} for load in mechanism.loads]
     markers = packer.markers
+    tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
 
     packed = PackedSystem(
         bodies=_body_records(bodies, packer.ports, packer.efforts),
@@ -168,6 +185,9 @@ def pack_system(
         loads=_records(LOAD, loads),
         lines=_records(LINE, lines),
         axes=_records(AXIS_RECORD, packer.axes),
+        tracks=_records(TRACK, tracks),
+        track_breaks=breaks,
+        track_coefficients=coefficients,
         rows=_records(ROW, _with_envelope(packer.rows, packer.ports)),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
@@ -192,6 +212,7 @@ class _Packer:
         self.ports: list[list[dict]] = [[] for _ in bodies]
         self.efforts: list[list[dict]] = [[] for _ in bodies]
         self.axes: list[dict] = []
+        self.tracks: list[int] = []
         self.rows: list[dict] = []
         self.labels: list[str] = []
 
@@ -219,7 +240,9 @@ class _Packer:
         self.rows += [dict(record) for _ in constraint.labels]
         axis = -1
         if constraint.kind == AXIS:
-            axis = self.add_axis(constraint.a, constraint.b, constraint.direction, row, -1)
+            axis = self.add_axis(
+                constraint.a, constraint.b, direction=constraint.direction, carrier=constraint.carrier, row=row
+            )
         for ref, sign in ((constraint.a, -1.0), (constraint.b, 1.0)):
             if ref.on_ground:
                 if constraint.kind == POINT:
@@ -229,7 +252,9 @@ class _Packer:
             if axis < 0:
                 marker, parts = self.add_marker(ref), len(constraint.labels)
             else:
-                marker, parts = (self.axes[axis]["a"], 3) if sign < 0.0 else (self.axes[axis]["b"], 2)
+                marker, parts = self.axes[axis]["b"], 2
+                if sign < 0.0:
+                    marker, parts = self.axes[axis]["a"], 3 if self.axes[axis]["track"] < 0 else 4
             self.ports[self.index[ref.body]].append(
                 {
                     "marker": marker,
@@ -242,19 +267,49 @@ class _Packer:
                 }
             )
 
-    def add_axis(self, a: PointRef, b: PointRef, direction: float, row: int, signal: int) -> int:
+    def add_axis(
+        self, a: PointRef, b: PointRef, *, direction: float, carrier: str, row: int = -1, signal: int = -1
+    ) -> int:
         ends = self.end(a, "a") | self.end(b, "b")
-        self.axes.append(ends | {"angle": direction, "row": row, "signal": signal})
+        track = -1
+        if carrier != "material":
+            # The frame has no slope of its own, and a track counts from its origin.
+            marker = self.markers[int(ends["a"])]
+            x0 = marker.x0 if carrier == "frame" else np.zeros(2)
+            still = replace(marker, x0=x0, N=np.zeros_like(marker.N), slope=np.zeros_like(marker.slope), bending=None)
+            self.markers[int(ends["a"])] = still
+        if carrier == "track":
+            self.tracks.append(self.index[a.body])
+            track = len(self.tracks) - 1
+        self.axes.append(ends | {"angle": direction, "row": row, "signal": signal, "track": track})
         return len(self.axes) - 1
 
     def add_motor(self, joint: Joint, signal: int) -> None:
-        if isinstance(joint, PrismaticJoint | SlotJoint):
-            self.add_axis(joint.a, joint.b, joint.direction, -1, signal)
+        if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+            self.add_axis(joint.a, joint.b, signal=signal, **_axis_of(joint))
             return
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
             if not ref.on_ground:
                 record = {"marker": self.add_marker(ref), "signal": signal, "sign": sign}
                 self.efforts[self.index[ref.body]].append(record)
+
+
+def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], NDArray[np.float64], NDArray[np.float64]]:
+    """Deflections of beams that points slide on: records, breaks and coefficients."""
+    records, breaks, coefficients = [], [np.zeros(0)], [np.zeros(0)]
+    for body in bodies:
+        pieces = transverse_pieces(body)
+        records.append(
+            {
+                "first": sum(part.size for part in breaks),
+                "pieces": pieces.shape[0],
+                "coefficients": sum(part.size for part in coefficients),
+            }
+        )
+        assert body.mesh is not None
+        breaks.append(body.mesh.nodes)
+        coefficients.append(pieces.ravel())
+    return records, np.concatenate(breaks), np.concatenate(coefficients)
 
 
 def _load_record(load: Load) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -58,6 +58,7 @@ from paraflex.mechanism import (
     RevoluteJoint,
     RigidBody,
     Section,
+    SlidingJoint,
     SlotJoint,
     TorsionalDamper,
     TorsionalSpring,
@@ -292,17 +293,23 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
     if isinstance(entry, list):
         return RevoluteJoint(name, a, b)
     # A field of another kind of joint would be read and not obeyed.
-    known = {"revolute": (), "slot": ("direction",), "weld": ("angle",), "prismatic": ("direction", "angle")}
+    kind = _JOINTS[entry.type]
     given = {key: getattr(entry, key) for key in ("direction", "angle") if key in entry.model_fields_set}
     for key, value in given.items():
-        if key not in known[entry.type]:
+        if key not in {field.name for field in fields(kind)}:
             raise InputError(
                 f"a {entry.type} joint has no {key}", field=f"joint.{name}.{key}", value=value, remedy="leave it out"
             )
-    return _JOINTS[entry.type](name, a, b, **given)
+    return kind(name, a, b, **given)
 
 
-_JOINTS = {"revolute": RevoluteJoint, "prismatic": PrismaticJoint, "slot": SlotJoint, "weld": WeldJoint}
+_JOINTS = {
+    "revolute": RevoluteJoint,
+    "prismatic": PrismaticJoint,
+    "slot": SlotJoint,
+    "sliding": SlidingJoint,
+    "weld": WeldJoint,
+}
 
 
 def _damping(table: DampingTable | None, name: str) -> Damping | None:

@@ -112,8 +112,8 @@ TwoPoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
 class JointTable(_Table):
     """A joint of any kind between two points."""
 
-    type: Literal["revolute", "prismatic", "slot", "weld"] = Field(
-        description='"revolute", "prismatic", "slot" or "weld"'
+    type: Literal["revolute", "prismatic", "slot", "sliding", "weld"] = Field(
+        description='"revolute", "prismatic", "slot", "sliding" or "weld"'
     )
     points: TwoPoints = Field(description='["body.point", "body.point"]')
     direction: Number = Field(default=0.0, description="the angle of its axis against the first body in rad")

@@ -13,7 +13,7 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from paraflex.kernel.arrays import fill
-from paraflex.kernel.axes import turn_axes
+from paraflex.kernel.axes import add_track, turn_axes
 from paraflex.kernel.bending import bent_mass_square, bent_mass_times, factor_bent, solve_bent
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import marker_shape, marker_shortening, shorten
@@ -149,11 +149,16 @@ def body_jacobian(p, i, q, ws):
                 ws.jac[x + 3 + j] = p.shape[NX, h + j]
                 ws.jac[y + 3 + j] = p.shape[NY, h + j]
             shorten(p, p.bending, marker, q, -1.0, ws.jac, x + 3)
-            if port.parts == 3:
+            if port.parts > 2:
                 z = y + width
                 ws.jac[z], ws.jac[z + 1], ws.jac[z + 2] = 0.0, 0.0, 1.0
                 for j in range(n):
                     ws.jac[z + 3 + j] = p.shape[SLOPE, h + j]
+            if port.parts > 3:
+                z = y + 2 * width
+                for j in range(width):
+                    ws.jac[z + j] = 0.0
+                add_track(p, port.axis, ws.axes[port.axis, 3], 1.0, ws.jac, z + 3)
     # The rows of a body lie one after the other, from its first port's on.
     first = p.ports[body.port].jac if body.port < body.port_end else 0
     for r in range(body.parts):
@@ -180,7 +185,9 @@ def share(ws, port, r, part, c, s):
     ex, ey = ws.axes[port.axis, 0], ws.axes[port.axis, 1]
     if part == 0:
         return port.sign * (c * ex + s * ey)
-    return port.sign * (c * ey - s * ex) if part == 1 else ws.axes[port.axis, 2]
+    if part == 1:
+        return port.sign * (c * ey - s * ex)
+    return ws.axes[port.axis, 2] if part == 2 else -1.0
 
 
 @inlined
@@ -285,6 +292,7 @@ def solve_schur(p, ws, x):
 def factor_bodies(p, b, q, ws):
     """Factor every body's M + b K at its deformation in q, in its own frame."""
     ws.step[0] = max(b, SMALLEST_B)
+    turn_axes(p, q, ws.axes)
     for i in range(p.bodies.size):
         if not factor_bent(p, i, b, q, ws, ws.dense):
             factor_body(p, i, b, q, ws)

@@ -73,8 +73,8 @@ PORT = np.dtype(
         ("kind", np.int64),
         ("row", np.int64),  # first constraint row
         ("rows", np.int64),  # 2 for a point, else 1
-        # Rows in the body frame that these are made of: x and y of a point, an angle; of an axis x, y, and the angle
-        # where the body carries it.
+        # Rows in the body frame that these are made of: x and y of a point, an angle; of an axis x, y, and where the
+        # body carries it the angle, and the deflection along a track.
         ("parts", np.int64),
         ("jac", np.int64),  # first entry of these parts in Workspace.jac
         ("local", np.int64),  # first of them among those of its body
@@ -118,6 +118,15 @@ AXIS_RECORD = np.dtype(
         ("angle", np.float64),  # of the axis against the marker that carries it
         ("row", np.int64),  # -1 for a motor's
         ("signal", np.int64),  # of the motor, else -1
+        ("track", np.int64),  # the deflection that a sliding point follows, -1 for none
+    ],
+    align=True,
+)
+TRACK = np.dtype(
+    [
+        ("first", np.int64),  # first of its breaks
+        ("pieces", np.int64),
+        ("coefficients", np.int64),  # first of its coefficients: by piece, power and flexible coordinate
     ],
     align=True,
 )
@@ -147,6 +156,9 @@ class PackedSystem(NamedTuple):
     loads: NDArray[np.void]
     lines: NDArray[np.void]  # springs and dampers between points
     axes: NDArray[np.void]
+    tracks: NDArray[np.void]
+    track_breaks: NDArray[np.float64]
+    track_coefficients: NDArray[np.float64]
     rows: NDArray[np.void]
     modal: NDArray[np.float64]  # (6, total nf): S2x, S2y, I1, G1 + Jf, omega^2, damping
     I2: NDArray[np.float64]  # nf x nf of every body, row by row
@@ -179,7 +191,7 @@ class Workspace(NamedTuple):
     q: NDArray[np.float64]
     v: NDArray[np.float64]
     step: NDArray[np.float64]  # (1,) b of the factor
-    axes: NDArray[np.float64]  # (axes, 3): e and n . d at the last `orient`
+    axes: NDArray[np.float64]  # (axes, 4): e and n . d at the last `orient`, and where a sliding point stands
     compliance: NDArray[np.float64]  # (m,) that of friction at the last `note_friction`
     frame: NDArray[np.float64]  # (bodies, 12): cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
     flex: NDArray[np.float64]  # (5, total nf)
@@ -210,7 +222,7 @@ def make_workspace(p: PackedSystem) -> Workspace:
         q=np.zeros(n),
         v=np.zeros(n),
         step=np.zeros(1),
-        axes=np.zeros((p.axes.size, 3)),
+        axes=np.zeros((p.axes.size, 4)),
         compliance=p.rows["compliance"].copy(),
         frame=np.zeros((p.bodies.size, 12)),
         flex=np.zeros((5, p.modal.shape[1])),

@@ -23,6 +23,7 @@ from paraflex.mechanism.joints import (
     PrismaticJoint,
     RevoluteJoint,
     SampledAngle,
+    SlidingJoint,
     SlotJoint,
     WeldJoint,
 )
@@ -82,6 +83,7 @@ __all__ = [
     "SampledAngle",
     "Section",
     "Segmented",
+    "SlidingJoint",
     "SlotJoint",
     "TorsionalDamper",
     "TorsionalSpring",

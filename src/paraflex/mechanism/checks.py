@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import mesh_beam
-from paraflex.mechanism.bodies import Body, Damping, ModalDamping, RayleighDamping, RigidBody
-from paraflex.mechanism.joints import GROUND, PointRef, WeldJoint
+from paraflex.mechanism.bodies import Body, Damping, FlexibleBeam, ModalDamping, RayleighDamping, RigidBody
+from paraflex.mechanism.joints import GROUND, PointRef, SlidingJoint, WeldJoint
 from paraflex.mechanism.loads import PointForce
 
 if TYPE_CHECKING:
@@ -137,6 +137,15 @@ def check_references(mechanism: Mechanism) -> None:
                 value=f"{joint.a}, {joint.b}",
                 remedy="one side must lie on another body or on the ground",
             )
+        if isinstance(joint, SlidingJoint):
+            body = None if joint.a.on_ground else mechanism.body(joint.a.body)
+            if not isinstance(body, FlexibleBeam):
+                raise InputError(
+                    "a sliding joint needs a beam to slide on",
+                    field=f"joint.{joint.name}",
+                    value=str(joint.a),
+                    remedy='name a point of a beam first; on other bodies use a "slot"',
+                )
         _finite([getattr(joint, "direction", 0.0)], f"joint.{joint.name}.direction")
         _finite([getattr(joint, "angle", 0.0)], f"joint.{joint.name}.angle")
     groups = {

@@ -104,7 +104,20 @@ class WeldJoint:
     angle: float = 0.0
 
 
-Joint = RevoluteJoint | PrismaticJoint | SlotJoint | WeldJoint
+@dataclass(frozen=True)
+class SlidingJoint:
+    """Point b slides along the centre line of a beam, bent as it is, and body b turns freely.
+
+    Point a says which beam. The joint's coordinate is how far point b is beyond point a along the x axis of the beam's
+    frame [m]. Deflections are taken where the point stands in the undeformed beam, as a linear theory does.
+    """
+
+    name: str
+    a: PointRef
+    b: PointRef
+
+
+Joint = RevoluteJoint | PrismaticJoint | SlotJoint | SlidingJoint | WeldJoint
 
 
 @runtime_checkable

@@ -69,7 +69,7 @@ class Mechanism:
     ground : mapping
         Named points fixed in the ground frame [m].
     bodies : tuple of RigidBody or FlexibleBeam
-    joints : tuple of RevoluteJoint, PrismaticJoint, SlotJoint or WeldJoint
+    joints : tuple of RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint or WeldJoint
     motors : tuple of Motor
         Their order is that of the signs in a mode such as "+-+-".
     prescribed : tuple of PrescribedAngle

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics import Marker, System, axis_angle
 from paraflex.fem import node_weights
 from paraflex.fem.element import AXIAL, SLOPE, TRANSVERSE
-from paraflex.mechanism import PointRef, PrismaticJoint, SlotJoint
+from paraflex.mechanism import PointRef, PrismaticJoint, SlidingJoint, SlotJoint
 
 
 class PointMotion(NamedTuple):
@@ -65,14 +65,15 @@ def joint_forces(
 ) -> NDArray[np.float64]:
     """Forces (k, joints, 2) of joints by name on their second bodies in the ground frame [N].
 
-    Those of a prismatic joint or slot are normal to its axis.
+    Those of a prismatic joint or slot are normal to its axis; those of a sliding joint are told by their part normal to
+    the beam's unbent axis.
     """
     row = {label: i for i, label in enumerate(system.rows)}
     forces = np.zeros((len(q), len(names), 2))
     for i, name in enumerate(names):
         joint = system.mechanism.joint(name)
         # Phi is of b less of a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
-        if isinstance(joint, PrismaticJoint | SlotJoint):
+        if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
             along = axis_angle(system, joint, q)
             normal = np.column_stack([-np.sin(along), np.cos(along)])
             forces[:, i] = -multipliers[:, row[f"{name} normal"], None] * normal
