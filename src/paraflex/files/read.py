@@ -114,9 +114,9 @@ def _is_variant(part: Any, location: tuple) -> bool:
     """Whether a part of an error's location names a variant of a union and not a field of the file."""
     if not isinstance(part, str):
         return False
-    variants = {"beam", "rigid", "polygon", "line", "circle", "points"}
+    variants = {"beam", "rigid", "assumed-modes", "modal", "polygon", "line", "circle", "points"}
     position = location.index(part)
-    if part.endswith("Table") or "[" in part or part in ("int", "constrained-int"):
+    if part.endswith("Table") or "[" in part or part in ("int", "constrained-int", "str", "constrained-str"):
         return True
     # A discriminator's value stands right behind the name of the body or path it describes.
     return part in variants and position == 2 and location[0] in ("body", "path")

@@ -1,6 +1,17 @@
 """What the user means: frozen descriptions of bodies, joints, motors and the mechanism they form."""
 
-from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, LumpedMass, Material, RigidBody, Section
+from paraflex.fem import Polynomial, ShapeFunction, Sine
+from paraflex.mechanism.bodies import (
+    AssumedModesBeam,
+    Body,
+    Curvature,
+    FlexibleBeam,
+    LumpedMass,
+    Material,
+    RigidBody,
+    Section,
+    given_shapes,
+)
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.joints import (
     GROUND,
@@ -23,8 +34,16 @@ from paraflex.mechanism.mechanism import (
     parse_geometry,
     parse_mode,
 )
+from paraflex.mechanism.modal import ModalBody, ModalPoint
 from paraflex.mechanism.raparm import raparm_i
-from paraflex.mechanism.segments import FIRST_END, LAST_END, Segmented, finite_segments, proportional_segments
+from paraflex.mechanism.segments import (
+    FIRST_END,
+    LAST_END,
+    Segmented,
+    check_segmentable,
+    finite_segments,
+    proportional_segments,
+)
 
 __all__ = [
     "FIRST_END",
@@ -34,6 +53,7 @@ __all__ = [
     "AngleLaw",
     "AppliedTorque",
     "Assembly",
+    "AssumedModesBeam",
     "Body",
     "Curvature",
     "EndEffector",
@@ -44,19 +64,26 @@ __all__ = [
     "LumpedMass",
     "Material",
     "Mechanism",
+    "ModalBody",
+    "ModalPoint",
     "Motor",
     "PointForce",
     "PointRef",
+    "Polynomial",
     "PrescribedAngle",
     "RevoluteJoint",
     "RigidBody",
     "SampledAngle",
     "Section",
     "Segmented",
+    "ShapeFunction",
+    "Sine",
     "TorsionalDamper",
     "TorsionalSpring",
     "check_mechanism",
+    "check_segmentable",
     "finite_segments",
+    "given_shapes",
     "mode_of_motors",
     "mode_of_signs",
     "parse_geometry",

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError, suggestion
-from paraflex.fem import mesh_beam
-from paraflex.mechanism.bodies import Body, RigidBody
+from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.joints import GROUND, PointRef
 from paraflex.mechanism.loads import PointForce
+from paraflex.mechanism.quantities import finite as _finite
+from paraflex.mechanism.quantities import not_negative as _not_negative
+from paraflex.mechanism.quantities import positive as _positive
 
 if TYPE_CHECKING:
     from paraflex.mechanism.mechanism import Mechanism
@@ -60,47 +60,6 @@ def check_names(mechanism: Mechanism) -> None:
                 )
     if not mechanism.bodies:
         raise InputError("a mechanism needs at least one body", field="body", remedy="add a beam or a rigid body")
-
-
-def check_body(body: Body) -> None:
-    """Masses, lengths and stiffnesses are numbers that make sense; lumps sit on points that exist."""
-    field = f"body.{body.name}"
-    if isinstance(body, RigidBody):
-        _positive(body.mass, f"{field}.mass", "kg")
-        _positive(body.inertia, f"{field}.inertia", "kg m^2")
-        _finite(body.centre_of_mass, f"{field}.centre_of_mass")
-        for name, position in body.points.items():
-            _finite(position, f"{field}.points.{name}")
-        return
-    _positive(body.length, f"{field}.length", "m")
-    _positive(body.section.area, f"{field}.section.area", "m^2")
-    _positive(body.section.second_moment, f"{field}.section.second_moment", "m^4")
-    _positive(body.material.youngs_modulus, f"{field}.material.youngs_modulus", "Pa")
-    _positive(body.material.density, f"{field}.material.density", "kg/m^3")
-    _finite(body.points.values(), f"{field}.points")
-    try:
-        mesh_beam(body.length, body.points, body.elements)
-    except InputError as error:
-        raise InputError(
-            error.problem, field=f"{field}.{error.field}", value=error.value, remedy=error.remedy
-        ) from error
-    for lump in body.lumps:
-        if lump.point not in body.points:
-            raise InputError(
-                "a lump on an unknown point",
-                field=f"{field}.lumps",
-                value=lump.point,
-                remedy=suggestion(lump.point, body.points),
-            )
-        _not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
-        _not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
-    if body.modes is not None and not 1 <= body.modes <= body.mesh.n_flexible:
-        raise InputError(
-            "no such number of modes",
-            field=f"{field}.modes",
-            value=body.modes,
-            remedy=f"from 1 to {body.mesh.n_flexible}, or leave it out for all",
-        )
 
 
 def check_ground(mechanism: Mechanism) -> None:
@@ -235,19 +194,3 @@ def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
 def _known(name: str, known: list[str], field: str, kind: str) -> None:
     if name not in known:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))
-
-
-def _finite(values: Iterable[float], field: str) -> None:
-    for value in values:
-        if not math.isfinite(value):
-            raise InputError("not a finite number", field=field, value=value, remedy="give a number")
-
-
-def _positive(value: float, field: str, unit: str) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError("must be positive", field=field, value=value, remedy=f"give it in {unit}")
-
-
-def _not_negative(value: float, field: str, unit: str) -> None:
-    if not (math.isfinite(value) and value >= 0.0):
-        raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")
