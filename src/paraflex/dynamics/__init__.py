@@ -1,6 +1,6 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, end_markers, node_marker
 from paraflex.dynamics.equilibrium import static_equilibrium
 from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate
 from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
@@ -26,6 +26,7 @@ __all__ = [
     "build_system",
     "consistent_state",
     "constant_signals",
+    "end_markers",
     "joint_coordinate",
     "momentum",
     "node_marker",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError
-from paraflex.mechanism import FlexibleBeam, Mechanism, RevoluteJoint
+from paraflex.mechanism import FlexibleBeam, Mechanism, RevoluteJoint, given_shapes
 
 # Names of the engines as users and Python's packages know them, and in print.
 _PRINTED = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}
@@ -25,6 +25,8 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     InputError
         It is not, or cannot.
     """
+    for body in given_shapes(mechanism.bodies):
+        refuse(_PRINTED[name], "a flexible body of given shapes", f"body.{body}")
     for prescribed in mechanism.prescribed:
         refuse(_PRINTED[name], "a prescribed angle", f"prescribed.{prescribed.name}")
     for joint in mechanism.joints:

@@ -12,17 +12,19 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
+from paraflex.files.bodies import assumed_modes_beam, damping, modal_body
 from paraflex.files.library import library_file, library_names
 from paraflex.files.read import read_toml, validate
 from paraflex.files.schema import (
+    AssumedModesTable,
     BeamTable,
     CircleTable,
-    DampingTable,
     ForceTable,
     GeneralSectionTable,
     JointTable,
     LinearSpringTable,
     LineTable,
+    ModalTable,
     ModelTable,
     PathFile,
     PointsTable,
@@ -37,7 +39,6 @@ from paraflex.mechanism import (
     Assembly,
     Body,
     Curvature,
-    Damping,
     EndEffector,
     FlexibleBeam,
     Geometry,
@@ -48,13 +49,11 @@ from paraflex.mechanism import (
     LumpedMass,
     Material,
     Mechanism,
-    ModalDamping,
     Motor,
     PointForce,
     PointRef,
     PrescribedAngle,
     PrismaticJoint,
-    RayleighDamping,
     RevoluteJoint,
     RigidBody,
     Section,
@@ -312,21 +311,6 @@ _JOINTS = {
 }
 
 
-def _damping(table: DampingTable | None, name: str) -> Damping | None:
-    if table is None:
-        return None
-    if "ratios" not in table.model_fields_set:
-        return RayleighDamping(table.mass, table.stiffness)
-    if table.model_fields_set != {"ratios"}:
-        raise InputError(
-            "ratios and Rayleigh's coefficients exclude each other",
-            field=f"body.{name}.damping",
-            value=sorted(table.model_fields_set),
-            remedy="give ratios alone, or mass and stiffness",
-        )
-    return ModalDamping(tuple(table.ratios))
-
-
 def _linear_spring(name: str, entry: LinearSpringTable) -> LinearSpring:
     a, b = (PointRef.parse(point, f"linear_spring.{name}.points") for point in entry.points)
     return LinearSpring(name, a, b, entry.stiffness, entry.length, entry.damping)
@@ -339,7 +323,7 @@ def _load(name: str, load: ForceTable | TorqueTable) -> Load:
     return PointForce(name, point, (load.force[0], load.force[1]))
 
 
-def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:
+def _body(name: str, body: BeamTable | RigidTable | AssumedModesTable | ModalTable, table: ModelTable) -> Body:
     if isinstance(body, RigidTable):
         return RigidBody(
             name=name,
@@ -348,31 +332,46 @@ def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:
             centre_of_mass=(body.centre_of_mass[0], body.centre_of_mass[1]),
             points={key: (point[0], point[1]) for key, point in body.points.items()},
         )
-    section = _named(table.section, body.section, f"body.{name}.section", "section")
-    material = _named(table.material, body.material, f"body.{name}.material", "material")
+    if isinstance(body, ModalTable):
+        return modal_body(name, body)
     lumps = []
     for point, lump_name in body.lumps.items():
         lump = _named(table.lump, lump_name, f"body.{name}.lumps.{point}", "lump")
         lumps.append(LumpedMass(point, lump.mass, lump.inertia))
-    if isinstance(section, GeneralSectionTable):
-        made = Section(section.area, section.second_moment)
-    else:
-        _check_sides(section.width, section.thickness, f"section.{body.section}")
-        made = Section.rectangle(section.width, section.thickness)
+    if isinstance(body, AssumedModesTable):
+        section, material = _section(name, body.section, table), _material(name, body.material, table)
+        return assumed_modes_beam(name, body, section, material, tuple(lumps))
     return FlexibleBeam(
         name=name,
         length=body.length,
-        section=made,
-        material=Material(material.youngs_modulus, material.density),
+        section=_section(name, body.section, table)
+        if isinstance(body.section, str)
+        else tuple(_section(name, each, table) for each in body.section),
+        material=_material(name, body.material, table)
+        if isinstance(body.material, str)
+        else tuple(_material(name, each, table) for each in body.material),
         points=body.points,
         elements=tuple(body.elements) if isinstance(body.elements, list) else body.elements,
         lumps=tuple(lumps),
         reference=ReferenceCondition(body.reference),
         curvature=Curvature(body.curvature),
         modes=body.modes,
-        damping=_damping(body.damping, name),
+        damping=damping(body.damping, name),
         flexible=body.flexible,
     )
+
+
+def _section(body: str, name: str, table: ModelTable) -> Section:
+    section = _named(table.section, name, f"body.{body}.section", "section")
+    if isinstance(section, GeneralSectionTable):
+        return Section(section.area, section.second_moment)
+    _check_sides(section.width, section.thickness, f"section.{name}")
+    return Section.rectangle(section.width, section.thickness)
+
+
+def _material(body: str, name: str, table: ModelTable) -> Material:
+    material = _named(table.material, name, f"body.{body}.material", "material")
+    return Material(material.youngs_modulus, material.density)
 
 
 def _check_sides(width: float, thickness: float, name: str) -> None:

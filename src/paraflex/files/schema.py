@@ -78,10 +78,10 @@ class DampingTable(_Table):
 class BeamTable(_Table):
     """A flexible beam along its x axis."""
 
-    type: Literal["beam"] = Field(description='"beam" or "rigid"')
+    type: Literal["beam"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     length: Number = Field(description="the length in m")
-    section: Text = Field(description="the name of a [section.NAME] table")
-    material: Text = Field(description="the name of a [material.NAME] table")
+    section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one a span")
+    material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one a span")
     points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
     elements: Count | list[Count] = Field(default=1, description="elements per span, one number or one a span")
     lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
@@ -99,7 +99,7 @@ class BeamTable(_Table):
 class RigidTable(_Table):
     """A rigid body."""
 
-    type: Literal["rigid"] = Field(description='"beam" or "rigid"')
+    type: Literal["rigid"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     mass: Number = Field(description="the mass in kg")
     inertia: Number = Field(description="the moment of inertia about the centre of mass in kg m^2")
     centre_of_mass: Pair = Field(default=[0.0, 0.0], description="[x, y] in the body frame in m")
@@ -125,6 +125,52 @@ JointEntry = Annotated[
     Annotated[TwoPoints, Tag("list[point]")] | Annotated[JointTable, Tag("JointTable")],
     Discriminator(lambda value: "JointTable" if isinstance(value, dict) else "list[point]"),
 ]
+
+
+class AssumedModesTable(_Table):
+    """A bar along its x axis that deforms in given shape functions of z = x/length."""
+
+    type: Literal["assumed-modes"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
+    length: Number = Field(description="the length in m")
+    section: Text = Field(description="the name of a [section.NAME] table")
+    material: Text = Field(description="the name of a [material.NAME] table")
+    transverse_sines: Count = Field(default=0, description="how many sin(n pi z), from n = 1 on")
+    transverse_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
+    axial_sines: Count = Field(default=0, description="how many sin(n pi z), from n = 1 on")
+    axial_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
+    points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
+    lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
+    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
+    damping: DampingTable | None = Field(default=None, description="a damping table")
+    flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid bar")
+
+
+class ModalPointTable(_Table):
+    """A point of a body of given matrices."""
+
+    position: Pair = Field(description="[x, y] in the body frame in m")
+    shape: list[list[Number]] = Field(description="two rows, displacement along x and y per flexible coordinate")
+    slope: list[Number] = Field(description="the turn per flexible coordinate")
+
+
+class ModalTable(_Table):
+    """A flexible body by its own matrices."""
+
+    type: Literal["modal"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
+    mass: Number = Field(description="the mass in kg")
+    first_moment: Pair = Field(description="[x, y], mass times the centre of mass in kg m")
+    inertia: Number = Field(description="the moment of inertia about the body frame's origin in kg m^2")
+    mass_matrix: list[list[Number]] = Field(description="rows of the mass matrix of the flexible coordinates")
+    stiffness: list[list[Number]] = Field(description="rows of the stiffness matrix")
+    S2: list[list[Number]] = Field(description="two rows, int N dm")
+    I1: list[Number] = Field(description="int s0^T N dm")
+    G1: list[Number] = Field(description="int (x N_y - y N_x) dm")
+    G2: list[list[Number]] = Field(description="rows of the skew int (N_x^T N_y - N_y^T N_x) dm")
+    I2: list[list[Number]] | None = Field(default=None, description="rows of int N^T N dm")
+    points: dict[str, ModalPointTable] = Field(default={}, description="position, shape and slope of each named point")
+    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
+    damping: DampingTable | None = Field(default=None, description="a damping table")
+    flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid body")
 
 
 class PrescribedTable(_Table):
@@ -254,8 +300,8 @@ class ModelTable(_Table):
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}
     ground: dict[str, Pair] = Field(default={}, description="[x, y] of each ground point in m")
-    body: dict[str, Annotated[BeamTable | RigidTable, Field(discriminator="type")]] = Field(
-        description="at least one [body.NAME] table"
+    body: dict[str, Annotated[BeamTable | RigidTable | AssumedModesTable | ModalTable, Field(discriminator="type")]] = (
+        Field(description="at least one [body.NAME] table")
     )
     joint: dict[str, JointEntry] = Field(
         default={}, description='["body.point", "body.point"] for each revolute joint, a table for others'

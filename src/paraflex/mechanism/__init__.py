@@ -1,18 +1,19 @@
 """What the user means: frozen descriptions of bodies, joints, motors and the mechanism they form."""
 
+from paraflex.fem import Polynomial, ShapeFunction, Sine
 from paraflex.mechanism.bodies import (
+    AssumedModesBeam,
     Body,
     Curvature,
-    Damping,
     FlexibleBeam,
     LumpedMass,
     Material,
-    ModalDamping,
-    RayleighDamping,
     RigidBody,
     Section,
+    given_shapes,
 )
 from paraflex.mechanism.checks import check_mechanism
+from paraflex.mechanism.damping import Damping, ModalDamping, RayleighDamping
 from paraflex.mechanism.joints import (
     GROUND,
     AngleLaw,
@@ -47,8 +48,16 @@ from paraflex.mechanism.mechanism import (
     parse_geometry,
     parse_mode,
 )
+from paraflex.mechanism.modal import ModalBody, ModalPoint
 from paraflex.mechanism.raparm import raparm_i
-from paraflex.mechanism.segments import FIRST_END, LAST_END, Segmented, finite_segments, proportional_segments
+from paraflex.mechanism.segments import (
+    FIRST_END,
+    LAST_END,
+    Segmented,
+    check_segmentable,
+    finite_segments,
+    proportional_segments,
+)
 
 __all__ = [
     "FIRST_END",
@@ -58,6 +67,7 @@ __all__ = [
     "AngleLaw",
     "AppliedTorque",
     "Assembly",
+    "AssumedModesBeam",
     "Body",
     "Curvature",
     "Damping",
@@ -71,10 +81,13 @@ __all__ = [
     "LumpedMass",
     "Material",
     "Mechanism",
+    "ModalBody",
     "ModalDamping",
+    "ModalPoint",
     "Motor",
     "PointForce",
     "PointRef",
+    "Polynomial",
     "PrescribedAngle",
     "PrismaticJoint",
     "RayleighDamping",
@@ -83,13 +96,17 @@ __all__ = [
     "SampledAngle",
     "Section",
     "Segmented",
+    "ShapeFunction",
+    "Sine",
     "SlidingJoint",
     "SlotJoint",
     "TorsionalDamper",
     "TorsionalSpring",
     "WeldJoint",
     "check_mechanism",
+    "check_segmentable",
     "finite_segments",
+    "given_shapes",
     "mode_of_motors",
     "mode_of_signs",
     "parse_geometry",

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError, suggestion
-from paraflex.fem import mesh_beam
-from paraflex.mechanism.bodies import Body, Damping, FlexibleBeam, ModalDamping, RayleighDamping, RigidBody
+from paraflex.mechanism.bodies import FlexibleBeam
+from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.joints import GROUND, PointRef, SlidingJoint, WeldJoint
 from paraflex.mechanism.loads import PointForce
+from paraflex.mechanism.quantities import finite, not_negative, positive
 
 if TYPE_CHECKING:
     from paraflex.mechanism.mechanism import Mechanism
@@ -63,63 +62,10 @@ def check_names(mechanism: Mechanism) -> None:
         raise InputError("a mechanism needs at least one body", field="body", remedy="add a beam or a rigid body")
 
 
-def check_body(body: Body) -> None:
-    """Masses, lengths and stiffnesses are numbers that make sense; lumps sit on points that exist."""
-    field = f"body.{body.name}"
-    if isinstance(body, RigidBody):
-        _positive(body.mass, f"{field}.mass", "kg")
-        _positive(body.inertia, f"{field}.inertia", "kg m^2")
-        _finite(body.centre_of_mass, f"{field}.centre_of_mass")
-        for name, position in body.points.items():
-            _finite(position, f"{field}.points.{name}")
-        return
-    _positive(body.length, f"{field}.length", "m")
-    _positive(body.section.area, f"{field}.section.area", "m^2")
-    _positive(body.section.second_moment, f"{field}.section.second_moment", "m^4")
-    _positive(body.material.youngs_modulus, f"{field}.material.youngs_modulus", "Pa")
-    _positive(body.material.density, f"{field}.material.density", "kg/m^3")
-    _finite(body.points.values(), f"{field}.points")
-    try:
-        mesh_beam(body.length, body.points, body.elements)
-    except InputError as error:
-        raise InputError(
-            error.problem, field=f"{field}.{error.field}", value=error.value, remedy=error.remedy
-        ) from error
-    for lump in body.lumps:
-        if lump.point not in body.points:
-            raise InputError(
-                "a lump on an unknown point",
-                field=f"{field}.lumps",
-                value=lump.point,
-                remedy=suggestion(lump.point, body.points),
-            )
-        _not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
-        _not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
-    _check_damping(body.damping, f"{field}.damping")
-    if body.modes is not None and not 1 <= body.modes <= body.mesh.n_flexible:
-        raise InputError(
-            "no such number of modes",
-            field=f"{field}.modes",
-            value=body.modes,
-            remedy=f"from 1 to {body.mesh.n_flexible}, or leave it out for all",
-        )
-
-
-def _check_damping(damping: Damping | None, field: str) -> None:
-    if isinstance(damping, RayleighDamping):
-        _not_negative(damping.mass, f"{field}.mass", "1/s")
-        _not_negative(damping.stiffness, f"{field}.stiffness", "s")
-    if isinstance(damping, ModalDamping):
-        if not damping.ratios:
-            raise InputError("no damping ratio", field=f"{field}.ratios", value=[], remedy="give one, say [0.01]")
-        for ratio in damping.ratios:
-            _not_negative(ratio, f"{field}.ratios", "parts of critical damping, say 0.01")
-
-
 def check_ground(mechanism: Mechanism) -> None:
     """Ground points are finite."""
     for name, position in mechanism.ground.items():
-        _finite(position, f"ground.{name}")
+        finite(position, f"ground.{name}")
 
 
 def check_references(mechanism: Mechanism) -> None:
@@ -146,8 +92,8 @@ def check_references(mechanism: Mechanism) -> None:
                     value=str(joint.a),
                     remedy='name a point of a beam first; on other bodies use a "slot"',
                 )
-        _finite([getattr(joint, "direction", 0.0)], f"joint.{joint.name}.direction")
-        _finite([getattr(joint, "angle", 0.0)], f"joint.{joint.name}.angle")
+        finite([getattr(joint, "direction", 0.0)], f"joint.{joint.name}.direction")
+        finite([getattr(joint, "angle", 0.0)], f"joint.{joint.name}.angle")
     groups = {
         "motor": mechanism.motors,
         "prescribed": mechanism.prescribed,
@@ -163,20 +109,20 @@ def check_references(mechanism: Mechanism) -> None:
                 raise InputError("a weld does not move", field=field, value=member.joint, remedy="name another joint")
     for spring in mechanism.springs:
         field = f"spring.{spring.name}"
-        _positive(spring.stiffness, f"{field}.stiffness", "N m/rad, or N/m")
-        _finite([spring.rest], f"{field}.rest")
+        positive(spring.stiffness, f"{field}.stiffness", "N m/rad, or N/m")
+        finite([spring.rest], f"{field}.rest")
     for damper in mechanism.dampers:
-        _positive(damper.coefficient, f"damper.{damper.name}.coefficient", "N m s/rad, or N s/m")
+        positive(damper.coefficient, f"damper.{damper.name}.coefficient", "N m s/rad, or N s/m")
     for friction in mechanism.frictions:
-        _positive(friction.limit, f"friction.{friction.name}.limit", "N m, or N")
-        _positive(friction.speed, f"friction.{friction.name}.speed", "rad/s, or m/s")
+        positive(friction.limit, f"friction.{friction.name}.limit", "N m, or N")
+        positive(friction.speed, f"friction.{friction.name}.speed", "rad/s, or m/s")
     for mode in mechanism.modes:
         for name in mode.motors:
             _known(name, motors, f"mode.{mode.name}", "motor")
     for assembly in mechanism.assemblies:
         for name, angle in assembly.angles.items():
             _known(name, bodies, f"assembly.{assembly.name}", "body")
-            _finite([angle], f"assembly.{assembly.name}.{name}")
+            finite([angle], f"assembly.{assembly.name}.{name}")
         for name in bodies:
             if name not in assembly.angles:
                 raise InputError(
@@ -230,7 +176,7 @@ def check_task(mechanism: Mechanism) -> None:
 
 def check_loads(mechanism: Mechanism) -> None:
     """Loads are finite and act on bodies; so is gravity."""
-    _finite(mechanism.gravity, "gravity")
+    finite(mechanism.gravity, "gravity")
     for spring in mechanism.linear_springs:
         field = f"linear_spring.{spring.name}"
         _known_point(mechanism, spring.a, f"{field}.points")
@@ -242,9 +188,9 @@ def check_loads(mechanism: Mechanism) -> None:
                 value=f"{spring.a}, {spring.b}",
                 remedy="one end must be on another body or on the ground",
             )
-        _not_negative(spring.stiffness, f"{field}.stiffness", "N/m")
-        _not_negative(spring.length, f"{field}.length", "m")
-        _not_negative(spring.damping, f"{field}.damping", "N s/m")
+        not_negative(spring.stiffness, f"{field}.stiffness", "N/m")
+        not_negative(spring.length, f"{field}.length", "m")
+        not_negative(spring.damping, f"{field}.damping", "N s/m")
     for load in mechanism.loads:
         field = f"load.{load.name}"
         _known_point(mechanism, load.point, f"{field}.point")
@@ -253,9 +199,9 @@ def check_loads(mechanism: Mechanism) -> None:
                 "the ground does not move", field=f"{field}.point", value=str(load.point), remedy="name a body's point"
             )
         if isinstance(load, PointForce):
-            _finite(load.force, f"{field}.force")
+            finite(load.force, f"{field}.force")
         else:
-            _finite([load.torque], f"{field}.torque")
+            finite([load.torque], f"{field}.torque")
 
 
 def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
@@ -268,19 +214,3 @@ def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
 def _known(name: str, known: list[str], field: str, kind: str) -> None:
     if name not in known:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))
-
-
-def _finite(values: Iterable[float], field: str) -> None:
-    for value in values:
-        if not math.isfinite(value):
-            raise InputError("not a finite number", field=field, value=value, remedy="give a number")
-
-
-def _positive(value: float, field: str, unit: str) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError("must be positive", field=field, value=value, remedy=f"give it in {unit}")
-
-
-def _not_negative(value: float, field: str, unit: str) -> None:
-    if not (math.isfinite(value) and value >= 0.0):
-        raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")

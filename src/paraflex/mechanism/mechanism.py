@@ -8,7 +8,7 @@ from enum import Enum
 
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
-from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam
+from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.joints import Joint, Motor, PointRef, PrescribedAngle
 from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
@@ -68,7 +68,7 @@ class Mechanism:
     name : str
     ground : mapping
         Named points fixed in the ground frame [m].
-    bodies : tuple of RigidBody or FlexibleBeam
+    bodies : tuple of RigidBody, FlexibleBeam, AssumedModesBeam or ModalBody
     joints : tuple of RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint or WeldJoint
     motors : tuple of Motor
         Their order is that of the signs in a mode such as "+-+-".
@@ -157,8 +157,8 @@ class Mechanism:
         for name in names:
             if name not in known:
                 raise InputError("unknown body", field="rigid", value=name, remedy=f"choose from {', '.join(known)}")
-        beams = [self.body(name) for name in names]
-        return self.with_bodies(beam.as_rigid() for beam in beams if isinstance(beam, FlexibleBeam))
+        bodies = [self.body(name) for name in names]
+        return self.with_bodies(body.as_rigid() for body in bodies if not isinstance(body, RigidBody))
 
     def with_beams(
         self,
@@ -177,8 +177,16 @@ class Mechanism:
         reference : ReferenceCondition, optional
         curvature : Curvature, optional
         modes : int, optional
-            Modes of lowest frequency kept of each.
+            Modes of lowest frequency kept of each, and of each other flexible body.
+
+        Raises
+        ------
+        InputError
+            Another mesh, condition or curvature for a flexible body of given shapes.
         """
+        asked = {"elements": elements, "reference": reference, "curvature": curvature}
+        for what in [name for name, value in asked.items() if value is not None]:
+            self._refuse_given_shapes(what)
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
         if elements is not None:
             beams = [replace(beam, elements=elements) for beam in beams]
@@ -186,18 +194,36 @@ class Mechanism:
             beams = [replace(beam, reference=reference) for beam in beams]
         if curvature is not None:
             beams = [replace(beam, curvature=curvature) for beam in beams]
-        if modes is not None:
-            beams = [replace(beam, modes=modes) for beam in beams]
-        return self.with_bodies(beams)
+        changed = self.with_bodies(beams)
+        if modes is None:
+            return changed
+        bodies = [body for body in changed.bodies if not isinstance(body, RigidBody)]
+        return changed.with_bodies(replace(body, modes=modes) for body in bodies)
 
     def refined(self, factor: int) -> Mechanism:
-        """The mechanism with so many times the elements on every span of its flexible beams."""
+        """The mechanism with so many times the elements on every span of its flexible beams.
+
+        Raises
+        ------
+        InputError
+            A flexible body of given shapes, which has no elements, and a factor other than 1.
+        """
+        if factor != 1:
+            self._refuse_given_shapes("elements")
 
         def times(elements: int | tuple[int, ...]) -> int | tuple[int, ...]:
             return elements * factor if isinstance(elements, int) else tuple(count * factor for count in elements)
 
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam) and body.flexible]
         return self.with_bodies(replace(beam, elements=times(beam.elements)) for beam in beams)
+
+    def _refuse_given_shapes(self, what: str) -> None:
+        for name in given_shapes(self.bodies):
+            raise InputError(
+                "the shapes of this body are given",
+                field=f"body.{name}.{what}",
+                remedy="change them in the body itself, or leave it out",
+            )
 
     def with_geometry(self, geometry: Geometry | str) -> Mechanism:
         """The mechanism with linear or second-order geometry of its flexible beams.
