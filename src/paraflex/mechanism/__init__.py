@@ -11,6 +11,7 @@ from paraflex.mechanism.joints import (
     RevoluteJoint,
     SampledAngle,
 )
+from paraflex.mechanism.laws import ConstantSpeed, PiecewiseLaw, TabulatedLaw
 from paraflex.mechanism.loads import AppliedTorque, LinearSpring, Load, PointForce, TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import (
     ActuationMode,
@@ -23,6 +24,7 @@ from paraflex.mechanism.mechanism import (
     parse_geometry,
     parse_mode,
 )
+from paraflex.mechanism.poses import Pose, approximate_poses
 from paraflex.mechanism.raparm import raparm_i
 from paraflex.mechanism.segments import FIRST_END, LAST_END, Segmented, finite_segments, proportional_segments
 
@@ -35,6 +37,7 @@ __all__ = [
     "AppliedTorque",
     "Assembly",
     "Body",
+    "ConstantSpeed",
     "Curvature",
     "EndEffector",
     "FlexibleBeam",
@@ -45,16 +48,20 @@ __all__ = [
     "Material",
     "Mechanism",
     "Motor",
+    "PiecewiseLaw",
     "PointForce",
     "PointRef",
+    "Pose",
     "PrescribedAngle",
     "RevoluteJoint",
     "RigidBody",
     "SampledAngle",
     "Section",
     "Segmented",
+    "TabulatedLaw",
     "TorsionalDamper",
     "TorsionalSpring",
+    "approximate_poses",
     "check_mechanism",
     "finite_segments",
     "mode_of_motors",

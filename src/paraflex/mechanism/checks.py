@@ -12,6 +12,7 @@ from paraflex.fem import mesh_beam
 from paraflex.mechanism.bodies import Body, RigidBody
 from paraflex.mechanism.joints import GROUND, PointRef
 from paraflex.mechanism.loads import PointForce
+from paraflex.mechanism.poses import approximate_poses
 
 if TYPE_CHECKING:
     from paraflex.mechanism.mechanism import Mechanism
@@ -144,14 +145,14 @@ def check_references(mechanism: Mechanism) -> None:
         for name, angle in assembly.angles.items():
             _known(name, bodies, f"assembly.{assembly.name}", "body")
             _finite([angle], f"assembly.{assembly.name}.{name}")
-        for name in bodies:
-            if name not in assembly.angles:
-                raise InputError(
-                    "no angle for a body",
-                    field=f"assembly.{assembly.name}",
-                    value=name,
-                    remedy="give its approximate angle in rad",
-                )
+        for ref, place in assembly.points.items():
+            field = f"assembly.{assembly.name}.points"
+            _known_point(mechanism, ref, field)
+            _finite(place, f"{field}.{ref}")
+            if ref.on_ground:
+                raise InputError("ground points are known", field=field, value=str(ref), remedy="name a body's point")
+        # It names the body that neither angles nor points place.
+        approximate_poses(mechanism, assembly)
 
 
 def check_connected(mechanism: Mechanism) -> None:
