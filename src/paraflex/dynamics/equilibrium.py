@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics.joint_coordinates import joint_coordinate
-from paraflex.dynamics.signals import constant_signals, pack_signals
+from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import State
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
@@ -71,11 +71,10 @@ class _Residual:
     """Forces, constraints and held joints at (q, multipliers, holding torques), at rest."""
 
     def __init__(self, system: System, start: State, held: Sequence[str]) -> None:
-        mechanism, time = system.mechanism, start.time
-        still = constant_signals([0.0] * len(mechanism.motors), time + 1.0)
-        self.system, self.time, self.held = system, time, held
+        mechanism = system.mechanism
+        self.system, self.time, self.held = system, start.time, held
         self.kept = self.joints(start.q)[0]
-        self.signals, _ = pack_signals(mechanism, still, time + 1.0)
+        self.signals = moment_signals(mechanism, start.time)
         self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
         self.still = np.zeros(system.n)
         self.largest_force = 0.0

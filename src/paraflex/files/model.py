@@ -7,15 +7,17 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path as FilePath
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from paraflex.dynamics import Start
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.files.bodies import assumed_modes_beam, damping, modal_body
+from paraflex.files.expressions import evaluate_parameters
+from paraflex.files.laws import quantities, read_law
 from paraflex.files.library import library_file, library_names
 from paraflex.files.read import read_toml, validate
+from paraflex.files.rows import with_rows
 from paraflex.files.schema import (
+    AssemblyTable,
     AssumedModesTable,
     BeamTable,
     CircleTable,
@@ -29,9 +31,11 @@ from paraflex.files.schema import (
     PathFile,
     PointsTable,
     PolygonTable,
+    PrescribedTable,
     RigidTable,
     TorqueTable,
 )
+from paraflex.files.start import read_start
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
     ActuationMode,
@@ -67,19 +71,6 @@ from paraflex.mechanism import (
 
 
 @dataclass(frozen=True)
-class ConstantSpeed:
-    """An angle law: a start angle [rad] and a constant speed [rad/s]."""
-
-    angle: float
-    speed: float
-    knots: tuple[float, ...] = ()
-
-    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Angle, rate and acceleration at times t."""
-        return self.angle + self.speed * t, np.full_like(t, self.speed), np.zeros_like(t)
-
-
-@dataclass(frozen=True)
 class StudyDefaults:
     """What a study of the model does unless told otherwise.
 
@@ -95,6 +86,8 @@ class StudyDefaults:
         The first of the mechanism where None.
     torques : mapping of str to float
         Constant motor torques of a run without a path [N m].
+    orientation : float
+        Angle of the end-effector along the path, where it is a task coordinate [rad].
     """
 
     path: str | None = None
@@ -103,6 +96,7 @@ class StudyDefaults:
     samples: int = 701
     assembly: str | None = None
     torques: Mapping[str, float] = field(default_factory=dict)
+    orientation: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -118,6 +112,8 @@ class Model:
         The file it came from, or the library name.
     parameters : mapping
         The file's content as read, for provenance.
+    start : Start or None
+        Deflection and velocity at the start of a run without a path; None for a start undeformed and at rest.
     """
 
     mechanism: Mechanism
@@ -125,6 +121,7 @@ class Model:
     study: StudyDefaults
     source: str
     parameters: Mapping[str, Any] = field(repr=False, compare=False)
+    start: Start | None = None
 
     def path(self, name: str | None = None) -> Path:
         """A path by name, or the study's.
@@ -180,9 +177,9 @@ def load(name_or_file: str | FilePath) -> Model:
                 remedy=suggestion(text, library_names()),
             )
     data = read_toml(path, source)
-    table = validate(ModelTable, data, source)
     try:
-        return _model(table, data, source)
+        data = with_rows(data, path.parent)
+        return _model(validate(ModelTable, data, source), data, source)
     except InputError as error:
         raise (error if error.source else error.in_file(source)) from None
 
@@ -222,9 +219,17 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
         samples=table.study.samples,
         assembly=table.study.assembly,
         torques=table.study.torques,
+        orientation=table.study.orientation or 0.0,
     )
     _check_study(mechanism, paths, study)
-    return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data)
+    turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
+    if table.study.orientation is not None and not turns:
+        raise InputError(
+            "the angle is no task coordinate", field="study.orientation", value=table.study.orientation,
+            remedy='name "angle" among the coordinates of [end_effector], or leave it out',
+        )  # fmt: skip
+    start = None if table.start is None else read_start(table.start, mechanism)
+    return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start)
 
 
 def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
@@ -264,10 +269,7 @@ def _mechanism(table: ModelTable) -> Mechanism:
         bodies=tuple(_body(name, body, table) for name, body in table.body.items()),
         joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
         motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
-        prescribed=tuple(
-            PrescribedAngle(name, entry.joint, ConstantSpeed(entry.angle, entry.speed))
-            for name, entry in table.prescribed.items()
-        ),
+        prescribed=_prescribed(table),
         springs=tuple(
             TorsionalSpring(name, entry.joint, entry.stiffness, entry.rest) for name, entry in table.spring.items()
         ),
@@ -281,7 +283,7 @@ def _mechanism(table: ModelTable) -> Mechanism:
         end_effector=None
         if effector is None
         else EndEffector(PointRef.parse(effector.point, "end_effector.point"), tuple(effector.coordinates)),
-        assemblies=tuple(Assembly(name, angles) for name, angles in table.assembly.items()),
+        assemblies=tuple(_assembly(name, entry) for name, entry in table.assembly.items()),
         modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
     )
 
@@ -309,6 +311,37 @@ _JOINTS = {
     "sliding": SlidingJoint,
     "weld": WeldJoint,
 }
+
+
+def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
+    parameters = evaluate_parameters(table.parameters)
+    made = []
+    for name, entry in table.prescribed.items():
+        _check_quantity(name, entry, table.joint.get(entry.joint))
+        try:
+            law = read_law(entry, parameters, table.study.duration)
+        except InputError as error:
+            raise error.within(f"prescribed.{name}") from None
+        made.append(PrescribedAngle(name, entry.joint, law))
+    return tuple(made)
+
+
+def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointTable | None) -> None:
+    """A joint that turns has an angle, one that slides a displacement."""
+    slides = isinstance(joint, JointTable) and joint.type in ("prismatic", "slot", "sliding")
+    wrong, right = ("angle", "displacement") if slides else ("displacement", "angle")
+    if joint is not None and wrong in quantities(entry):
+        kind = joint.type if isinstance(joint, JointTable) else "revolute"
+        raise InputError(
+            f"a {kind} joint has no {wrong}", field=f"prescribed.{name}.{wrong}", value=entry.joint,
+            remedy=f"give its {right}",
+        )  # fmt: skip
+
+
+def _assembly(name: str, entry: AssemblyTable) -> Assembly:
+    field = f"assembly.{name}.points"
+    points = {PointRef.parse(text, field): (place[0], place[1]) for text, place in entry.points.items()}
+    return Assembly(name, entry.angles, points)
 
 
 def _linear_spring(name: str, entry: LinearSpringTable) -> LinearSpring:
@@ -394,4 +427,4 @@ def _path(table: PolygonTable | LineTable | CircleTable | PointsTable) -> Path:
     if isinstance(table, CircleTable):
         centre = (table.centre[0], table.centre[1])
         return Circle(centre, table.radius, table.max_acceleration, table.start_angle, table.sweep)
-    return PointPath(tuple((x, y) for x, y in table.points), table.motion_time)
+    return PointPath(tuple(map(tuple, table.points)), table.motion_time)

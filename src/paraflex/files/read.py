@@ -45,6 +45,13 @@ def read_toml(path: Path, source: str) -> dict[str, Any]:
             remedy="mend that line; a name may stand only once",
             source=source,
         ) from error
+    except (ValueError, RecursionError):
+        raise InputError(
+            "not valid TOML: a number of too many digits, or too many brackets in one another",
+            field="file",
+            remedy="name a model file",
+            source=source,
+        ) from None
 
 
 def validate(schema: type[T], data: dict[str, Any], source: str) -> T:

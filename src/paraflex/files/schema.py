@@ -6,12 +6,13 @@ checked once, in `mechanism.checks` and by the paths themselves.
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from paraflex.files.expressions import ExpressionError, evaluate
+from paraflex.files.expressions import ExpressionError, check_in_time, evaluate
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -19,20 +20,46 @@ def _number(value: Any, info: ValidationInfo) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        return evaluate(value, (info.context or {}).get("parameters", {}))
+        return evaluate(value, _parameters(info))
     except ExpressionError as error:
-        raise PydanticCustomError(
-            "expression", "{problem}", {"problem": error.problem, "remedy": error.remedy}
-        ) from None
+        raise _refused(error.problem, error.remedy) from None
+
+
+def _function(value: Any, info: ValidationInfo) -> Any:
+    """A finite number as it is, or an expression of the time t found right in form."""
+    example = 'say "0.2 * sin(3 * t)"'
+    if isinstance(value, str):
+        try:
+            check_in_time(value, _parameters(info))
+        except ExpressionError as error:
+            raise _refused(error.problem, error.remedy) from None
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise _refused("neither a number nor an expression", example)
+    if not abs(value) <= sys.float_info.max:
+        raise _refused("not a finite number", example)
+    return float(value)
+
+
+def _parameters(info: ValidationInfo) -> dict[str, float]:
+    return (info.context or {}).get("parameters", {})
+
+
+def _refused(problem: str, remedy: str) -> PydanticCustomError:
+    return PydanticCustomError("expression", "{problem}", {"problem": problem, "remedy": remedy})
 
 
 # A number, or an expression of parameters in quotes.
 Number = Annotated[
     float, Field(strict=True, allow_inf_nan=False), BeforeValidator(_number, json_schema_input_type=float | str)
 ]
+# A number, or an expression of parameters and the time t in quotes.
+FunctionOfTime = Annotated[Any, BeforeValidator(_function, json_schema_input_type=float | str)]
 Count = Annotated[int, Field(strict=True)]
 Text = Annotated[str, Field(strict=True)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+# Rows of two numbers; the name of a file stands for its rows, which `rows.with_rows` has put in its place.
+Rows = Annotated[list[Pair], BeforeValidator(lambda value: value, json_schema_input_type=list[Pair] | str)]
 
 
 class _Table(BaseModel):
@@ -173,12 +200,33 @@ class ModalTable(_Table):
     flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid body")
 
 
+class PieceTable(_Table):
+    """One of the pieces of a law."""
+
+    until: Number | None = Field(default=None, description="the time in s at which the next piece takes over")
+    angle: FunctionOfTime | None = Field(default=None, description="the angle in rad, an expression of the time t")
+    displacement: FunctionOfTime | None = Field(
+        default=None, description="the displacement in m, an expression of the time t"
+    )
+
+
 class PrescribedTable(_Table):
-    """A joint angle given in time: a constant speed from a start angle."""
+    """A joint's angle, or where it slides its displacement, given in time."""
 
     joint: Text = Field(description="the name of a joint")
-    angle: Number = Field(default=0.0, description="the angle at t = 0 in rad")
-    speed: Number = Field(default=0.0, description="the speed in rad/s")
+    angle: FunctionOfTime | None = Field(
+        default=None, description="the angle at t = 0 in rad, or an expression of the time t"
+    )
+    displacement: FunctionOfTime | None = Field(
+        default=None, description="the displacement at t = 0 in m, or an expression of the time t"
+    )
+    speed: Number | None = Field(default=None, description="the speed in rad/s or m/s, from a constant start")
+    pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = Field(
+        default=None, description='a list of { until = s, angle = "..." }, the last without until'
+    )
+    table: Rows | None = Field(
+        default=None, description="a list of [t, value] in s and rad or m, or the name of a file with two such columns"
+    )
 
 
 class SpringTable(_Table):
@@ -229,6 +277,57 @@ class TorqueTable(_Table):
     torque: Number = Field(description="the torque in N m")
 
 
+class AssemblyTable(BaseModel):
+    """Approximate angles of bodies by name, and places of points from which the other angles follow."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    __pydantic_extra__: dict[str, Number] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    points: dict[str, Pair] = Field(default={}, description='[x, y] in m for each "body.point"')
+
+    @property
+    def angles(self) -> dict[str, float]:
+        """Of the bodies that have one [rad]."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class DeflectionTable(_Table):
+    """How far a point of a beam is off its place in the body frame."""
+
+    axial: Number | None = Field(default=None, description="the stretch along the beam in m")
+    transverse: Number | None = Field(default=None, description="the displacement across the beam in m")
+    slope: Number | None = Field(default=None, description="the slope in rad")
+
+
+class CoordinatesTable(_Table):
+    """All coordinates of a body, or their rates."""
+
+    x: Number = Field(description="x of the body frame's origin in m, or its rate in m/s")
+    y: Number = Field(description="y of the body frame's origin in m, or its rate in m/s")
+    phi: Number = Field(description="the angle of the body frame in rad, or its rate in rad/s")
+    flexible: list[Number] | None = Field(
+        default=None, description="the body's own flexible coordinates, or their rates; zeros by default"
+    )
+
+
+class VelocityTable(_Table):
+    """Velocities at the start; the rest follows."""
+
+    angular: dict[str, Number] = Field(default={}, description="the rate of each body's angle in rad/s")
+    point: dict[str, Pair] = Field(default={}, description='[x, y] in m/s for each "body.point"')
+
+
+class StartTable(_Table):
+    """How a model without a path starts."""
+
+    deflection: dict[str, dict[str, Pair | DeflectionTable]] = Field(
+        default={}, description="[axial, transverse] in m, or a table of axial, transverse, slope, for points of beams"
+    )
+    velocity: VelocityTable = VelocityTable()
+    coordinates: dict[str, CoordinatesTable] = Field(default={}, description="x, y, phi and flexible of bodies")
+    rates: dict[str, CoordinatesTable] = Field(default={}, description="rates of x, y, phi and flexible of bodies")
+
+
 class EndEffectorTable(_Table):
     """The point that is to follow a path."""
 
@@ -269,7 +368,9 @@ class PointsTable(_Table):
     """A smooth motion through points."""
 
     type: Literal["points"]
-    points: list[Pair] = Field(description="a list of [x, y] in m")
+    points: list[Annotated[list[Number], Field(min_length=2, max_length=3)]] = Field(
+        description="a list of [x, y] in m, or of [x, y, angle] in m and rad"
+    )
     motion_time: Number = Field(description="the time from the first point to the last in s")
 
 
@@ -285,6 +386,9 @@ class StudyTable(_Table):
     samples: Count = Field(default=701, description="the number of samples kept")
     assembly: Text | None = Field(default=None, description="the name of an [assembly.NAME] table")
     torques: dict[str, Number] = Field(default={}, description="constant torques of motors in N m, without a path")
+    orientation: Number | None = Field(
+        default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
+    )
 
 
 class ModelTable(_Table):
@@ -315,11 +419,12 @@ class ModelTable(_Table):
     load: dict[str, Annotated[ForceTable | TorqueTable, Field(discriminator="type")]] = {}
     gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
     end_effector: EndEffectorTable | None = None
-    assembly: dict[str, dict[str, Number]] = Field(
-        default={}, description="approximate angles of all bodies in rad for each assembly"
+    assembly: dict[str, AssemblyTable] = Field(
+        default={}, description="approximate angles of all bodies in rad for each assembly, or places of points in m"
     )
     mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
     path: dict[str, PathTable] = {}
+    start: StartTable | None = None
     study: StudyTable = StudyTable()
 
 

@@ -28,6 +28,7 @@ from paraflex.mechanism.joints import (
     SlotJoint,
     WeldJoint,
 )
+from paraflex.mechanism.laws import ConstantSpeed, PiecewiseLaw, TabulatedLaw
 from paraflex.mechanism.loads import (
     AppliedTorque,
     JointFriction,
@@ -49,6 +50,7 @@ from paraflex.mechanism.mechanism import (
     parse_mode,
 )
 from paraflex.mechanism.modal import ModalBody, ModalPoint
+from paraflex.mechanism.poses import Pose, approximate_poses
 from paraflex.mechanism.raparm import raparm_i
 from paraflex.mechanism.segments import (
     FIRST_END,
@@ -69,6 +71,7 @@ __all__ = [
     "Assembly",
     "AssumedModesBeam",
     "Body",
+    "ConstantSpeed",
     "Curvature",
     "Damping",
     "EndEffector",
@@ -85,9 +88,11 @@ __all__ = [
     "ModalDamping",
     "ModalPoint",
     "Motor",
+    "PiecewiseLaw",
     "PointForce",
     "PointRef",
     "Polynomial",
+    "Pose",
     "PrescribedAngle",
     "PrismaticJoint",
     "RayleighDamping",
@@ -100,9 +105,11 @@ __all__ = [
     "Sine",
     "SlidingJoint",
     "SlotJoint",
+    "TabulatedLaw",
     "TorsionalDamper",
     "TorsionalSpring",
     "WeldJoint",
+    "approximate_poses",
     "check_mechanism",
     "check_segmentable",
     "finite_segments",

@@ -10,6 +10,7 @@ from paraflex.mechanism.bodies import FlexibleBeam
 from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.joints import GROUND, PointRef, SlidingJoint, WeldJoint
 from paraflex.mechanism.loads import PointForce
+from paraflex.mechanism.poses import approximate_poses
 from paraflex.mechanism.quantities import finite, not_negative, positive
 
 if TYPE_CHECKING:
@@ -123,14 +124,14 @@ def check_references(mechanism: Mechanism) -> None:
         for name, angle in assembly.angles.items():
             _known(name, bodies, f"assembly.{assembly.name}", "body")
             finite([angle], f"assembly.{assembly.name}.{name}")
-        for name in bodies:
-            if name not in assembly.angles:
-                raise InputError(
-                    "no angle for a body",
-                    field=f"assembly.{assembly.name}",
-                    value=name,
-                    remedy="give its approximate angle in rad",
-                )
+        for ref, place in assembly.points.items():
+            field = f"assembly.{assembly.name}.points"
+            _known_point(mechanism, ref, field)
+            finite(place, f"{field}.{ref}")
+            if ref.on_ground:
+                raise InputError("ground points are known", field=field, value=str(ref), remedy="name a body's point")
+        # It names the body that neither angles nor points place.
+        approximate_poses(mechanism, assembly)
 
 
 def check_connected(mechanism: Mechanism) -> None:

@@ -31,10 +31,19 @@ class Assembly:
     """One way of putting the mechanism together, given by an approximate angle [rad] of each body.
 
     The solver closes the loops from there; several assemblies of one mechanism differ in their elbows.
+
+    Attributes
+    ----------
+    name : str
+    angles : mapping of str to float
+        Of all bodies, or of those whose angles do not follow from points [rad].
+    points : mapping of PointRef to (x, y)
+        Approximate places in the ground frame [m].
     """
 
     name: str
     angles: Mapping[str, float]
+    points: Mapping[PointRef, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shape
 from paraflex.mechanism.damping import RayleighDamping
 from paraflex.mechanism.joints import PointRef, RevoluteJoint
 from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
-from paraflex.mechanism.mechanism import Mechanism
+from paraflex.mechanism.mechanism import Assembly, Mechanism
+from paraflex.mechanism.poses import approximate_poses
 
 # Points at which segments hang together.
 FIRST_END, LAST_END = "_first", "_last"
@@ -116,10 +117,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         ),
         loads=tuple(replace(load, point=moved(load.point)) for load in mechanism.loads),
         end_effector=None if effector is None else replace(effector, point=moved(effector.point)),
-        assemblies=tuple(
-            replace(assembly, angles={name: assembly.angles[carrier] for name, (carrier, _) in carriers.items()})
-            for assembly in mechanism.assemblies
-        ),
+        assemblies=tuple(_assembly(mechanism, assembly, carriers) for assembly in mechanism.assemblies),
     )
     return Segmented(segmented, carriers)
 
@@ -138,6 +136,12 @@ def check_segmentable(mechanism: Mechanism) -> None:
             field=f"body.{name}",
             remedy='make it a flexible beam (type = "beam") or rigid, or leave out finite segments',
         )
+
+
+def _assembly(mechanism: Mechanism, assembly: Assembly, carriers: Mapping[str, tuple[str, float]]) -> Assembly:
+    """Segments lie as their beams do; angles that follow from points follow before beams are cut."""
+    poses = approximate_poses(mechanism, assembly)
+    return replace(assembly, angles={name: poses[carrier].angle for name, (carrier, _) in carriers.items()}, points={})
 
 
 def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, int]:
