@@ -156,7 +156,8 @@ class FlexibleBeam:
             See `fem.mesh_beam` and `spans`.
         """
         mesh = mesh_beam(self.length, self.points, self.elements)
-        stiffness = [self._spans_of(mesh)[span].bending_stiffness for span in mesh.spans]
+        spans = self._spans_of(mesh)
+        stiffness = [spans[span].bending_stiffness for span in mesh.spans]
         # At a step of E I the moment is continuous: a shared curvature would be wrong on one side at least.
         separate = {node for node in range(1, mesh.n_elements) if stiffness[node - 1] != stiffness[node]}
         if self.curvature is Curvature.SEPARATE:
