@@ -1,6 +1,7 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
+from paraflex.dynamics.dependence import Dependence, dependence, redundant_rows
 from paraflex.dynamics.equilibrium import static_equilibrium
 from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.state import (
@@ -9,13 +10,13 @@ from paraflex.dynamics.state import (
     momentum,
     project_position,
     project_velocity,
-    redundant_rows,
     reference_pose,
 )
 from paraflex.dynamics.system import System, build_system
 
 __all__ = [
     "BodyCoordinates",
+    "Dependence",
     "InputSignals",
     "Marker",
     "State",
@@ -23,6 +24,7 @@ __all__ = [
     "build_system",
     "consistent_state",
     "constant_signals",
+    "dependence",
     "momentum",
     "node_marker",
     "pack_signals",
