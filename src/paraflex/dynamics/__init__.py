@@ -1,8 +1,8 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
-from paraflex.dynamics.dependence import Dependence, dependence, redundant_rows
 from paraflex.dynamics.equilibrium import static_equilibrium
+from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.state import (
     State,

@@ -9,13 +9,13 @@ import scipy.linalg
 import scipy.sparse
 from numpy.typing import NDArray
 
-from paraflex.dynamics.dependence import DENSE_ROWS, joint_of_row
+from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence, involved, joint_of_row
 from paraflex.dynamics.sparse import Saddle, body_masses, sparse_jacobian, sparse_mass, stiffness_diagonal
 from paraflex.dynamics.system import System
 from paraflex.errors import InconsistentConstraintsError, Moment
 
 # Joints named in an error.
-NAMED = 4
+NAMED = 6
 # What constraints may leave of each other's rates (m, rad; s), as a fraction of what they ask for.
 _CONFLICT = 1e-6
 
@@ -64,12 +64,28 @@ def joint_gaps(system: System, phi: NDArray[np.float64]) -> dict[str, float]:
 
 
 def refuse_conflict(
-    system: System, what: str, wanted: NDArray[np.float64], left: NDArray[np.float64], t: float
+    system: System, what: str, t: float, q: NDArray[np.float64], wanted: NDArray[np.float64], left: NDArray[np.float64]
 ) -> None:
-    """Raise where a projection leaves more of what rows want than rounding explains."""
-    if np.max(np.abs(left), initial=0.0) > _CONFLICT * max(1.0, np.max(np.abs(wanted), initial=0.0)):
-        gaps = joint_gaps(system, left)
-        where, size = " and ".join(list(gaps)[:NAMED]), max(gaps.values())
-        raise InconsistentConstraintsError(
-            f"constraints contradict one another in their {what}, by {size:.3g} in {where}", Moment(t, 0)
-        )
+    """Raise where a projection leaves more of what the rows want (m,) than rounding explains.
+
+    Raises
+    ------
+    InconsistentConstraintsError
+        It names joints and prescribed motions that depend on one another.
+    """
+    if not np.max(np.abs(left), initial=0.0) > _CONFLICT * max(1.0, np.max(np.abs(wanted), initial=0.0)):
+        return
+    raise InconsistentConstraintsError(contradiction(system, wanted, dependence(system, q), what), Moment(t, 0))
+
+
+def contradiction(system: System, wanted: NDArray[np.float64], found: Dependence, what: str) -> str:
+    """Who contradicts whom, and by how much: the dropped row furthest from what its sources have it want."""
+    if found.dropped.size:
+        conflict = np.abs(found.conflict(wanted))
+        k = int(np.argmax(conflict))
+        names, size = involved(system, found, k), float(conflict[k])
+    else:
+        gaps = joint_gaps(system, wanted)
+        names, size = list(gaps), max(gaps.values())
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"the {what} of constraints contradict one another, by {size:.3g}: {', '.join(names[:NAMED])}{more}"

@@ -156,7 +156,7 @@ def project_velocity(
     """
     _, rate = system.constraints(signals, t, q, v)
     v = v - least_change(system, q, rate, stiffness)
-    refuse_conflict(system, "velocities", rate, system.constraints(signals, t, q, v)[1], t)
+    refuse_conflict(system, "velocities", t, q, rate, system.constraints(signals, t, q, v)[1])
     return v
 
 
@@ -225,4 +225,4 @@ def check_accelerations(
 
     wanted = rows(np.zeros(system.n))
     if np.any(wanted):
-        refuse_conflict(system, "accelerations", wanted, rows(-least_change(system, q, wanted)), t)
+        refuse_conflict(system, "accelerations", t, q, wanted, rows(-least_change(system, q, wanted)))

@@ -126,6 +126,14 @@ def redundant_rows(system: System, q: NDArray[np.float64], threshold: float = DE
     return sorted(system.rows[i] for i in dependence(system, q, threshold).dropped)
 
 
+def involved(system: System, found: Dependence, k: int) -> list[str]:
+    """Joints and prescribed motions that the k-th dropped row is of or follows from; prescribed motions first."""
+    rows = [found.dropped[k], *found.sources(k)]
+    names = dict.fromkeys(joint_of_row(system.rows[row]) for row in rows)
+    prescribed = {motion.name for motion in system.mechanism.prescribed}
+    return sorted(names, key=lambda name: name not in prescribed)
+
+
 def joint_of_row(row: str) -> str:
     """The joint or prescribed motion that a row belongs to: "B1" of "B1 x"."""
     return row.rsplit(" ", 1)[0]
