@@ -2,6 +2,7 @@
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
 from paraflex.dynamics.equilibrium import static_equilibrium
+from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.state import (
@@ -21,11 +22,13 @@ __all__ = [
     "Marker",
     "State",
     "System",
+    "Vibration",
     "build_system",
     "consistent_state",
     "constant_signals",
     "dependence",
     "momentum",
+    "natural_frequencies",
     "node_marker",
     "pack_signals",
     "piecewise_quintic",

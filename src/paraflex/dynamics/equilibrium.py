@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics.signals import constant_signals, pack_signals
+from paraflex.dynamics.signals import resting_signals
 from paraflex.dynamics.state import State
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
@@ -73,9 +73,8 @@ class _Residual:
 
     def __init__(self, system: System, time: float, rows: NDArray[np.float64], kept: NDArray[np.float64]) -> None:
         mechanism = system.mechanism
-        still = constant_signals([0.0] * len(mechanism.motors), time + 1.0)
         self.system, self.time, self.rows, self.kept = system, time, rows, kept
-        self.signals, _ = pack_signals(mechanism, still, time + 1.0)
+        self.signals = resting_signals(mechanism, time)
         self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
         self.still = np.zeros(system.n)
         self.largest_force = 0.0

@@ -97,6 +97,12 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
     return _pack(signals), knots
 
 
+def resting_signals(mechanism: Mechanism, time: float) -> Signals:
+    """Motors without torque and the mechanism's prescribed angles, for what is asked at one instant [s]."""
+    end = time + 1.0
+    return pack_signals(mechanism, constant_signals([0.0] * len(mechanism.motors), end), end)[0]
+
+
 def _join(parts: Sequence[InputSignals]) -> InputSignals:
     breaks = np.concatenate([part.breaks[:-1] for part in parts] + [parts[-1].breaks[-1:]])
     return InputSignals(breaks, np.vstack([part.coefficients for part in parts]))

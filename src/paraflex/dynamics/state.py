@@ -10,7 +10,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from paraflex.dynamics.projection import NAMED, joint_gaps, least_change, refuse_conflict
-from paraflex.dynamics.signals import constant_signals, pack_signals
+from paraflex.dynamics.signals import resting_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
@@ -194,9 +194,7 @@ def consistent_state(
     for name, nodal in (deflection or {}).items():
         body = system.body(name)
         q[body.flexible] = np.linalg.lstsq(body.integrals.D, nodal, rcond=None)[0]
-    signals, _ = pack_signals(
-        system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), time + 1.0), time + 1.0
-    )
+    signals = resting_signals(system.mechanism, time)
     q = project_position(system, signals, time, q)
     if velocity is None:
         v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)

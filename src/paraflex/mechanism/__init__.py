@@ -12,6 +12,7 @@ from paraflex.mechanism.joints import (
     SampledAngle,
 )
 from paraflex.mechanism.loads import AppliedTorque, LinearSpring, Load, PointForce, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.loops import loops
 from paraflex.mechanism.mechanism import (
     ActuationMode,
     Assembly,
@@ -57,6 +58,7 @@ __all__ = [
     "TorsionalSpring",
     "check_mechanism",
     "finite_segments",
+    "loops",
     "mode_of_motors",
     "mode_of_signs",
     "parse_geometry",
