@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import CONSTRAINT, Signals
 from paraflex.kernel.stage import equations
-from paraflex.mechanism import Assembly
+from paraflex.mechanism import GROUND, Assembly, Joint, RevoluteJoint, WeldJoint
 from paraflex.mechanism.poses import approximate_poses
 
 _MAX_ITERATIONS = 50
@@ -59,31 +60,40 @@ def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
 def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
     """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
 
-    Loops are not closed yet. Bodies the tree does not reach are where the assembly's points have them.
+    Bodies whose places follow from the assembly's points are there. Loops are not closed yet.
     """
     q = np.zeros(system.n)
-    poses = approximate_poses(system.mechanism, assembly)
-    for body in system.bodies:
-        pose = poses[body.name]
+    placed = set()
+    for name, pose in approximate_poses(system.mechanism, assembly).items():
+        body = system.body(name)
         q[body.angle] = pose.angle
-        q[body.position] = (0.0, 0.0) if pose.position is None else pose.position
-    placed: set[str] = set()
-    joints = list(system.mechanism.joints)
-    if not any(joint.a.on_ground or joint.b.on_ground for joint in joints):
+        if pose.position is not None:
+            q[body.position] = pose.position
+            placed.add(name)
+    joints: dict[str, list[Joint]] = {body.name: [] for body in system.bodies} | {GROUND: []}
+    for joint in system.mechanism.joints:
+        joints[joint.a.body].append(joint)
+        joints[joint.b.body].append(joint)
+    if not joints[GROUND] and not placed:
         placed.add(system.bodies[0].name)
-    while joints:
-        for joint in joints:
-            known, new = (joint.a, joint.b) if joint.a.on_ground or joint.a.body in placed else (joint.b, joint.a)
-            if not (known.on_ground or known.body in placed):
-                continue
-            if not new.on_ground and new.body not in placed:
-                target = point_position(system, q, known)
-                q[system.body(new.body).position] += target - point_position(system, q, new)
-                placed.add(new.body)
-            joints.remove(joint)
-            break
-        else:  # what is left floats free of everything placed
-            break
+    # Joints that hold points together say where the next body is; others only where nothing better does.
+    firm: deque[tuple[Joint, str]] = deque()
+    loose: deque[tuple[Joint, str]] = deque()
+
+    def reach(name: str) -> None:
+        for joint in joints[name]:
+            (firm if isinstance(joint, RevoluteJoint | WeldJoint) else loose).append((joint, name))
+
+    for name in (GROUND, *placed):
+        reach(name)
+    while firm or loose:
+        joint, name = firm.popleft() if firm else loose.popleft()
+        known, new = (joint.a, joint.b) if joint.a.body == name else (joint.b, joint.a)
+        if not new.on_ground and new.body not in placed:
+            target = point_position(system, q, known)
+            q[system.body(new.body).position] += target - point_position(system, q, new)
+            placed.add(new.body)
+            reach(new.body)
     return q
 
 
