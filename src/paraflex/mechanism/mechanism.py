@@ -10,7 +10,15 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.joints import Joint, Motor, PointRef, PrescribedAngle
+from paraflex.mechanism.joints import (
+    Joint,
+    Motor,
+    PointRef,
+    PrescribedAngle,
+    PrismaticJoint,
+    SlidingJoint,
+    SlotJoint,
+)
 from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
 
 TASK_COORDINATES = ("x", "y", "angle")
@@ -133,6 +141,11 @@ class Mechanism:
     def joint(self, name: str) -> Joint:
         """The joint of that name."""
         return next(joint for joint in self.joints if joint.name == name)
+
+    def motor_units(self) -> tuple[str, ...]:
+        """What each motor's torque is counted in: N m, or N where its joint slides."""
+        slides = (PrismaticJoint, SlotJoint, SlidingJoint)
+        return tuple("N" if isinstance(self.joint(motor.joint), slides) else "N m" for motor in self.motors)
 
     def assembly(self, name: str | None = None) -> Assembly:
         """The assembly of that name, or the first.
