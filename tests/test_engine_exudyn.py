@@ -141,6 +141,23 @@ def test_a_linkage_moves_as_with_second_order_geometry(bar, stiffness):
     assert np.max(np.abs(ours.tip[:, 1, 1])) > 2e-3
 
 
+def test_a_coupler_of_two_sections_moves_as_with_second_order_geometry(bar):
+    """A stiff span before the middle point, soft ones of lighter stuff behind it."""
+    section, thick = Section.rectangle(0.02, 0.004), Section.rectangle(0.025, 0.005)
+    heavy, light = Material(280e9, 1200.0), Material(180e9, 1000.0)
+    coupler = dataclasses.replace(
+        bar.mechanism.body("coupler"), section=(thick, section, section), material=(heavy, light, light)
+    )
+    task = bar.remodelled(bar.mechanism.with_bodies([coupler]))
+    ours, plain = (record(one.simulate("+++", options=TIGHT)) for one in (task, bar))
+    theirs = simulate_exudyn(task, "+++", FINE)
+    assert distance(ours, theirs) < 2e-6
+    assert distance(ours, plain) > 1e-4
+    assert theirs.figures["energy_balance_max"] < 2e-6
+    for name in ("kinetic_energy", "strain_energy", "work"):
+        np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1e-5, err_msg=name)
+
+
 def test_a_rigid_linkage_follows_the_plan():
     """Nothing bends: angles, rates, accelerations and joint forces to second order in the step."""
     task = plan(four_bar().rigid(), samples=26)

@@ -15,6 +15,7 @@ from paraflex.kinematics import Line, PointPath
 from paraflex.mechanism import (
     AppliedTorque,
     Assembly,
+    ConstantSpeed,
     FlexibleBeam,
     Geometry,
     LinearSpring,
@@ -58,8 +59,6 @@ def test_a_clamped_beam_sags_and_stays(geometry):
     beam = FlexibleBeam(
         "beam", length, Section(1e-4, EI / 70e9), Material(70e9, per_length / 1e-4), {"A": 0.0, "B": length}, 2
     )
-    from paraflex.files.model import ConstantSpeed
-
     mechanism = Mechanism(
         "clamped",
         {"O": (0.0, 0.0)},

@@ -79,7 +79,7 @@ def test_the_rigid_mechanism_driven_by_its_torques_follows_the_path(tasks, name,
     run = simulate(tasks[name], mode, options=IntegrationOptions(tolerance=tolerance))
     data = tracking_dataset([run])
     distance = np.linalg.norm(data["end_effector"][0] - data["end_effector_desired"][0], axis=1)
-    # The tolerance is a mean over the masses: the end strays by up to 4.4 of it, by more where a mode is ill-conditioned.
+    # The tolerance is a mean over the masses: the end strays by up to 4.4 of it, by more where a mode is ill-posed.
     assert distance.max() < tolerance * max(5.0, float(run.condition.max()))
     assert run.solution.energy_balance_max < 1e-5
     bodies = [body.angle for body in tasks[name].system.bodies]

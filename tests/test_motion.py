@@ -12,6 +12,7 @@ from paraflex.files import library_file, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import (
     Assembly,
+    ConstantSpeed,
     Mechanism,
     Motor,
     PointRef,
@@ -67,7 +68,6 @@ def test_a_dataset_names_coordinates_points_forces_and_torques():
 
 def test_a_driven_crank_turns_a_linkage(tmp_path):
     """A four-bar with its crank at constant speed: rocker angles from the closed form of the loop."""
-    from paraflex.files.model import ConstantSpeed
 
     def bar(name, length, a, b):
         return RigidBody(name, 0.2, 1e-3, (length / 2, 0.0), {a: (0.0, 0.0), b: (length, 0.0)})

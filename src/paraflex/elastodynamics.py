@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
-from paraflex.dynamics import BodyCoordinates, System, pack_signals
+from paraflex.dynamics import BodyCoordinates, System, joint_coordinate, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
 from paraflex.integrators.generalised_alpha import Block, GeneralisedAlpha, Response, march
@@ -96,7 +96,7 @@ def simulate_ked(
     scheme = GeneralisedAlpha(float(times[1] - times[0]), spectral_radius)
     nominal = _nominal(task, times)
     blocks = [Block(body.all, _mass(body), _stiffness(body)) for body in task.system.bodies]
-    held = _angle_rows(task.system, torques.mode)
+    held = [motor.joint for motor in task.mechanism.motors if motor.name in torques.mode.motors]
     kept, steps, status, message, failure = [], 0, "complete", "", None
     try:
         responses = march(scheme, blocks, lambda instants: nominal[instants].structure(held), times)
@@ -123,7 +123,15 @@ def simulate_ked(
 
 
 def _check(task: TrackingTask, step: float, spectral_radius: float) -> None:
-    for kind, members in (("spring", task.mechanism.springs), ("damper", task.mechanism.dampers)):
+    mechanism = task.mechanism
+    groups = {
+        "spring": mechanism.springs,
+        "linear spring": mechanism.linear_springs,
+        "damper": mechanism.dampers,
+        "friction law": mechanism.frictions,
+        "damped beam": [body for body in mechanism.bodies if getattr(body, "damping", None) is not None],
+    }
+    for kind, members in groups.items():
         for member in members:
             raise InputError(
                 f"kineto-elastodynamics does not account for {kind}s",
@@ -156,16 +164,16 @@ class _Motion:
         """Of the body frames (k, bodies)."""
         return self.q[:, [body.angle for body in self.system.bodies]]
 
-    def structure(self, held: Array) -> tuple[Array, Array]:
-        """Constraints C (k, rows, n) with constant rows of the held motors, and forces -(M q_r'' + h) (k, n).
+    def structure(self, held: Sequence[str]) -> tuple[Array, Array]:
+        """Constraints C (k, rows, n), those of joints held by their motors last, and forces -(M q_r'' + h) (k, n).
 
         Both in the body frames.
         """
         forces, packed = np.zeros_like(self.q), self.system.packed
         motion_forces(packed, self.q, self.v, self.a, forces, make_point_scratch(packed))
         joints = np.array([self.system.jacobian(q) for q in self.q])
-        held = np.broadcast_to(held, (len(joints), *held.shape))
-        return self.to_bodies(np.concatenate([joints, held], axis=1)), -self.to_bodies(forces)
+        motors = [joint_coordinate(self.system, name, self.q).rows[:, None] for name in held]
+        return self.to_bodies(np.concatenate([joints, *motors], axis=1)), -self.to_bodies(forces)
 
     def to_bodies(self, values: Array) -> Array:
         """Translational parts of vectors (k, n) or rows (k, m, n) turned from the ground frame to the body frames."""
@@ -196,12 +204,6 @@ def _nominal(task: TrackingTask, times: Array) -> _Motion:
         target = slice(body.offset, body.offset + 3)
         q[:, target], v[:, target], a[:, target] = rigid.q[:, source], rigid.v[:, source], rigid.a[:, source]
     return _Motion(task.system, q, v, a)
-
-
-def _angle_rows(system: System, mode: ActuationMode) -> Array:
-    """Rows (motors, n) of the angles of a mode's motors, slopes of the beams included: side b less side a."""
-    active = [motor for motor in system.mechanism.motors if motor.name in mode.motors]
-    return np.array([system.angle_row(motor.joint) for motor in active]).reshape(-1, system.n)
 
 
 def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array:

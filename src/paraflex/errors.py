@@ -61,6 +61,11 @@ class InputError(ParaflexError, ValueError):
         """The same error, naming the file it came from."""
         return type(self)(self.problem, field=self.field, value=self.value, remedy=self.remedy, source=source)
 
+    def within(self, table: str) -> InputError:
+        """The same error, its field named from the table it stands in."""
+        field = f"{table}.{self.field}"
+        return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy, source=self.source)
+
 
 class OutputError(InputError):
     """A place where results cannot be written."""

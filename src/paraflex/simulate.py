@@ -177,7 +177,7 @@ def plan_tracking(
     assembly : str, optional
         Which way the mechanism is put together; the first by default.
     orientation : float
-        Angle of the end-effector where it is a task coordinate [rad].
+        Angle of the end-effector where it is a task coordinate and the path does not say it [rad].
 
     Raises
     ------

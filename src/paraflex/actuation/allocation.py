@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.dynamics import joint_coordinate
 from paraflex.errors import ActuationError, Moment, SingularActuationError
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_point_scratch
@@ -45,24 +46,28 @@ class Effort:
 
 
 def required_effort(motion: RigidMotion) -> Effort:
-    """Effort and actuation matrix of a rigid motion, under gravity, loads, springs and dampers."""
+    """Effort and actuation matrix of a rigid motion, under gravity, loads, springs, dampers and friction."""
     system = motion.system
     forces = np.zeros_like(motion.q)
     motion_forces(system.packed, motion.q, motion.v, motion.a, forces, make_point_scratch(system.packed))
     _add_springs_and_dampers(motion, forces)
-    selection = np.array([system.angle_row(motor.joint) for motor in system.mechanism.motors]).reshape(-1, system.n).T
     transposed = np.swapaxes(motion.basis, 1, 2)
+    rows = [joint_coordinate(system, motor.joint, motion.q).rows for motor in system.mechanism.motors]
+    selection = np.stack(rows, axis=2) if rows else np.zeros((*motion.q.shape, 0))
     return Effort(motion, np.einsum("kij,kj->ki", transposed, forces), transposed @ selection)
 
 
 def _add_springs_and_dampers(motion: RigidMotion, forces: NDArray[np.float64]) -> None:
-    """What springs and dampers at joints ask for besides inertia, into forces (k, n)."""
+    """What springs, dampers and friction at joints ask for besides inertia, into forces (k, n)."""
     for spring in motion.mechanism.springs:
-        row = motion.system.angle_row(spring.joint)
-        forces += np.outer(spring.stiffness * (motion.q @ row - spring.rest), row)
+        value, _, rows = joint_coordinate(motion.system, spring.joint, motion.q)
+        forces += (spring.stiffness * (value - spring.rest))[:, None] * rows
     for damper in motion.mechanism.dampers:
-        row = motion.system.angle_row(damper.joint)
-        forces += np.outer(damper.coefficient * (motion.v @ row), row)
+        _, rate, rows = joint_coordinate(motion.system, damper.joint, motion.q, motion.v)
+        forces += (damper.coefficient * rate)[:, None] * rows
+    for friction in motion.mechanism.frictions:
+        _, rate, rows = joint_coordinate(motion.system, friction.joint, motion.q, motion.v)
+        forces += (friction.limit * np.tanh(rate / friction.speed))[:, None] * rows
 
 
 def actuation_condition(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:

@@ -15,7 +15,6 @@ from paraflex.dynamics import build_system, consistent_state
 from paraflex.dynamics.state import redundant_rows
 from paraflex.errors import ActuationError, NumericalError
 from paraflex.files import library_names, load
-from paraflex.mechanism import FlexibleBeam
 from paraflex.simulate import plan_tracking
 
 _FREQUENCIES_SHOWN = 3
@@ -72,12 +71,11 @@ def describe(source: str) -> dict[str, Any]:
     system = build_system(mechanism)
     links = []
     for body, coordinates in zip(mechanism.bodies, system.bodies, strict=True):
-        beam = body if isinstance(body, FlexibleBeam) else None
         links.append(
             {
                 "name": body.name,
-                "kind": "flexible" if beam and beam.flexible else "rigid",
-                "length": beam.length if beam else None,
+                "kind": "flexible" if getattr(body, "flexible", False) else "rigid",
+                "length": getattr(body, "length", None),
                 "mass": float(coordinates.integrals.m),
                 "elements": coordinates.mesh.n_elements if coordinates.mesh else None,
                 "coordinates": 3 + coordinates.nf,
@@ -120,7 +118,9 @@ def modes_command(source: str, path: str | None, as_json: bool) -> None:
     rows = []
     effort = None
     if model.mechanism.end_effector is not None and (path is not None or model.paths):
-        effort = plan_tracking(model.mechanism.rigid(), model.path(path), samples=201).effort
+        effort = plan_tracking(
+            model.mechanism.rigid(), model.path(path), samples=201, orientation=model.study.orientation
+        ).effort
     for mode in model.mechanism.modes:
         row: dict[str, Any] = {"mode": mode.name, "motors": list(mode.motors)}
         if effort is not None:

@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, StudyRequest, at_fault, results_folder, write_json
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels
-from paraflex.dynamics import build_system, consistent_state, static_equilibrium
+from paraflex.dynamics import State, build_system, consistent_state, start_state, static_equilibrium
 from paraflex.errors import AssemblyError, InputError, IntegrationError
 from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
@@ -77,12 +77,9 @@ def _simulate(
         progress.start()
         progress.update(bar, completed=reached)
 
-    assembly, start = request.assembly or model.study.assembly, None
+    assembly = request.assembly or model.study.assembly
     try:
-        if request.balanced:
-            system = build_system(mechanism)
-            undeformed = consistent_state(system, mechanism.assembly(assembly))
-            start = static_equilibrium(system, undeformed, [motor.joint for motor in mechanism.motors])
+        start = _start(model, mechanism, assembly, request.balanced)
         return simulate_motion(
             mechanism,
             duration,
@@ -104,6 +101,25 @@ def _simulate(
     finally:
         if progress.live.is_started:
             progress.stop()
+
+
+def _start(model: Model, mechanism: Mechanism, assembly: str | None, balanced: bool) -> State | None:
+    """The state the file describes, from static equilibrium if asked for; None for an assembly undeformed at rest."""
+    if balanced and model.start is not None and model.start.places:
+        raise InputError(
+            "the file gives the coordinates of the start", field="--balanced",
+            remedy="leave it out, or give [start.velocity] only",
+        )  # fmt: skip
+    if not balanced and model.start is None:
+        return None
+    system = build_system(mechanism)
+    if not balanced:
+        given = mechanism.assembly(assembly) if assembly is not None or mechanism.assemblies else None
+        assert model.start is not None
+        return start_state(system, model.start, given)
+    undeformed = consistent_state(system, mechanism.assembly(assembly))
+    still = static_equilibrium(system, undeformed, [motor.joint for motor in mechanism.motors])
+    return still if model.start is None else start_state(system, model.start, q=still.q)
 
 
 def _report(figures: dict, data: xr.Dataset) -> None:

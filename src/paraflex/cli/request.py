@@ -57,6 +57,11 @@ def plan_study(
     model: Model, mechanism: Mechanism, path: EndEffectorPath, path_name: str, request: StudyRequest
 ) -> TrackingTask:
     """The study, planned; errors name the option or the field at fault."""
+    if model.start is not None:
+        raise InputError(
+            "a path says where and how the mechanism starts", field="start", source=model.source,
+            remedy="drop the [start] table, or run without a path",
+        )  # fmt: skip
     # Another path than the study's has another length: its own duration, with the study's share of dwell.
     duration, samples = request.duration, request.samples
     if duration is None:
@@ -69,6 +74,7 @@ def plan_study(
             duration=duration,
             samples=model.study.samples if samples is None else samples,
             assembly=request.assembly or model.study.assembly,
+            orientation=model.study.orientation,
         )
     except AssemblyError as error:
         raise InputError(

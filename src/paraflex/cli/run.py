@@ -118,6 +118,11 @@ def _without_path(model: Model, request: RunRequest) -> Mechanism:
     mechanism = asked_mechanism(model, request)
     if request.segments is None:
         return mechanism
+    if model.start is not None:
+        raise InputError(
+            "the file's [start] speaks of links that are not cut", field="--segments", value=request.segments,
+            remedy="leave one of them out",
+        )  # fmt: skip
     return finite_segments(mechanism, proportional_segments(mechanism, request.segments)).mechanism
 
 

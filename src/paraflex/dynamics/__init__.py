@@ -1,8 +1,10 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, end_markers, node_marker
 from paraflex.dynamics.equilibrium import static_equilibrium
-from paraflex.dynamics.signals import InputSignals, constant_signals, pack_signals, piecewise_quintic
+from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate
+from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
+from paraflex.dynamics.start import BodyValues, Deflection, Start, check_start, start_state
 from paraflex.dynamics.state import (
     State,
     consistent_state,
@@ -16,13 +18,22 @@ from paraflex.dynamics.system import System, build_system
 
 __all__ = [
     "BodyCoordinates",
+    "BodyValues",
+    "Deflection",
     "InputSignals",
+    "JointCoordinate",
     "Marker",
+    "Start",
     "State",
     "System",
+    "axis_angle",
     "build_system",
+    "check_start",
     "consistent_state",
     "constant_signals",
+    "end_markers",
+    "joint_coordinate",
+    "moment_signals",
     "momentum",
     "node_marker",
     "pack_signals",
@@ -31,5 +42,6 @@ __all__ = [
     "project_velocity",
     "redundant_rows",
     "reference_pose",
+    "start_state",
     "static_equilibrium",
 ]

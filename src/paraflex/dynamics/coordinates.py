@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.dynamics.shapes import BodyShape, PointShape, beam_lumps, body_shape
 from paraflex.errors import InputError
 from paraflex.fem import (
     BeamMesh,
-    Lump,
     MassPoints,
     ModalBasis,
     ShapeIntegrals,
-    SpanProperties,
-    beam_integrals,
     mass_points,
     modal_basis,
     node_weights,
-    rigid_integrals,
 )
-from paraflex.fem.element import SLOPE
-from paraflex.mechanism import Body, Geometry, Mechanism, PointRef, RigidBody
+from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
 
@@ -39,18 +36,26 @@ class BodyCoordinates:
     integrals : ShapeIntegrals
         In modal coordinates: u of the formulation is `modes.vectors @ q[flexible]`.
     modes : ModalBasis
-    mesh : BeamMesh or None
-        None for a rigid body.
+    shape : BodyShape
+        Its points in its own coordinates, to which `integrals.D` leads.
     points : MassPoints or None
         In modal coordinates, of a flexible beam of second-order geometry.
+    damping : (nf,) array
+        Of the modes [1/s].
     """
 
     name: str
     offset: int
     integrals: ShapeIntegrals
     modes: ModalBasis
-    mesh: BeamMesh | None
+    shape: BodyShape
     points: MassPoints | None = None
+    damping: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def mesh(self) -> BeamMesh | None:
+        """Of a flexible beam; None for any other body."""
+        return self.shape.mesh
 
     @property
     def nf(self) -> int:
@@ -78,10 +83,8 @@ class BodyCoordinates:
         return slice(self.offset, self.offset + 3 + self.nf)
 
     def slopes(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Slopes of the beam at its nodes [rad]; none for a rigid body."""
-        if self.mesh is None:
-            return np.zeros(0)
-        return self.integrals.D[self.mesh.rows_of(SLOPE)] @ q[self.flexible]
+        """Slopes along the body, a beam's at its nodes [rad]; none for a rigid body."""
+        return self.shape.slopes @ (self.integrals.D @ q[self.flexible])
 
 
 @dataclass(frozen=True)
@@ -124,20 +127,10 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordin
     InputError
         A mass matrix that is not positive definite.
     """
-    if isinstance(body, RigidBody):
-        integrals = rigid_integrals(body.mass, body.centre_of_mass, body.inertia)
-        return BodyCoordinates(body.name, offset, integrals, modal_basis(integrals), None)
-    mesh = body.mesh
-    span = SpanProperties(
-        mass_per_length=body.material.density * body.section.area,
-        axial_stiffness=body.material.youngs_modulus * body.section.area,
-        bending_stiffness=body.material.youngs_modulus * body.section.second_moment,
-    )
-    spans = [span] * (int(mesh.spans[-1]) + 1)
-    lumps = [Lump(mesh.points[lump.point], lump.mass, lump.inertia) for lump in body.lumps]
     try:
-        integrals = beam_integrals(mesh, spans, lumps, body.reference)
-        if not body.flexible:
+        shape = body_shape(body)
+        integrals = shape.integrals
+        if not isinstance(body, RigidBody) and not body.flexible:
             integrals = integrals.without_flexibility()
         modes = modal_basis(integrals)
     except np.linalg.LinAlgError as error:
@@ -146,13 +139,15 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordin
             field=f"body.{body.name}",
             remedy="check section, material and lumped masses for values many orders of magnitude apart",
         ) from error
-    if body.modes is not None:
+    if not isinstance(body, RigidBody) and body.modes is not None:
         modes = modes.lowest(body.modes)
     integrals = integrals.in_basis(modes.vectors)
     points = None
-    if geometry is Geometry.SECOND_ORDER and integrals.nf:
-        points = mass_points(mesh, spans, lumps, integrals.D)
-    return BodyCoordinates(body.name, offset, integrals, modes, mesh, points)
+    if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
+        points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
+    damping = getattr(body, "damping", None)
+    coefficients = np.zeros(integrals.nf) if damping is None else damping.coefficients(modes.omega)
+    return BodyCoordinates(body.name, offset, integrals, modes, shape, points, coefficients)
 
 
 def make_marker(
@@ -162,12 +157,21 @@ def make_marker(
     if ref.on_ground:
         return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point], dtype=float), np.zeros((2, 0)), np.zeros(0))
     i = index[ref.body]
-    body = mechanism.bodies[i]
-    if isinstance(body, RigidBody):
-        return Marker(i, np.array(body.points[ref.point], dtype=float), np.zeros((2, 0)), np.zeros(0))
-    mesh = bodies[i].mesh
-    assert mesh is not None
-    return node_marker(i, bodies[i], mesh.points[ref.point])
+    body = bodies[i]
+    if body.mesh is None:
+        return _point_marker(i, body, body.shape.points[ref.point])
+    return node_marker(i, body, body.mesh.points[ref.point])
+
+
+def end_markers(index: int, body: BodyCoordinates) -> tuple[Marker, ...]:
+    """First and last end of a beam or bar, first and last point of a modal body; none of a rigid body."""
+    if body.mesh is None:
+        return tuple(_point_marker(index, body, point) for point in body.shape.ends)
+    return node_marker(index, body, 0), node_marker(index, body, body.mesh.n_elements)
+
+
+def _point_marker(index: int, body: BodyCoordinates, point: PointShape) -> Marker:
+    return Marker(index, point.x0, point.N @ body.integrals.D, point.slope @ body.integrals.D)
 
 
 def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
@@ -178,3 +182,20 @@ def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
     N, slope = mesh.shape_at(x)
     bending = points.bending(node_weights(mesh, node)) if points is not None and node > 0 else None
     return Marker(index, np.array([x, 0.0]), N @ body.integrals.D, slope @ body.integrals.D, bending)
+
+
+def transverse_pieces(body: BodyCoordinates) -> NDArray[np.float64]:
+    """Transverse displacement of a beam's centre line per modal coordinate: (elements, 6, nf).
+
+    Coefficients of ascending powers of the distance from the element's first node.
+    """
+    mesh = body.mesh
+    assert mesh is not None
+    z = np.linspace(0.0, 1.0, 6)
+    pieces = []
+    for a, b in pairwise(mesh.nodes):
+        # Six values settle a quintic; at a node the shape is the same from either side.
+        rows = np.array([mesh.shape_at(a + x * (b - a))[0][1] for x in z])
+        powers = np.linalg.solve(np.vander(z, increasing=True), rows)
+        pieces.append(powers / ((b - a) ** np.arange(6))[:, None] @ body.integrals.D)
+    return np.array(pieces)

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics.signals import constant_signals, pack_signals
+from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import State
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
@@ -38,17 +39,15 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
     start : State
         Its q is where the search begins; its v does not matter.
     held : sequence of str
-        Joints whose angles, slopes of beams included, stay as they are.
+        Joints whose angle or travel, slopes of beams included, stays as it is.
 
     Raises
     ------
     AssemblyError
         No equilibrium is found near the start.
     """
-    rows = np.array([system.angle_row(joint) for joint in held]).reshape(-1, system.n)
-    kept = rows @ start.q
     n, m, size = system.n, system.m, system.n + system.m + len(held)
-    residual = _Residual(system, start.time, rows, kept)
+    residual = _Residual(system, start, held)
     z = np.concatenate([start.q, np.zeros(m + len(held))])
     # Stiffness spans ten powers of ten: modes are scaled to a stiffness of one.
     scale = np.ones(size)
@@ -69,16 +68,22 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
 
 
 class _Residual:
-    """Forces, constraints and held angles at (q, multipliers, holding torques), at rest."""
+    """Forces, constraints and held joints at (q, multipliers, holding torques), at rest."""
 
-    def __init__(self, system: System, time: float, rows: NDArray[np.float64], kept: NDArray[np.float64]) -> None:
+    def __init__(self, system: System, start: State, held: Sequence[str]) -> None:
         mechanism = system.mechanism
-        still = constant_signals([0.0] * len(mechanism.motors), time + 1.0)
-        self.system, self.time, self.rows, self.kept = system, time, rows, kept
-        self.signals, _ = pack_signals(mechanism, still, time + 1.0)
+        self.system, self.time, self.held = system, start.time, held
+        self.kept = self.joints(start.q)[0]
+        self.signals = moment_signals(mechanism, start.time)
         self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
         self.still = np.zeros(system.n)
         self.largest_force = 0.0
+
+    def joints(self, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Coordinates of the held joints (held,) and their derivatives (held, n)."""
+        found = [joint_coordinate(self.system, name, q[None]) for name in self.held]
+        rows = np.array([joint.rows[0] for joint in found]).reshape(-1, self.system.n)
+        return np.array([joint.value[0] for joint in found]), rows
 
     def __call__(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         system, ws, still = self.system, self.workspace, self.still
@@ -88,6 +93,7 @@ class _Residual:
         phi, _ = system.constraints(self.signals, self.time, q, still)
         # Rows of springs have no second derivatives in them, those of dampers hold no force at rest.
         closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
-        holding = self.rows.T @ torque
+        value, rows = self.joints(q)
+        holding = rows.T @ torque
         self.largest_force = max(np.max(np.abs(lam), initial=0.0), np.max(np.abs(holding), initial=0.0))
-        return np.concatenate([ws.f + holding, closed, self.rows @ q - self.kept])
+        return np.concatenate([ws.f + holding, closed, value - self.kept])

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
 from paraflex.kernel.packed import (
     ANGLE,
+    AXIS,
+    AXIS_RECORD,
     BODY,
     CONSTRAINT,
     DAMPER,
     EFFORT,
+    FRICTION,
     LINE,
     LOAD,
     MARKER,
@@ -23,47 +27,112 @@ from paraflex.kernel.packed import (
     PORT,
     ROW,
     SPRING,
+    TRACK,
     PackedSystem,
 )
-from paraflex.mechanism import Load, Mechanism, PointForce, PointRef
+from paraflex.mechanism import (
+    Joint,
+    Load,
+    Mechanism,
+    PointForce,
+    PointRef,
+    PrismaticJoint,
+    RevoluteJoint,
+    SlidingJoint,
+    SlotJoint,
+    WeldJoint,
+)
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """A joint, a prescribed angle or a spring before packing: two points, and a signal where it is driven in time.
+    """A joint or part of one, a prescribed motion, a spring, damper or friction before packing.
 
-    A spring is a compliant constraint: angle - rest = compliance * multiplier; so is a damper, of the angle's rate.
+    A spring is a compliant constraint: value - rest = compliance * multiplier; so is a damper, of the value's rate.
+
+    Attributes
+    ----------
+    name : str
+    kind : int
+        Of its ports: POINT, ANGLE or AXIS.
+    a, b : PointRef
+    labels : tuple of str
+        One a row.
+    signal : int
+        Where it is driven in time, else -1.
+    row : int
+        Kind of its rows: CONSTRAINT, SPRING, DAMPER or FRICTION.
+    compliance, limit : float
+    rest : float
+        What the value is compared with: of a spring at rest, of an angle held.
+    direction : float
+        Of an axis against body a [rad].
+    carrier : str
+        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
+        origin on.
     """
 
     name: str
     kind: int
     a: PointRef
     b: PointRef
-    signal: int
+    labels: tuple[str, ...]
+    signal: int = -1
     row: int = CONSTRAINT
     compliance: float = 0.0
+    limit: float = 0.0
     rest: float = 0.0
+    direction: float = 0.0
+    carrier: str = "material"
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """One name a row."""
-        return (f"{self.name} angle",) if self.kind == ANGLE else (f"{self.name} x", f"{self.name} y")
+
+def _joint_constraints(joint: Joint) -> list[Constraint]:
+    """What a joint holds."""
+    name, a, b = joint.name, joint.a, joint.b
+    parts = []
+    if isinstance(joint, RevoluteJoint | WeldJoint):
+        parts.append(Constraint(name, POINT, a, b, (f"{name} x", f"{name} y")))
+    if isinstance(joint, PrismaticJoint | SlotJoint):
+        normal = joint.direction + 0.5 * np.pi
+        parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=normal))
+    if isinstance(joint, SlidingJoint):
+        parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=0.5 * np.pi, carrier="track"))
+    if isinstance(joint, PrismaticJoint | WeldJoint):
+        parts.append(Constraint(name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
+    return parts
+
+
+def _axis_of(joint: PrismaticJoint | SlotJoint | SlidingJoint) -> dict[str, Any]:
+    """Direction and carrier of the axis that a joint's travel is measured on."""
+    if isinstance(joint, SlidingJoint):
+        return {"direction": 0.0, "carrier": "frame"}
+    return {"direction": joint.direction, "carrier": "material"}
+
+
+def _along(joint: Joint, name: str, **keywords) -> Constraint:
+    """A compliant or driven row of a joint's coordinate."""
+    if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+        keywords |= _axis_of(joint)
+        return Constraint(name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
+    return Constraint(name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
-    constraints = [Constraint(joint.name, POINT, joint.a, joint.b, -1) for joint in mechanism.joints]
-    # Signals are the motors' torques first, then the prescribed angles.
+    constraints = [part for joint in mechanism.joints for part in _joint_constraints(joint)]
+    # Signals are the motors' torques first, then the prescribed motions.
     for k, prescribed in enumerate(mechanism.prescribed):
         joint = mechanism.joint(prescribed.joint)
-        constraints.append(Constraint(prescribed.name, ANGLE, joint.a, joint.b, len(mechanism.motors) + k))
+        constraints.append(_along(joint, prescribed.name, signal=len(mechanism.motors) + k))
     for spring in mechanism.springs:
         joint = mechanism.joint(spring.joint)
-        constraints.append(
-            Constraint(spring.name, ANGLE, joint.a, joint.b, -1, SPRING, 1.0 / spring.stiffness, spring.rest)
-        )
+        constraints.append(_along(joint, spring.name, row=SPRING, compliance=1.0 / spring.stiffness, rest=spring.rest))
     for damper in mechanism.dampers:
         joint = mechanism.joint(damper.joint)
-        constraints.append(Constraint(damper.name, ANGLE, joint.a, joint.b, -1, DAMPER, 1.0 / damper.coefficient))
+        constraints.append(_along(joint, damper.name, row=DAMPER, compliance=1.0 / damper.coefficient))
+    for friction in mechanism.frictions:
+        joint = mechanism.joint(friction.joint)
+        slope = friction.limit / friction.speed
+        constraints.append(_along(joint, friction.name, row=FRICTION, compliance=1.0 / slope, limit=friction.limit))
     return constraints
 
 
@@ -72,12 +141,14 @@ def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
     constraints = _constraints(mechanism)
     if not constraints:
         return []
-    touched = np.zeros((len(constraints), len(index)))
-    for i, constraint in enumerate(constraints):
-        for ref in (constraint.a, constraint.b):
-            if not ref.on_ground:
-                touched[i, index[ref.body]] = 1.0
-    incidence = scipy.sparse.csr_matrix(touched)
+    touched = [
+        (i, index[ref.body])
+        for i, constraint in enumerate(constraints)
+        for ref in (constraint.a, constraint.b)
+        if not ref.on_ground
+    ]
+    rows, columns = zip(*touched, strict=True)
+    incidence = scipy.sparse.csr_matrix((np.ones(len(touched)), (rows, columns)), (len(constraints), len(index)))
     graph = scipy.sparse.csr_matrix(incidence @ incidence.T)
     order = scipy.sparse.csgraph.reverse_cuthill_mckee(graph, symmetric_mode=True)
     return [constraints[i] for i in order]
@@ -87,62 +158,37 @@ def pack_system(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], constraints: list[Constraint]
 ) -> tuple[PackedSystem, tuple[str, ...]]:
     """Records and arrays for the kernels, and the name of every constraint row."""
-    markers: list[Marker] = []
-    ports: list[list[dict]] = [[] for _ in bodies]
-    efforts: list[list[dict]] = [[] for _ in bodies]
-    labels: list[str] = []
-    ground: list[float] = []
-    signals: list[int] = []
-    kinds: list[int] = []
-    compliance: list[float] = []
-
-    def add_marker(ref: PointRef) -> int:
-        markers.append(make_marker(mechanism, bodies, index, ref))
-        return len(markers) - 1
-
+    packer = _Packer(mechanism, bodies, index)
     for constraint in constraints:
-        row, n_rows = len(labels), len(constraint.labels)
-        labels += constraint.labels
-        signals += [constraint.signal] * n_rows
-        kinds += [constraint.row] * n_rows
-        compliance += [constraint.compliance] * n_rows
-        ground += [-constraint.rest] * n_rows
-        for ref, sign in ((constraint.a, -1.0), (constraint.b, 1.0)):
-            if ref.on_ground:
-                if constraint.kind == POINT:
-                    for axis in range(2):
-                        ground[row + axis] += sign * mechanism.ground[ref.point][axis]
-                continue
-            ports[index[ref.body]].append(
-                {"marker": add_marker(ref), "kind": constraint.kind, "row": row, "rows": n_rows, "sign": sign}
-            )
+        packer.add_constraint(constraint)
     for k, motor in enumerate(mechanism.motors):
-        joint = mechanism.joint(motor.joint)
-        for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
-            if not ref.on_ground:
-                efforts[index[ref.body]].append({"marker": add_marker(ref), "signal": k, "sign": sign})
+        packer.add_motor(mechanism.joint(motor.joint), k)
     lines = [
         {
-            "a": -1 if spring.a.on_ground else add_marker(spring.a),
-            "b": -1 if spring.b.on_ground else add_marker(spring.b),
-            **_ground_place(mechanism, spring.a, "a"),
-            **_ground_place(mechanism, spring.b, "b"),
+            **packer.end(spring.a, "a"),
+            **packer.end(spring.b, "b"),
             "stiffness": spring.stiffness,
             "length": spring.length,
             "damping": spring.damping,
         }
         for spring in mechanism.linear_springs
     ]
-    loads = [_load_record(load) | {"marker": add_marker(load.point)} for load in mechanism.loads]
+    loads = [_load_record(load) | {"marker": packer.add_marker(load.point)} for load in mechanism.loads]
+    markers = packer.markers
+    tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
 
     packed = PackedSystem(
-        bodies=_body_records(bodies, ports, efforts),
+        bodies=_body_records(bodies, packer.ports, packer.efforts),
         markers=_marker_records(markers),
-        ports=_port_records(bodies, ports),
-        efforts=_records(EFFORT, [effort for group in efforts for effort in group]),
+        ports=_port_records(bodies, packer.ports),
+        efforts=_records(EFFORT, [effort for group in packer.efforts for effort in group]),
         loads=_records(LOAD, loads),
         lines=_records(LINE, lines),
-        rows=_row_records(kinds, signals, ground, compliance, ports),
+        axes=_records(AXIS_RECORD, packer.axes),
+        tracks=_records(TRACK, tracks),
+        track_breaks=breaks,
+        track_coefficients=coefficients,
+        rows=_records(ROW, _with_envelope(packer.rows, packer.ports)),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
         G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
@@ -154,12 +200,116 @@ def pack_system(
         total_mass=float(sum(body.integrals.m for body in bodies)),
         gravity=np.array(mechanism.gravity, dtype=float),
     )
-    return packed, tuple(labels)
+    return packed, tuple(packer.labels)
 
 
-def _ground_place(mechanism: Mechanism, ref: PointRef, end: str) -> dict[str, float]:
-    x, y = mechanism.ground[ref.point] if ref.on_ground else (0.0, 0.0)
-    return {f"{end}x": x, f"{end}y": y}
+class _Packer:
+    """Gathers the records of a system, joint by joint."""
+
+    def __init__(self, mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int]) -> None:
+        self.mechanism, self.bodies, self.index = mechanism, bodies, index
+        self.markers: list[Marker] = []
+        self.ports: list[list[dict]] = [[] for _ in bodies]
+        self.efforts: list[list[dict]] = [[] for _ in bodies]
+        self.axes: list[dict] = []
+        self.tracks: list[int] = []
+        self.rows: list[dict] = []
+        self.labels: list[str] = []
+
+    def add_marker(self, ref: PointRef) -> int:
+        self.markers.append(make_marker(self.mechanism, self.bodies, self.index, ref))
+        return len(self.markers) - 1
+
+    def end(self, ref: PointRef, end: str) -> dict[str, float]:
+        """One end of a line or an axis: a marker, or a place on the ground."""
+        if ref.on_ground:
+            x, y = self.mechanism.ground[ref.point]
+            return {end: -1, f"{end}x": x, f"{end}y": y}
+        return {end: self.add_marker(ref), f"{end}x": 0.0, f"{end}y": 0.0}
+
+    def add_constraint(self, constraint: Constraint) -> None:
+        row = len(self.rows)
+        self.labels += constraint.labels
+        record = {
+            "kind": constraint.row,
+            "signal": constraint.signal,
+            "compliance": constraint.compliance,
+            "limit": constraint.limit,
+            "ground": -constraint.rest,
+        }
+        self.rows += [dict(record) for _ in constraint.labels]
+        axis = -1
+        if constraint.kind == AXIS:
+            axis = self.add_axis(
+                constraint.a, constraint.b, direction=constraint.direction, carrier=constraint.carrier, row=row
+            )
+        for ref, sign in ((constraint.a, -1.0), (constraint.b, 1.0)):
+            if ref.on_ground:
+                if constraint.kind == POINT:
+                    for coordinate in range(2):
+                        self.rows[row + coordinate]["ground"] += sign * self.mechanism.ground[ref.point][coordinate]
+                continue
+            if axis < 0:
+                marker, parts = self.add_marker(ref), len(constraint.labels)
+            else:
+                marker, parts = self.axes[axis]["b"], 2
+                if sign < 0.0:
+                    marker, parts = self.axes[axis]["a"], 3 if self.axes[axis]["track"] < 0 else 4
+            self.ports[self.index[ref.body]].append(
+                {
+                    "marker": marker,
+                    "kind": constraint.kind,
+                    "row": row,
+                    "rows": len(constraint.labels),
+                    "parts": parts,
+                    "axis": axis,
+                    "sign": sign,
+                }
+            )
+
+    def add_axis(
+        self, a: PointRef, b: PointRef, *, direction: float, carrier: str, row: int = -1, signal: int = -1
+    ) -> int:
+        ends = self.end(a, "a") | self.end(b, "b")
+        track = -1
+        if carrier != "material":
+            # The frame has no slope of its own, and a track counts from its origin.
+            marker = self.markers[int(ends["a"])]
+            x0 = marker.x0 if carrier == "frame" else np.zeros(2)
+            still = replace(marker, x0=x0, N=np.zeros_like(marker.N), slope=np.zeros_like(marker.slope), bending=None)
+            self.markers[int(ends["a"])] = still
+        if carrier == "track":
+            self.tracks.append(self.index[a.body])
+            track = len(self.tracks) - 1
+        self.axes.append(ends | {"angle": direction, "row": row, "signal": signal, "track": track})
+        return len(self.axes) - 1
+
+    def add_motor(self, joint: Joint, signal: int) -> None:
+        if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+            self.add_axis(joint.a, joint.b, signal=signal, **_axis_of(joint))
+            return
+        for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
+            if not ref.on_ground:
+                record = {"marker": self.add_marker(ref), "signal": signal, "sign": sign}
+                self.efforts[self.index[ref.body]].append(record)
+
+
+def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], NDArray[np.float64], NDArray[np.float64]]:
+    """Deflections of beams that points slide on: records, breaks and coefficients."""
+    records, breaks, coefficients = [], [np.zeros(0)], [np.zeros(0)]
+    for body in bodies:
+        pieces = transverse_pieces(body)
+        records.append(
+            {
+                "first": sum(part.size for part in breaks),
+                "pieces": pieces.shape[0],
+                "coefficients": sum(part.size for part in coefficients),
+            }
+        )
+        assert body.mesh is not None
+        breaks.append(body.mesh.nodes)
+        coefficients.append(pieces.ravel())
+    return records, np.concatenate(breaks), np.concatenate(coefficients)
 
 
 def _load_record(load: Load) -> dict[str, float]:
@@ -170,7 +320,7 @@ def _load_record(load: Load) -> dict[str, float]:
 
 def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
     s = body.integrals
-    return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2])
+    return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2, body.damping])
 
 
 def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> NDArray[np.float64] | None:
@@ -228,7 +378,7 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
     flex = square = port = effort = block = mass = dense = 0
     for body, body_ports, body_efforts in zip(bodies, ports, efforts, strict=True):
         s = body.integrals
-        rows = sum(port["rows"] for port in body_ports)
+        parts = sum(port["parts"] for port in body_ports)
         masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
         values.append(
             {
@@ -241,7 +391,7 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
                 "effort": effort,
                 "effort_end": effort + len(body_efforts),
                 "block": block,
-                "rows": rows,
+                "parts": parts,
                 "mass": mass,
                 "mass_end": mass + masses,
                 "slopes": slopes,
@@ -256,7 +406,7 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
         square += body.nf**2
         port += len(body_ports)
         effort += len(body_efforts)
-        block += rows**2
+        block += parts**2
         mass += masses
         dense += (3 + body.nf) ** 2 if slopes else 0
     return _records(BODY, values)
@@ -286,32 +436,21 @@ def _port_records(bodies, ports) -> NDArray[np.void]:
         local = 0
         for port in body_ports:
             values.append(port | {"jac": jac, "local": local})
-            local += port["rows"]
-            jac += port["rows"] * (3 + body.nf)
+            local += port["parts"]
+            jac += port["parts"] * (3 + body.nf)
     return _records(PORT, values)
 
 
-def _row_records(
-    kinds: list[int], signals: list[int], ground: list[float], compliance: list[float], ports: list[list[dict]]
-) -> NDArray[np.void]:
+def _with_envelope(rows: list[dict], ports: list[list[dict]]) -> list[dict]:
     """Constraint rows with the envelope of the Schur complement: rows of one body are coupled."""
-    first = list(range(len(signals)))
+    first = list(range(len(rows)))
     for body_ports in ports:
         low = min((port["row"] for port in body_ports), default=0)
         for port in body_ports:
             for row in range(port["row"], port["row"] + port["rows"]):
                 first[row] = min(first[row], low)
-    values, start = [], 0
-    for row, (signal, value) in enumerate(zip(signals, ground, strict=True)):
-        values.append(
-            {
-                "kind": kinds[row],
-                "signal": signal,
-                "ground": value,
-                "compliance": compliance[row],
-                "first": first[row],
-                "start": start,
-            }
-        )
-        start += row + 1 - first[row]
-    return _records(ROW, values)
+    out, start = [], 0
+    for i, row in enumerate(rows):
+        out.append(row | {"first": first[i], "start": start})
+        start += i + 1 - first[i]
+    return out

@@ -9,11 +9,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
-from paraflex.mechanism import Mechanism
+from paraflex.mechanism import AngleLaw, Mechanism, PrescribedAngle
 
 # Breaks of a prescribed law: its quintic Hermite pieces are this short, as a fraction of the run.
 _LAW_PIECES = 2000
+_SHORTEST_PIECE = 1e-6
 _DEGREE = 5
 
 
@@ -72,6 +74,11 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
     -------
     Signals, knots
         The knots are the times at which a prescribed law is not smooth.
+
+    Raises
+    ------
+    InputError
+        A law that does not cover the run or is not finite in it.
     """
     signals, knots = list(torques), []
     for prescribed in mechanism.prescribed:
@@ -81,14 +88,42 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
         # The law may jump in a derivative at a knot: pieces on either side take its one-sided limits.
         parts = []
         for a, b in pairwise(edges):
-            count = max(8, round(_LAW_PIECES * (b - a) / end))
-            t = np.linspace(a, b, count + 1)
+            t = _grid(prescribed.law, a, b, end)
             inside = t.copy()
-            inside[0] += 1e-12 * (b - a)
-            inside[-1] -= 1e-12 * (b - a)
-            parts.append(piecewise_quintic(t, *prescribed.law.evaluate(inside)))
+            inside[0] = max(a + 1e-12 * (b - a), np.nextafter(a, b))
+            inside[-1] = min(b - 1e-12 * (b - a), np.nextafter(b, a))
+            parts.append(piecewise_quintic(t, *_evaluate(prescribed, inside)))
         signals.append(_join(parts))
     return _pack(signals), knots
+
+
+def moment_signals(mechanism: Mechanism, time: float) -> Signals:
+    """Signals at one time: no torques; laws with their rate and acceleration there, asked for at no other time."""
+    signals = constant_signals([0.0] * len(mechanism.motors), 1.0)
+    for prescribed in mechanism.prescribed:
+        value, rate, acceleration = (float(x[0]) for x in _evaluate(prescribed, np.array([time])))
+        taylor = np.array([[value, rate, 0.5 * acceleration, 0.0, 0.0, 0.0]])
+        signals.append(InputSignals(np.array([time, time + 1.0]), taylor))
+    return _pack(signals)
+
+
+def _grid(law: AngleLaw, a: float, b: float, end: float) -> NDArray[np.float64]:
+    """Breaks of a law's pieces on [a, b]: its own where it is a quintic between them, else many."""
+    breaks = getattr(law, "breaks", None)
+    if breaks is None:
+        return np.linspace(a, b, max(8, round(_LAW_PIECES * (b - a) / end)) + 1)
+    # A piece of nearly no length would have no accurate second derivative.
+    margin = _SHORTEST_PIECE * (b - a)
+    return np.array([a, *(t for t in breaks if a + margin < t < b - margin), b])
+
+
+def _evaluate(
+    prescribed: PrescribedAngle, t: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    try:
+        return prescribed.law.evaluate(t)
+    except InputError as error:
+        raise error.within(f"prescribed.{prescribed.name}") from None
 
 
 def _join(parts: Sequence[InputSignals]) -> InputSignals:

@@ -9,12 +9,13 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from paraflex.dynamics.signals import constant_signals, pack_signals
+from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.bodies import body_terms
 from paraflex.kernel.packed import CONSTRAINT, Signals, make_point_scratch
 from paraflex.mechanism import Assembly
+from paraflex.mechanism.poses import approximate_poses
 
 _MAX_ITERATIONS = 50
 # Closure error that counts as closed [m, rad]: a few rounding errors of a metre-sized mechanism.
@@ -80,11 +81,14 @@ def redundant_rows(system: System, q: NDArray[np.float64], threshold: float = DE
 def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
     """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
 
-    Loops are not closed yet.
+    Loops are not closed yet. Bodies the tree does not reach are where the assembly's points have them.
     """
     q = np.zeros(system.n)
+    poses = approximate_poses(system.mechanism, assembly)
     for body in system.bodies:
-        q[body.angle] = assembly.angles[body.name]
+        pose = poses[body.name]
+        q[body.angle] = pose.angle
+        q[body.position] = (0.0, 0.0) if pose.position is None else pose.position
     placed: set[str] = set()
     joints = list(system.mechanism.joints)
     if not any(joint.a.on_ground or joint.b.on_ground for joint in joints):
@@ -200,9 +204,7 @@ def consistent_state(
     for name, nodal in (deflection or {}).items():
         body = system.body(name)
         q[body.flexible] = np.linalg.lstsq(body.integrals.D, nodal, rcond=None)[0]
-    signals, _ = pack_signals(
-        system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), time + 1.0), time + 1.0
-    )
+    signals = moment_signals(system.mechanism, time)
     q = project_position(system, signals, time, q)
     if velocity is not None:
         return State(time, q, project_velocity(system, signals, time, q, velocity))

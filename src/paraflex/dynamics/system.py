@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
 from paraflex.dynamics.packing import pack_system, row_order
-from paraflex.kernel.joints import constraint_values, fill_jacobian
+from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_workspace
 from paraflex.mechanism import Mechanism, PointRef
 
@@ -71,17 +71,6 @@ class System:
     def marker(self, ref: PointRef) -> Marker:
         """The material point of that name."""
         return make_marker(self.mechanism, self.bodies, self.index, ref)
-
-    def angle_row(self, joint: str) -> NDArray[np.float64]:
-        """Row (n,) of the angle of a joint, slopes of beams included: side b less side a."""
-        row = np.zeros(self.n)
-        sides = self.mechanism.joint(joint)
-        for ref, sign in ((sides.a, -1.0), (sides.b, 1.0)):
-            if not ref.on_ground:
-                body = self.body(ref.body)
-                row[body.angle] += sign
-                row[body.flexible] += sign * self.marker(ref).slope
-        return row
 
     def workspace(self) -> Workspace:
         """A fresh workspace for the kernels."""

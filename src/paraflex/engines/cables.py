@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.fem import BeamMesh, SpanProperties
-from paraflex.mechanism import PointRef, RevoluteJoint
+from paraflex.mechanism import Joint, PointRef
 from paraflex.results.motion import PointMotion
 
 Array = NDArray[np.float64]
@@ -183,7 +183,8 @@ class Cable:
     Attributes
     ----------
     mesh : BeamMesh
-    span : SpanProperties
+    spans : tuple of SpanProperties
+        One an element.
     items : tuple of int
         The engine's numbers of the elements.
     columns : (2 nodes, 2) array of int
@@ -195,7 +196,7 @@ class Cable:
     """
 
     mesh: BeamMesh
-    span: SpanProperties
+    spans: tuple[SpanProperties, ...]
     items: tuple[int, ...]
     columns: Columns
     lumps: Array
@@ -253,12 +254,13 @@ class Cable:
         """Sum of mass times position (k, 2) [kg m]."""
         q = history.states[0][:, self.columns]
         weights, rows = self._quadrature(_MASS_POINTS, 0)
-        return self.span.mass_per_length * (weights @ (rows @ q)) + self.lumps[:, 0] @ q[:, ::2]
+        return (weights * self._along("mass_per_length", _MASS_POINTS)) @ (rows @ q) + self.lumps[:, 0] @ q[:, ::2]
 
     def kinetic_energy(self, history: History) -> Array:
         """1/2 int rho A |r_t|^2 dx, and the lumps' 1/2 m |r_t|^2 + 1/2 J |r'_t|^2 [J]."""
         weights, rows = self._quadrature(_MASS_POINTS, 0)
-        mass = np.diag(self.lumps.ravel()) + self.span.mass_per_length * (rows.T * weights) @ rows
+        weights = weights * self._along("mass_per_length", _MASS_POINTS)
+        mass = np.diag(self.lumps.ravel()) + (rows.T * weights) @ rows
         v = history.states[1][:, self.columns]
         return 0.5 * np.sum(v * (mass @ v), axis=(1, 2))
 
@@ -267,17 +269,17 @@ class Cable:
         q = history.states[0][:, self.columns]
         weights, rows = self._quadrature(_AXIAL_POINTS, 1)
         strain = np.linalg.norm(rows @ q, axis=2) - 1.0
-        axial = self.span.axial_stiffness * strain**2 @ weights
+        axial = strain**2 @ (weights * self._along("axial_stiffness", _AXIAL_POINTS))
         weights, rows = self._quadrature(_BENDING_POINTS, 1)
         first, second = rows @ q, self._quadrature(_BENDING_POINTS, 2)[1] @ q
         curvature = _cross(first, second) / np.sum(first**2, axis=2)
-        return 0.5 * (axial + self.span.bending_stiffness * curvature**2 @ weights)
+        return 0.5 * (axial + curvature**2 @ (weights * self._along("bending_stiffness", _BENDING_POINTS)))
 
     def rounding(self, reference: Array) -> float:
-        """Of the axial force: EA times the rounding of positions over the shortest element's length [N]."""
+        """Of the axial force: EA times the rounding of positions over the element's length, at its largest [N]."""
         far = float(np.max(np.abs(reference[self.columns[::2]])))
-        shortest = float(np.min(np.diff(self.mesh.nodes)))
-        return float(np.finfo(float).eps) * self.span.axial_stiffness * far / shortest
+        stiffest = float(np.max(self._along("axial_stiffness", 1) / np.diff(self.mesh.nodes)))
+        return float(np.finfo(float).eps) * stiffest * far
 
     def _tangent(self, node: int, history: History) -> Turn:
         return turn_of(self.start, *history.states[:, :, self.columns[1::2][node]])
@@ -285,6 +287,10 @@ class Cable:
     def _line(self, history: History) -> Array:
         """From the first end to the last, with two derivatives (3, k, 2)."""
         return history.states[:, :, self.columns[-2]] - history.states[:, :, self.columns[0]]
+
+    def _along(self, quantity: str, count: int) -> Array:
+        """A property of the spans at so many Gauss points an element."""
+        return np.repeat([getattr(span, quantity) for span in self.spans], count)
 
     def _quadrature(self, count: int, order: int) -> tuple[Array, Array]:
         """Gauss points along the beam: weights [m], and rows that make of r and r' at the nodes a derivative of r."""
@@ -314,11 +320,11 @@ class Linkage:
         """Of a named point."""
         return self.part(ref).motion(ref.point, history)
 
-    def gap(self, joint: RevoluteJoint, history: History) -> Array:
+    def gap(self, joint: Joint, history: History) -> Array:
         """From side a of a joint to side b, with two derivatives (3, k, 2)."""
         return np.subtract(self.motion(joint.b, history), self.motion(joint.a, history))
 
-    def joint_turn(self, joint: RevoluteJoint, history: History) -> Turn:
+    def joint_turn(self, joint: Joint, history: History) -> Turn:
         """Of the material at side b of a joint against that at side a."""
         a, b = (self.part(ref).turn(ref.point, history) for ref in (joint.a, joint.b))
         return Turn(*np.subtract(b, a))

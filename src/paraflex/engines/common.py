@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError
-from paraflex.mechanism import Mechanism
+from paraflex.mechanism import FlexibleBeam, Mechanism, RevoluteJoint, given_shapes
 
 # Names of the engines as users and Python's packages know them, and in print.
 _PRINTED = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}
@@ -25,10 +25,20 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     InputError
         It is not, or cannot.
     """
+    for body in given_shapes(mechanism.bodies):
+        refuse(_PRINTED[name], "a flexible body of given shapes", f"body.{body}")
     for prescribed in mechanism.prescribed:
         refuse(_PRINTED[name], "a prescribed angle", f"prescribed.{prescribed.name}")
+    for joint in mechanism.joints:
+        if not isinstance(joint, RevoluteJoint):
+            refuse(_PRINTED[name], "a joint that is not revolute", f"joint.{joint.name}")
     for damper in mechanism.dampers:
         refuse(_PRINTED[name], "a damper", f"damper.{damper.name}")
+    for friction in mechanism.frictions:
+        refuse(_PRINTED[name], "dry friction", f"friction.{friction.name}")
+    for body in mechanism.bodies:
+        if isinstance(body, FlexibleBeam) and body.damping is not None:
+            refuse(_PRINTED[name], "structural damping", f"body.{body.name}.damping")
     for spring in mechanism.linear_springs:
         refuse(_PRINTED[name], "a spring between points", f"linear_spring.{spring.name}")
     for load in mechanism.loads:

@@ -23,8 +23,7 @@ from paraflex.dynamics import System
 from paraflex.engines.cables import Array, Cable, Columns, Ground, History, Link, Linkage, Pose, RigidLink
 from paraflex.engines.common import check_engine, import_engine, steps_between
 from paraflex.errors import InputError, IntegrationError, Moment
-from paraflex.fem import SpanProperties
-from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Mechanism, PointRef, RevoluteJoint, TorsionalSpring
+from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
 from paraflex.results.record import Record
 from paraflex.simulate import TrackingTask
 
@@ -150,7 +149,7 @@ class _Engine:
         """On position and turn of the material at a point."""
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(**linkage.part(ref).place(ref.point)))
 
-    def markers(self, linkage: Linkage, joint: RevoluteJoint) -> list[int]:
+    def markers(self, linkage: Linkage, joint: Joint) -> list[int]:
         return [self.marker(linkage, ref) for ref in (joint.a, joint.b)]
 
 
@@ -242,8 +241,8 @@ def _add_rigid(engine: _Engine, system: System, body: Body, pose: Pose) -> Rigid
 
 
 def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: Pose) -> Cable:
-    mesh, E, area = beam.mesh, beam.material.youngs_modulus, beam.section.area
-    span = SpanProperties(beam.material.density * area, E * area, E * beam.section.second_moment)
+    mesh, of_span = beam.mesh, beam.spans
+    spans = tuple(of_span[span] for span in mesh.spans)
     slope, turning = pose.direction(1.0, 0.0)
     nodes, columns = [], []
     for x in mesh.nodes.tolist():
@@ -260,7 +259,7 @@ def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: Pose) -> Cable:
             axialStiffness=span.axial_stiffness,
             nodeNumbers=nodes[i : i + 2],
         )
-        for i, length in enumerate(np.diff(mesh.nodes).tolist())
+        for i, (span, length) in enumerate(zip(spans, np.diff(mesh.nodes).tolist(), strict=True))
     ]
     lumps = np.zeros((len(nodes), 2))
     for lump in beam.lumps:
@@ -268,10 +267,10 @@ def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: Pose) -> Cable:
     for node in np.flatnonzero(lumps.any(axis=1)):
         # Kinetic energy J/2 |r'_t|^2: that of the turning cross-section as long as |r'| = 1, to within the strain.
         engine.add("ObjectGenericODE2", nodeNumbers=[nodes[node]], massMatrix=np.diag(np.repeat(lumps[node], 2)))
-    return Cable(mesh, span, tuple(items), np.reshape(columns, (-1, 2)), lumps, pose.phi)
+    return Cable(mesh, spans, tuple(items), np.reshape(columns, (-1, 2)), lumps, pose.phi)
 
 
-def _add_motor(engine: _Engine, linkage: Linkage, joint: RevoluteJoint) -> list[tuple[int, float]]:
+def _add_motor(engine: _Engine, linkage: Linkage, joint: Joint) -> list[tuple[int, float]]:
     """Loads on the material at both sides of a joint, as numbers with signs."""
     return [
         (engine.mbs.AddLoad(engine.items.LoadTorqueVector(markerNumber=engine.marker(linkage, ref))), sign)
@@ -280,7 +279,7 @@ def _add_motor(engine: _Engine, linkage: Linkage, joint: RevoluteJoint) -> list[
     ]
 
 
-def _add_spring(engine: _Engine, linkage: Linkage, joint: RevoluteJoint, spring: TorsionalSpring) -> None:
+def _add_spring(engine: _Engine, linkage: Linkage, joint: Joint, spring: TorsionalSpring) -> None:
     """A spring between the material at both sides of a joint."""
     # Exudyn counts the angle on from its start, and starts within half a turn of zero.
     turns = 2.0 * np.pi * np.round((linkage.part(joint.b).start - linkage.part(joint.a).start) / (2.0 * np.pi))

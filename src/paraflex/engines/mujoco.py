@@ -23,7 +23,7 @@ from paraflex.engines.tree import Tree, body_motion, joint_state, place, spannin
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
-from paraflex.mechanism import GROUND, ActuationMode, Mechanism, RevoluteJoint, proportional_segments
+from paraflex.mechanism import GROUND, ActuationMode, Joint, Mechanism, proportional_segments
 from paraflex.results.record import Record, record
 from paraflex.simulate import TrackingRun, TrackingTask
 
@@ -137,7 +137,7 @@ def _add_springs(spec: Any, mechanism: Mechanism, tree: Tree) -> None:
         joint.springref = link.sign * spring.rest
 
 
-def _close(mujoco: Any, spec: Any, system: System, joint: RevoluteJoint, bodies: dict, step: float) -> None:
+def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, step: float) -> None:
     sites = []
     for side, ref in (("a", joint.a), ("b", joint.b)):
         name = f"{joint.name} {side}"

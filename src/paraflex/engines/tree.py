@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System
 from paraflex.errors import InputError
-from paraflex.mechanism import GROUND, Mechanism, PointRef, RevoluteJoint
+from paraflex.mechanism import GROUND, Joint, Mechanism, PointRef
 from paraflex.simulate import TrackingTask
 
 
@@ -18,7 +18,7 @@ class Link:
     """A body hinged to its parent in the tree, or to the ground."""
 
     name: str
-    joint: RevoluteJoint
+    joint: Joint
 
     @property
     def sign(self) -> float:
@@ -49,17 +49,17 @@ class Tree:
     ----------
     links : tuple of Link
         One a body; its hinge's angle is the coordinate of that number.
-    closing : tuple of RevoluteJoint
+    closing : tuple of Joint
         Joints that close loops.
     angles : mapping of str to (links,) array
         Weights of the hinges' angles in each body's angle; zero for the ground.
     """
 
     links: tuple[Link, ...]
-    closing: tuple[RevoluteJoint, ...]
+    closing: tuple[Joint, ...]
     angles: dict[str, NDArray[np.float64]]
 
-    def relative_angle(self, joint: RevoluteJoint) -> NDArray[np.float64]:
+    def relative_angle(self, joint: Joint) -> NDArray[np.float64]:
         """Weights (links,) of the hinges' angles in the angle of a joint of the mechanism."""
         return self.angles[joint.b.body] - self.angles[joint.a.body]
 
@@ -97,7 +97,7 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
     return Tree(tuple(links), tuple(closing), angles)
 
 
-def _split(joints: list[RevoluteJoint]) -> tuple[list[RevoluteJoint], list[RevoluteJoint]]:
+def _split(joints: list[Joint]) -> tuple[list[Joint], list[Joint]]:
     """Joints that join what was apart before, first come first served, and those that close loops (Kruskal)."""
     group: dict[str, str] = {}
 

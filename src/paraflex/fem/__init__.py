@@ -1,5 +1,6 @@
 """Flexible beams: element, mesh, reference conditions, inertia shape integrals, eigenmodes. Knows no mechanisms."""
 
+from paraflex.fem.assumed import AssumedShapes, PlacedLump, Polynomial, ShapeFunction, Sine, assumed_integrals
 from paraflex.fem.foreshortening import MassPoints, mass_points, node_weights
 from paraflex.fem.integrals import Lump, ShapeIntegrals, SpanProperties, beam_integrals, rigid_integrals
 from paraflex.fem.mesh import BeamMesh, mesh_beam
@@ -7,13 +8,19 @@ from paraflex.fem.modes import ModalBasis, modal_basis, natural_frequencies
 from paraflex.fem.reference import ReferenceCondition, reference_basis
 
 __all__ = [
+    "AssumedShapes",
     "BeamMesh",
     "Lump",
     "MassPoints",
     "ModalBasis",
+    "PlacedLump",
+    "Polynomial",
     "ReferenceCondition",
+    "ShapeFunction",
     "ShapeIntegrals",
+    "Sine",
     "SpanProperties",
+    "assumed_integrals",
     "beam_integrals",
     "mass_points",
     "mesh_beam",

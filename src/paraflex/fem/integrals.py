@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,8 +77,8 @@ class ShapeIntegrals:
         sum J N2'^T N2'.
     K : (nf, nf) array
         Elastic stiffness.
-    D : (n_nodal, nf) array
-        Nodal coordinates per flexible coordinate (Eq. 7); no rows for a rigid body.
+    D : (own, nf) array
+        The body's own coordinates, a beam's nodal ones (Eq. 7), per flexible coordinate; no rows for a rigid body.
     """
 
     m: float
@@ -182,14 +182,36 @@ def beam_integrals(
     ShapeIntegrals
         In the independent coordinates of the reference condition.
     """
-    n = mesh.n_nodal
     points, stiffness = _quadrature(mesh, spans)
-    points += [(mesh.nodes[lump.node], *mesh.shape_at(mesh.nodes[lump.node]), lump.mass) for lump in lumps]
+    points += [(mesh.nodes[lump.node], mesh.shape_at(mesh.nodes[lump.node])[0], lump.mass) for lump in lumps]
+    turning = [(np.eye(mesh.n_nodal)[mesh.slope_column(lump.node)], lump.inertia) for lump in lumps]
+    nodal = bar_integrals(points, turning, stiffness, np.eye(mesh.n_nodal))
+    return nodal.in_basis(reference_basis(mesh, condition, nodal.Mff, stiffness))
 
+
+def bar_integrals(
+    points: Iterable[tuple[float, NDArray[np.float64], float]],
+    turning: Iterable[tuple[NDArray[np.float64], float]],
+    stiffness: NDArray[np.float64],
+    basis: NDArray[np.float64],
+) -> ShapeIntegrals:
+    """Integrals of a straight bar as sums over its mass points.
+
+    Parameters
+    ----------
+    points : iterable of (x, N, dm)
+        Place along the bar [m], displacement (2, n) per coordinate, mass [kg].
+    turning : iterable of (slope, J)
+        Slope row (n,) at each lumped moment of inertia [kg m^2].
+    stiffness : (n, n) array
+    basis : (own, n) array
+        The body's own coordinates per coordinate: D.
+    """
+    n = stiffness.shape[0]
     m, I0, S1 = 0.0, 0.0, np.zeros(2)
     S2, I1, I2 = np.zeros((2, n)), np.zeros(n), np.zeros((n, n))
     G1, G2 = np.zeros(n), np.zeros((n, n))
-    for x, N, _, dm in points:
+    for x, N, dm in points:
         s0 = np.array([x, 0.0])
         m += dm
         S1 += dm * s0
@@ -201,21 +223,17 @@ def beam_integrals(
         G2 += dm * (N.T @ _ET @ N)
 
     J, Jf, Jff = 0.0, np.zeros(n), np.zeros((n, n))
-    for lump in lumps:
-        slope = np.zeros(n)
-        slope[mesh.slope_column(lump.node)] = 1.0
-        J += lump.inertia
-        Jf += lump.inertia * slope
-        Jff += lump.inertia * np.outer(slope, slope)
-
-    nodal = ShapeIntegrals(
-        m=m, S1=S1, S2=S2, I0=I0, I1=I1, I2=I2, G1=G1, G2=G2, J=J, Jf=Jf, Jff=Jff, K=stiffness, D=np.eye(n)
+    for slope, inertia in turning:
+        J += inertia
+        Jf += inertia * slope
+        Jff += inertia * np.outer(slope, slope)
+    return ShapeIntegrals(
+        m=m, S1=S1, S2=S2, I0=I0, I1=I1, I2=I2, G1=G1, G2=G2, J=J, Jf=Jf, Jff=Jff, K=stiffness, D=basis
     )
-    return nodal.in_basis(reference_basis(mesh, condition, nodal.Mff, stiffness))
 
 
 def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
-    """Mass points (x, N, N2', dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
+    """Mass points (x, N, dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
     z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     points = []
     stiffness = np.zeros((mesh.n_nodal, mesh.n_nodal))
@@ -225,12 +243,11 @@ def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
         x, weight = 0.5 * length * (z + 1.0), 0.5 * length * w
         axial = mesh.scatter(e, axial_shape(x, length))
         transverse = mesh.scatter(e, transverse_shape(x, length))
-        slope = mesh.scatter(e, transverse_shape(x, length, derivative=1))
         strain = mesh.scatter(e, axial_shape(x, length, derivative=1))
         curvature = mesh.scatter(e, transverse_shape(x, length, derivative=2))
         stiffness += span.axial_stiffness * (strain.T * weight) @ strain
         stiffness += span.bending_stiffness * (curvature.T * weight) @ curvature
         for k in range(x.size):
             N = np.vstack([axial[k], transverse[k]])
-            points.append((mesh.nodes[e] + x[k], N, slope[k], weight[k] * span.mass_per_length))
+            points.append((mesh.nodes[e] + x[k], N, weight[k] * span.mass_per_length))
     return points, stiffness

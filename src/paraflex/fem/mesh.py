@@ -43,6 +43,16 @@ class BeamMesh:
         return self.nodes.size - 1
 
     @property
+    def n_spans(self) -> int:
+        """Number of spans between neighbouring named points and the ends."""
+        return int(self.spans[-1]) + 1
+
+    @property
+    def knots(self) -> NDArray[np.float64]:
+        """Ends of the spans (n_spans + 1,) [m]."""
+        return self.nodes[np.searchsorted(self.spans, np.arange(self.n_spans + 1))]
+
+    @property
     def n_nodal(self) -> int:
         """Number of nodal coordinates before any reference condition.
 

@@ -1,4 +1,4 @@
-"""Parameters of a model file and simple expressions of them, such as "l1 - la": arithmetic, no code is run."""
+"""Parameters of a model file and expressions of them, such as "l1 - la" or "a * sin(w * t)": no code is run."""
 
 from __future__ import annotations
 
@@ -8,19 +8,27 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from paraflex.errors import InputError, suggestion
+from paraflex.files.jets import FUNCTIONS, Jet
 
 # Longer ones are no lengths of links; parsing them would only take time.
 _LONGEST = 200
 _CONSTANTS = {"pi": math.pi}
-_BINARY: dict[type, Callable[[float, float], float]] = {
+# The name of time in an expression of it.
+TIME = "t"
+_BINARY: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_UNARY: dict[type, Callable[[float], float]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
+_UNARY: dict[type, Callable[[Any], Any]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
+# What others would look for, and motions must not have.
+_WITH_KINKS = {"abs", "sign", "min", "max", "floor", "ceil", "round", "step", "heaviside", "mod"}
 
 
 class ExpressionError(ValueError):
@@ -32,7 +40,7 @@ class ExpressionError(ValueError):
 
 
 def evaluate(text: str, parameters: Mapping[str, float]) -> float:
-    """Value of an expression of numbers, parameters, pi, + - * / ** and brackets.
+    """Value of an expression of numbers, parameters, pi, + - * / **, brackets and the functions of `jets`.
 
     Raises
     ------
@@ -40,6 +48,43 @@ def evaluate(text: str, parameters: Mapping[str, float]) -> float:
         It does not parse, has anything else in it, names an unknown parameter, or has no finite value.
     """
     return _evaluate(text, lambda name: _look_up(name, parameters))
+
+
+def evaluate_in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Jet:
+    """Value, rate and acceleration at times t of an expression as above in which t is the time [s].
+
+    Raises
+    ------
+    ExpressionError
+        As above; or one of the three is no finite number at some of the times, the first of which it names.
+    """
+    t = np.asarray(t, dtype=float)
+    value = _in_time(text, parameters, t)
+    jet = value if isinstance(value, Jet) else Jet.constant(_finite(value), t)
+    for what, values in (("value", jet.value), ("rate", jet.rate), ("second derivative", jet.acceleration)):
+        bad = ~np.isfinite(values)
+        if np.any(bad):
+            raise ExpressionError(
+                f"its {what} is not a finite number at t = {np.ravel(t)[np.argmax(np.ravel(bad))]:.6g} s",
+                "it must be smooth while the mechanism runs",
+            )
+    return jet
+
+
+def check_in_time(text: str, parameters: Mapping[str, float]) -> None:
+    """Nothing, if a text is an expression of time and parameters; it may be without a value at some times.
+
+    Raises
+    ------
+    ExpressionError
+        See `evaluate`.
+    """
+    _in_time(text, parameters, np.ones(1))
+
+
+def is_constant(text: str) -> bool:
+    """Whether time does not occur in an expression."""
+    return not any(isinstance(node, ast.Name) and node.id == TIME for node in ast.walk(_parse(text)))
 
 
 def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
@@ -64,7 +109,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
         if isinstance(entry, str):
             values[name] = _evaluate(entry, lambda other: value_of(other, (*open_names, name)))
         else:
-            values[name] = float(entry)
+            values[name] = _float(entry)
         return values[name]
 
     for name, entry in table.items():
@@ -82,37 +127,86 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
     return values
 
 
+def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Any:
+    if TIME in parameters:
+        raise ExpressionError(f'"{TIME}" is the time in this expression', f'give the parameter "{TIME}" another name')
+
+    def value_of(name: str) -> Any:
+        return Jet.time(t) if name == TIME else _look_up(name, parameters)
+
+    # What is not finite has no warning but is told with its time.
+    with np.errstate(all="ignore"):
+        return _arithmetic(text, value_of)
+
+
 def _evaluate(text: str, value_of: Callable[[str], float]) -> float:
+    return _finite(_arithmetic(text, value_of))
+
+
+def _finite(value: Any) -> float:
+    if not math.isfinite(value):
+        raise ExpressionError("not a finite number", "check the parameters")
+    return float(value)
+
+
+def _float(number: float) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        raise ExpressionError("too large a number", "check its digits") from None
+
+
+def _parse(text: str) -> ast.AST:
     if len(text) > _LONGEST:
         raise ExpressionError("too long for an expression", f"at most {_LONGEST} letters; name its parts as parameters")
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ExpressionError("neither a number nor an expression", 'write it like "l1 - 0.5 * la"') from None
+
+
+def _arithmetic(text: str, value_of: Callable[[str], Any]) -> Any:
+    tree = _parse(text)
     try:
-        value = _value(tree.body, value_of)
+        return _value(tree, value_of)
     except ZeroDivisionError:
         raise ExpressionError("a division by zero", "check the parameters") from None
     except OverflowError:
         raise ExpressionError("too large a number", "check the parameters") from None
-    if isinstance(value, complex) or not math.isfinite(value):
-        raise ExpressionError("not a finite number", "check the parameters")
-    return value
 
 
-def _value(node: ast.AST, value_of: Callable[[str], float]) -> float:
+def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-            return float(number)
+            return _float(number)
         case ast.Name(id=name):
             return value_of(name)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-            return _BINARY[type(op)](_value(left, value_of), _value(right, value_of))
+            value = _BINARY[type(op)](_value(left, value_of), _value(right, value_of))
+            if isinstance(value, complex):  # a negative number to a broken power
+                raise ExpressionError("not a finite number", "check the parameters")
+            return value
         case ast.UnaryOp(op=op, operand=operand) if type(op) in _UNARY:
             return _UNARY[type(op)](_value(operand, value_of))
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+            return _call(name, [_value(argument, value_of) for argument in arguments])
     raise ExpressionError(
-        "only numbers, parameters, + - * / ** and brackets may stand in an expression", "work out the rest elsewhere"
+        "only numbers, parameters, + - * / ** and brackets may stand in an expression, and functions like sin(...)",
+        "work out the rest elsewhere",
     )
+
+
+def _call(name: str, arguments: list[Any]) -> Any:
+    if name in _WITH_KINKS:
+        raise ExpressionError(f'the function "{name}" has no derivative everywhere', "write a motion in pieces instead")
+    if name not in FUNCTIONS:
+        raise ExpressionError(f'unknown function "{name}"', suggestion(name, FUNCTIONS))
+    if len(arguments) != 1:
+        raise ExpressionError(f"{name} takes one argument, not {len(arguments)}", f"write {name}(...)")
+    if isinstance(arguments[0], Jet):
+        return FUNCTIONS[name](arguments[0])
+    with np.errstate(all="ignore"):
+        return float(FUNCTIONS[name](Jet.constant(arguments[0], np.zeros(1))).value[0])
 
 
 def _look_up(name: str, parameters: Mapping[str, float]) -> float:
@@ -120,4 +214,6 @@ def _look_up(name: str, parameters: Mapping[str, float]) -> float:
         return parameters[name]
     if name in _CONSTANTS:
         return _CONSTANTS[name]
+    if name in FUNCTIONS:
+        raise ExpressionError(f"{name} is a function", f"write {name}(...)")
     raise ExpressionError(f'unknown parameter "{name}"', suggestion(name, parameters))

@@ -3,31 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path as FilePath
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from paraflex.dynamics import Start
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
+from paraflex.files.bodies import assumed_modes_beam, damping, modal_body
+from paraflex.files.expressions import evaluate_parameters
+from paraflex.files.laws import quantities, read_law
 from paraflex.files.library import library_file, library_names
 from paraflex.files.read import read_toml, validate
+from paraflex.files.rows import with_rows
 from paraflex.files.schema import (
+    AssemblyTable,
+    AssumedModesTable,
     BeamTable,
     CircleTable,
     ForceTable,
     GeneralSectionTable,
+    JointTable,
     LinearSpringTable,
     LineTable,
+    ModalTable,
     ModelTable,
     PathFile,
     PointsTable,
     PolygonTable,
+    PrescribedTable,
     RigidTable,
     TorqueTable,
 )
+from paraflex.files.start import read_start
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
     ActuationMode,
@@ -38,6 +46,8 @@ from paraflex.mechanism import (
     EndEffector,
     FlexibleBeam,
     Geometry,
+    Joint,
+    JointFriction,
     LinearSpring,
     Load,
     LumpedMass,
@@ -47,26 +57,17 @@ from paraflex.mechanism import (
     PointForce,
     PointRef,
     PrescribedAngle,
+    PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     Section,
+    SlidingJoint,
+    SlotJoint,
     TorsionalDamper,
     TorsionalSpring,
+    WeldJoint,
     parse_mode,
 )
-
-
-@dataclass(frozen=True)
-class ConstantSpeed:
-    """An angle law: a start angle [rad] and a constant speed [rad/s]."""
-
-    angle: float
-    speed: float
-    knots: tuple[float, ...] = ()
-
-    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Angle, rate and acceleration at times t."""
-        return self.angle + self.speed * t, np.full_like(t, self.speed), np.zeros_like(t)
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,8 @@ class StudyDefaults:
         The first of the mechanism where None.
     torques : mapping of str to float
         Constant motor torques of a run without a path [N m].
+    orientation : float
+        Angle of the end-effector along the path, where it is a task coordinate [rad].
     """
 
     path: str | None = None
@@ -93,6 +96,7 @@ class StudyDefaults:
     samples: int = 701
     assembly: str | None = None
     torques: Mapping[str, float] = field(default_factory=dict)
+    orientation: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,8 @@ class Model:
         The file it came from, or the library name.
     parameters : mapping
         The file's content as read, for provenance.
+    start : Start or None
+        Deflection and velocity at the start of a run without a path; None for a start undeformed and at rest.
     """
 
     mechanism: Mechanism
@@ -115,6 +121,7 @@ class Model:
     study: StudyDefaults
     source: str
     parameters: Mapping[str, Any] = field(repr=False, compare=False)
+    start: Start | None = None
 
     def path(self, name: str | None = None) -> Path:
         """A path by name, or the study's.
@@ -170,9 +177,9 @@ def load(name_or_file: str | FilePath) -> Model:
                 remedy=suggestion(text, library_names()),
             )
     data = read_toml(path, source)
-    table = validate(ModelTable, data, source)
     try:
-        return _model(table, data, source)
+        data = with_rows(data, path.parent)
+        return _model(validate(ModelTable, data, source), data, source)
     except InputError as error:
         raise (error if error.source else error.in_file(source)) from None
 
@@ -212,9 +219,17 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
         samples=table.study.samples,
         assembly=table.study.assembly,
         torques=table.study.torques,
+        orientation=table.study.orientation or 0.0,
     )
     _check_study(mechanism, paths, study)
-    return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data)
+    turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
+    if table.study.orientation is not None and not turns:
+        raise InputError(
+            "the angle is no task coordinate", field="study.orientation", value=table.study.orientation,
+            remedy='name "angle" among the coordinates of [end_effector], or leave it out',
+        )  # fmt: skip
+    start = None if table.start is None else read_start(table.start, mechanism)
+    return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start)
 
 
 def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
@@ -252,28 +267,81 @@ def _mechanism(table: ModelTable) -> Mechanism:
         geometry=Geometry(table.geometry),
         ground={name: (point[0], point[1]) for name, point in table.ground.items()},
         bodies=tuple(_body(name, body, table) for name, body in table.body.items()),
-        joints=tuple(
-            RevoluteJoint(name, *(PointRef.parse(side, f"joint.{name}") for side in sides))
-            for name, sides in table.joint.items()
-        ),
+        joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
         motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
-        prescribed=tuple(
-            PrescribedAngle(name, entry.joint, ConstantSpeed(entry.angle, entry.speed))
-            for name, entry in table.prescribed.items()
-        ),
+        prescribed=_prescribed(table),
         springs=tuple(
             TorsionalSpring(name, entry.joint, entry.stiffness, entry.rest) for name, entry in table.spring.items()
         ),
         dampers=tuple(TorsionalDamper(name, entry.joint, entry.coefficient) for name, entry in table.damper.items()),
+        frictions=tuple(
+            JointFriction(name, entry.joint, entry.limit, entry.speed) for name, entry in table.friction.items()
+        ),
         linear_springs=tuple(_linear_spring(name, entry) for name, entry in table.linear_spring.items()),
         loads=tuple(_load(name, load) for name, load in table.load.items()),
         gravity=(table.gravity[0], table.gravity[1]),
         end_effector=None
         if effector is None
         else EndEffector(PointRef.parse(effector.point, "end_effector.point"), tuple(effector.coordinates)),
-        assemblies=tuple(Assembly(name, angles) for name, angles in table.assembly.items()),
+        assemblies=tuple(_assembly(name, entry) for name, entry in table.assembly.items()),
         modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
     )
+
+
+def _joint(name: str, entry: list[str] | JointTable) -> Joint:
+    points = entry if isinstance(entry, list) else entry.points
+    a, b = (PointRef.parse(point, f"joint.{name}") for point in points)
+    if isinstance(entry, list):
+        return RevoluteJoint(name, a, b)
+    # A field of another kind of joint would be read and not obeyed.
+    kind = _JOINTS[entry.type]
+    given = {key: getattr(entry, key) for key in ("direction", "angle") if key in entry.model_fields_set}
+    for key, value in given.items():
+        if key not in {field.name for field in fields(kind)}:
+            raise InputError(
+                f"a {entry.type} joint has no {key}", field=f"joint.{name}.{key}", value=value, remedy="leave it out"
+            )
+    return kind(name, a, b, **given)
+
+
+_JOINTS = {
+    "revolute": RevoluteJoint,
+    "prismatic": PrismaticJoint,
+    "slot": SlotJoint,
+    "sliding": SlidingJoint,
+    "weld": WeldJoint,
+}
+
+
+def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
+    parameters = evaluate_parameters(table.parameters)
+    made = []
+    for name, entry in table.prescribed.items():
+        _check_quantity(name, entry, table.joint.get(entry.joint))
+        try:
+            law = read_law(entry, parameters, table.study.duration)
+        except InputError as error:
+            raise error.within(f"prescribed.{name}") from None
+        made.append(PrescribedAngle(name, entry.joint, law))
+    return tuple(made)
+
+
+def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointTable | None) -> None:
+    """A joint that turns has an angle, one that slides a displacement."""
+    slides = isinstance(joint, JointTable) and joint.type in ("prismatic", "slot", "sliding")
+    wrong, right = ("angle", "displacement") if slides else ("displacement", "angle")
+    if joint is not None and wrong in quantities(entry):
+        kind = joint.type if isinstance(joint, JointTable) else "revolute"
+        raise InputError(
+            f"a {kind} joint has no {wrong}", field=f"prescribed.{name}.{wrong}", value=entry.joint,
+            remedy=f"give its {right}",
+        )  # fmt: skip
+
+
+def _assembly(name: str, entry: AssemblyTable) -> Assembly:
+    field = f"assembly.{name}.points"
+    points = {PointRef.parse(text, field): (place[0], place[1]) for text, place in entry.points.items()}
+    return Assembly(name, entry.angles, points)
 
 
 def _linear_spring(name: str, entry: LinearSpringTable) -> LinearSpring:
@@ -288,7 +356,7 @@ def _load(name: str, load: ForceTable | TorqueTable) -> Load:
     return PointForce(name, point, (load.force[0], load.force[1]))
 
 
-def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:
+def _body(name: str, body: BeamTable | RigidTable | AssumedModesTable | ModalTable, table: ModelTable) -> Body:
     if isinstance(body, RigidTable):
         return RigidBody(
             name=name,
@@ -297,30 +365,46 @@ def _body(name: str, body: BeamTable | RigidTable, table: ModelTable) -> Body:
             centre_of_mass=(body.centre_of_mass[0], body.centre_of_mass[1]),
             points={key: (point[0], point[1]) for key, point in body.points.items()},
         )
-    section = _named(table.section, body.section, f"body.{name}.section", "section")
-    material = _named(table.material, body.material, f"body.{name}.material", "material")
+    if isinstance(body, ModalTable):
+        return modal_body(name, body)
     lumps = []
     for point, lump_name in body.lumps.items():
         lump = _named(table.lump, lump_name, f"body.{name}.lumps.{point}", "lump")
         lumps.append(LumpedMass(point, lump.mass, lump.inertia))
-    if isinstance(section, GeneralSectionTable):
-        made = Section(section.area, section.second_moment)
-    else:
-        _check_sides(section.width, section.thickness, f"section.{body.section}")
-        made = Section.rectangle(section.width, section.thickness)
+    if isinstance(body, AssumedModesTable):
+        section, material = _section(name, body.section, table), _material(name, body.material, table)
+        return assumed_modes_beam(name, body, section, material, tuple(lumps))
     return FlexibleBeam(
         name=name,
         length=body.length,
-        section=made,
-        material=Material(material.youngs_modulus, material.density),
+        section=_section(name, body.section, table)
+        if isinstance(body.section, str)
+        else tuple(_section(name, each, table) for each in body.section),
+        material=_material(name, body.material, table)
+        if isinstance(body.material, str)
+        else tuple(_material(name, each, table) for each in body.material),
         points=body.points,
         elements=tuple(body.elements) if isinstance(body.elements, list) else body.elements,
         lumps=tuple(lumps),
         reference=ReferenceCondition(body.reference),
         curvature=Curvature(body.curvature),
         modes=body.modes,
+        damping=damping(body.damping, name),
         flexible=body.flexible,
     )
+
+
+def _section(body: str, name: str, table: ModelTable) -> Section:
+    section = _named(table.section, name, f"body.{body}.section", "section")
+    if isinstance(section, GeneralSectionTable):
+        return Section(section.area, section.second_moment)
+    _check_sides(section.width, section.thickness, f"section.{name}")
+    return Section.rectangle(section.width, section.thickness)
+
+
+def _material(body: str, name: str, table: ModelTable) -> Material:
+    material = _named(table.material, name, f"body.{body}.material", "material")
+    return Material(material.youngs_modulus, material.density)
 
 
 def _check_sides(width: float, thickness: float, name: str) -> None:
@@ -343,4 +427,4 @@ def _path(table: PolygonTable | LineTable | CircleTable | PointsTable) -> Path:
     if isinstance(table, CircleTable):
         centre = (table.centre[0], table.centre[1])
         return Circle(centre, table.radius, table.max_acceleration, table.start_angle, table.sweep)
-    return PointPath(tuple((x, y) for x, y in table.points), table.motion_time)
+    return PointPath(tuple(map(tuple, table.points)), table.motion_time)

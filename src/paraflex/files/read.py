@@ -45,6 +45,13 @@ def read_toml(path: Path, source: str) -> dict[str, Any]:
             remedy="mend that line; a name may stand only once",
             source=source,
         ) from error
+    except (ValueError, RecursionError):
+        raise InputError(
+            "not valid TOML: a number of too many digits, or too many brackets in one another",
+            field="file",
+            remedy="name a model file",
+            source=source,
+        ) from None
 
 
 def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
@@ -94,7 +101,8 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
 
 def _fields(problem: Any) -> list:
     """An error's location without the variants of unions in it."""
-    return [part for part in problem["loc"] if not _is_variant(part, problem["loc"])]
+    location = problem["loc"]
+    return [part for position, part in enumerate(location) if not _is_variant(position, location)]
 
 
 def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
@@ -110,13 +118,13 @@ def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
     return 2 if problem["type"] == "missing" and name not in known else 1
 
 
-def _is_variant(part: Any, location: tuple) -> bool:
+def _is_variant(position: int, location: tuple) -> bool:
     """Whether a part of an error's location names a variant of a union and not a field of the file."""
+    part = location[position]
     if not isinstance(part, str):
         return False
-    variants = {"beam", "rigid", "polygon", "line", "circle", "points"}
-    position = location.index(part)
-    if part.endswith("Table") or "[" in part or part in ("int", "constrained-int"):
+    variants = {"beam", "rigid", "assumed-modes", "modal", "polygon", "line", "circle", "points"}
+    if part.endswith("Table") or "[" in part or part in ("int", "constrained-int", "str", "constrained-str"):
         return True
     # A discriminator's value stands right behind the name of the body or path it describes.
     return part in variants and position == 2 and location[0] in ("body", "path")

@@ -6,12 +6,13 @@ checked once, in `mechanism.checks` and by the paths themselves.
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from paraflex.files.expressions import ExpressionError, evaluate
+from paraflex.files.expressions import ExpressionError, check_in_time, evaluate
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -19,20 +20,46 @@ def _number(value: Any, info: ValidationInfo) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        return evaluate(value, (info.context or {}).get("parameters", {}))
+        return evaluate(value, _parameters(info))
     except ExpressionError as error:
-        raise PydanticCustomError(
-            "expression", "{problem}", {"problem": error.problem, "remedy": error.remedy}
-        ) from None
+        raise _refused(error.problem, error.remedy) from None
+
+
+def _function(value: Any, info: ValidationInfo) -> Any:
+    """A finite number as it is, or an expression of the time t found right in form."""
+    example = 'say "0.2 * sin(3 * t)"'
+    if isinstance(value, str):
+        try:
+            check_in_time(value, _parameters(info))
+        except ExpressionError as error:
+            raise _refused(error.problem, error.remedy) from None
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise _refused("neither a number nor an expression", example)
+    if not abs(value) <= sys.float_info.max:
+        raise _refused("not a finite number", example)
+    return float(value)
+
+
+def _parameters(info: ValidationInfo) -> dict[str, float]:
+    return (info.context or {}).get("parameters", {})
+
+
+def _refused(problem: str, remedy: str) -> PydanticCustomError:
+    return PydanticCustomError("expression", "{problem}", {"problem": problem, "remedy": remedy})
 
 
 # A number, or an expression of parameters in quotes.
 Number = Annotated[
     float, Field(strict=True, allow_inf_nan=False), BeforeValidator(_number, json_schema_input_type=float | str)
 ]
+# A number, or an expression of parameters and the time t in quotes.
+FunctionOfTime = Annotated[Any, BeforeValidator(_function, json_schema_input_type=float | str)]
 Count = Annotated[int, Field(strict=True)]
 Text = Annotated[str, Field(strict=True)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+# Rows of two numbers; the name of a file stands for its rows, which `rows.with_rows` has put in its place.
+Rows = Annotated[list[Pair], BeforeValidator(lambda value: value, json_schema_input_type=list[Pair] | str)]
 
 
 class _Table(BaseModel):
@@ -67,13 +94,21 @@ class LumpTable(_Table):
     inertia: Number = Field(default=0.0, description="the moment of inertia in kg m^2")
 
 
+class DampingTable(_Table):
+    """Structural damping of a beam: in proportion to mass and stiffness, or by a ratio for each mode."""
+
+    mass: Number = Field(default=0.0, description="the part in proportion to mass in 1/s")
+    stiffness: Number = Field(default=0.0, description="the part in proportion to stiffness in s")
+    ratios: list[Number] = Field(default=[], description="the damping ratio of each mode; the last serves the rest")
+
+
 class BeamTable(_Table):
     """A flexible beam along its x axis."""
 
-    type: Literal["beam"] = Field(description='"beam" or "rigid"')
+    type: Literal["beam"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     length: Number = Field(description="the length in m")
-    section: Text = Field(description="the name of a [section.NAME] table")
-    material: Text = Field(description="the name of a [material.NAME] table")
+    section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one a span")
+    material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one a span")
     points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
     elements: Count | list[Count] = Field(default=1, description="elements per span, one number or one a span")
     lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
@@ -84,25 +119,114 @@ class BeamTable(_Table):
         default="shared", description='curvature at lumped moments of inertia: "shared" or "separate"'
     )
     modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
+    damping: DampingTable | None = Field(default=None, description="a damping table")
     flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid beam")
 
 
 class RigidTable(_Table):
     """A rigid body."""
 
-    type: Literal["rigid"] = Field(description='"beam" or "rigid"')
+    type: Literal["rigid"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     mass: Number = Field(description="the mass in kg")
     inertia: Number = Field(description="the moment of inertia about the centre of mass in kg m^2")
     centre_of_mass: Pair = Field(default=[0.0, 0.0], description="[x, y] in the body frame in m")
     points: dict[str, Pair] = Field(default={}, description="[x, y] of each named point in the body frame in m")
 
 
+TwoPoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
+
+
+class JointTable(_Table):
+    """A joint of any kind between two points."""
+
+    type: Literal["revolute", "prismatic", "slot", "sliding", "weld"] = Field(
+        description='"revolute", "prismatic", "slot", "sliding" or "weld"'
+    )
+    points: TwoPoints = Field(description='["body.point", "body.point"]')
+    direction: Number = Field(default=0.0, description="the angle of its axis against the first body in rad")
+    angle: Number = Field(default=0.0, description="the angle of the second body against the first in rad")
+
+
+# A revolute joint may be written as its two points alone. Tags are such that errors do not show them.
+JointEntry = Annotated[
+    Annotated[TwoPoints, Tag("list[point]")] | Annotated[JointTable, Tag("JointTable")],
+    Discriminator(lambda value: "JointTable" if isinstance(value, dict) else "list[point]"),
+]
+
+
+class AssumedModesTable(_Table):
+    """A bar along its x axis that deforms in given shape functions of z = x/length."""
+
+    type: Literal["assumed-modes"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
+    length: Number = Field(description="the length in m")
+    section: Text = Field(description="the name of a [section.NAME] table")
+    material: Text = Field(description="the name of a [material.NAME] table")
+    transverse_sines: Count = Field(default=0, description="how many sin(n pi z), from n = 1 on")
+    transverse_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
+    axial_sines: Count = Field(default=0, description="how many sin(n pi z), from n = 1 on")
+    axial_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
+    points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
+    lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
+    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
+    damping: DampingTable | None = Field(default=None, description="a damping table")
+    flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid bar")
+
+
+class ModalPointTable(_Table):
+    """A point of a body of given matrices."""
+
+    position: Pair = Field(description="[x, y] in the body frame in m")
+    shape: list[list[Number]] = Field(description="two rows, displacement along x and y per flexible coordinate")
+    slope: list[Number] = Field(description="the turn per flexible coordinate")
+
+
+class ModalTable(_Table):
+    """A flexible body by its own matrices."""
+
+    type: Literal["modal"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
+    mass: Number = Field(description="the mass in kg")
+    first_moment: Pair = Field(description="[x, y], mass times the centre of mass in kg m")
+    inertia: Number = Field(description="the moment of inertia about the body frame's origin in kg m^2")
+    mass_matrix: list[list[Number]] = Field(description="rows of the mass matrix of the flexible coordinates")
+    stiffness: list[list[Number]] = Field(description="rows of the stiffness matrix")
+    S2: list[list[Number]] = Field(description="two rows, int N dm")
+    I1: list[Number] = Field(description="int s0^T N dm")
+    G1: list[Number] = Field(description="int (x N_y - y N_x) dm")
+    G2: list[list[Number]] = Field(description="rows of the skew int (N_x^T N_y - N_y^T N_x) dm")
+    I2: list[list[Number]] | None = Field(default=None, description="rows of int N^T N dm")
+    points: dict[str, ModalPointTable] = Field(default={}, description="position, shape and slope of each named point")
+    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
+    damping: DampingTable | None = Field(default=None, description="a damping table")
+    flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid body")
+
+
+class PieceTable(_Table):
+    """One of the pieces of a law."""
+
+    until: Number | None = Field(default=None, description="the time in s at which the next piece takes over")
+    angle: FunctionOfTime | None = Field(default=None, description="the angle in rad, an expression of the time t")
+    displacement: FunctionOfTime | None = Field(
+        default=None, description="the displacement in m, an expression of the time t"
+    )
+
+
 class PrescribedTable(_Table):
-    """A joint angle given in time: a constant speed from a start angle."""
+    """A joint's angle, or where it slides its displacement, given in time."""
 
     joint: Text = Field(description="the name of a joint")
-    angle: Number = Field(default=0.0, description="the angle at t = 0 in rad")
-    speed: Number = Field(default=0.0, description="the speed in rad/s")
+    angle: FunctionOfTime | None = Field(
+        default=None, description="the angle at t = 0 in rad, or an expression of the time t"
+    )
+    displacement: FunctionOfTime | None = Field(
+        default=None, description="the displacement at t = 0 in m, or an expression of the time t"
+    )
+    speed: Number | None = Field(default=None, description="the speed in rad/s or m/s, from a constant start")
+    pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = Field(
+        default=None, description='a list of { until = s, angle = "..." }, the last without until'
+    )
+    table: Rows | None = Field(
+        default=None, description="a list of [t, value] in s and rad or m, or the name of a file with two such columns"
+    )
 
 
 class SpringTable(_Table):
@@ -111,6 +235,14 @@ class SpringTable(_Table):
     joint: Text = Field(description="the name of a joint")
     stiffness: Number = Field(description="the stiffness in N m/rad")
     rest: Number = Field(default=0.0, description="the joint's angle at which the spring is free in rad")
+
+
+class FrictionTable(_Table):
+    """Dry friction at a joint, regularised: -limit tanh(rate / speed)."""
+
+    joint: Text = Field(description="the name of a joint")
+    limit: Number = Field(description="the friction torque in N m, or force in N")
+    speed: Number = Field(description="the speed below which it acts as a damper in rad/s or m/s")
 
 
 class DamperTable(_Table):
@@ -143,6 +275,57 @@ class TorqueTable(_Table):
     type: Literal["torque"] = Field(description='"force" or "torque"')
     point: Text = Field(description='"body.point"')
     torque: Number = Field(description="the torque in N m")
+
+
+class AssemblyTable(BaseModel):
+    """Approximate angles of bodies by name, and places of points from which the other angles follow."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    __pydantic_extra__: dict[str, Number] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    points: dict[str, Pair] = Field(default={}, description='[x, y] in m for each "body.point"')
+
+    @property
+    def angles(self) -> dict[str, float]:
+        """Of the bodies that have one [rad]."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class DeflectionTable(_Table):
+    """How far a point of a beam is off its place in the body frame."""
+
+    axial: Number | None = Field(default=None, description="the stretch along the beam in m")
+    transverse: Number | None = Field(default=None, description="the displacement across the beam in m")
+    slope: Number | None = Field(default=None, description="the slope in rad")
+
+
+class CoordinatesTable(_Table):
+    """All coordinates of a body, or their rates."""
+
+    x: Number = Field(description="x of the body frame's origin in m, or its rate in m/s")
+    y: Number = Field(description="y of the body frame's origin in m, or its rate in m/s")
+    phi: Number = Field(description="the angle of the body frame in rad, or its rate in rad/s")
+    flexible: list[Number] | None = Field(
+        default=None, description="the body's own flexible coordinates, or their rates; zeros by default"
+    )
+
+
+class VelocityTable(_Table):
+    """Velocities at the start; the rest follows."""
+
+    angular: dict[str, Number] = Field(default={}, description="the rate of each body's angle in rad/s")
+    point: dict[str, Pair] = Field(default={}, description='[x, y] in m/s for each "body.point"')
+
+
+class StartTable(_Table):
+    """How a model without a path starts."""
+
+    deflection: dict[str, dict[str, Pair | DeflectionTable]] = Field(
+        default={}, description="[axial, transverse] in m, or a table of axial, transverse, slope, for points of beams"
+    )
+    velocity: VelocityTable = VelocityTable()
+    coordinates: dict[str, CoordinatesTable] = Field(default={}, description="x, y, phi and flexible of bodies")
+    rates: dict[str, CoordinatesTable] = Field(default={}, description="rates of x, y, phi and flexible of bodies")
 
 
 class EndEffectorTable(_Table):
@@ -185,7 +368,9 @@ class PointsTable(_Table):
     """A smooth motion through points."""
 
     type: Literal["points"]
-    points: list[Pair] = Field(description="a list of [x, y] in m")
+    points: list[Annotated[list[Number], Field(min_length=2, max_length=3)]] = Field(
+        description="a list of [x, y] in m, or of [x, y, angle] in m and rad"
+    )
     motion_time: Number = Field(description="the time from the first point to the last in s")
 
 
@@ -201,6 +386,9 @@ class StudyTable(_Table):
     samples: Count = Field(default=701, description="the number of samples kept")
     assembly: Text | None = Field(default=None, description="the name of an [assembly.NAME] table")
     torques: dict[str, Number] = Field(default={}, description="constant torques of motors in N m, without a path")
+    orientation: Number | None = Field(
+        default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
+    )
 
 
 class ModelTable(_Table):
@@ -216,25 +404,27 @@ class ModelTable(_Table):
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}
     ground: dict[str, Pair] = Field(default={}, description="[x, y] of each ground point in m")
-    body: dict[str, Annotated[BeamTable | RigidTable, Field(discriminator="type")]] = Field(
-        description="at least one [body.NAME] table"
+    body: dict[str, Annotated[BeamTable | RigidTable | AssumedModesTable | ModalTable, Field(discriminator="type")]] = (
+        Field(description="at least one [body.NAME] table")
     )
-    joint: dict[str, Annotated[list[Text], Field(min_length=2, max_length=2)]] = Field(
-        default={}, description='["body.point", "body.point"] for each joint'
+    joint: dict[str, JointEntry] = Field(
+        default={}, description='["body.point", "body.point"] for each revolute joint, a table for others'
     )
     motor: dict[str, Text] = Field(default={}, description="the joint of each motor")
     prescribed: dict[str, PrescribedTable] = {}
     spring: dict[str, SpringTable] = {}
     damper: dict[str, DamperTable] = {}
+    friction: dict[str, FrictionTable] = {}
     linear_spring: dict[str, LinearSpringTable] = {}
     load: dict[str, Annotated[ForceTable | TorqueTable, Field(discriminator="type")]] = {}
     gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
     end_effector: EndEffectorTable | None = None
-    assembly: dict[str, dict[str, Number]] = Field(
-        default={}, description="approximate angles of all bodies in rad for each assembly"
+    assembly: dict[str, AssemblyTable] = Field(
+        default={}, description="approximate angles of all bodies in rad for each assembly, or places of points in m"
     )
     mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
     path: dict[str, PathTable] = {}
+    start: StartTable | None = None
     study: StudyTable = StudyTable()
 
 

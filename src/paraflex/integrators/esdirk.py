@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import InputError, IntegrationError, Moment
+from paraflex.integrators.stretches import hidden_from, jump_times
 from paraflex.integrators.tableaux import TR_BDF2
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
@@ -19,6 +20,7 @@ from paraflex.kernel.packed import Signals, Workspace
 from paraflex.kernel.run_state import (
     BALANCE,
     DPHI_MAX,
+    ENERGY_0,
     ERROR_TEST,
     FACTORS,
     FINISHED,
@@ -33,6 +35,7 @@ from paraflex.kernel.run_state import (
     STEP,
     STEPS,
     TIME,
+    WEIGHT_0,
     Controls,
     March,
     Samples,
@@ -245,6 +248,7 @@ class Run:
     tableau: Tableau
     controls: Controls
     stops: NDArray[np.float64]
+    jumps: NDArray[np.float64]
     state: March
     workspace: Workspace
     slow: Workspace
@@ -257,8 +261,21 @@ class Run:
 
     def march(self, attempts: int) -> int:
         """So many attempted steps; a code of `kernel.run_state`."""
-        arguments = (self.system.packed, self.signals, self.tableau, self.controls, self.stops, attempts)
-        return march(*arguments, self.state, self.workspace, self.slow, self.samples)
+        ahead = self.jumps[self.jumps > self.state.clock[TIME]]
+        signals, stops = self.signals, self.stops
+        if ahead.size:
+            signals, stops = hidden_from(signals, ahead[0]), stops[stops <= ahead[0]]
+        arguments = (self.system.packed, signals, self.tableau, self.controls, stops, attempts)
+        code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
+        return self._resume() if code == FINISHED and ahead.size else code
+
+    def _resume(self) -> int:
+        """A first stage with what is given after a jump; energies go on counting from the run's start."""
+        kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
+        arguments = (self.system.packed, self.signals, self.tableau, self.controls)
+        code = start(*arguments, self.state, self.workspace, _samples(np.zeros(0), self.system))
+        self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
+        return code
 
 
 def prepare(
@@ -289,12 +306,14 @@ def prepare(
         max_step=options.max_step,
         dependent_rows=int(factor_system(system.packed, 0.0, initial.q, workspace)),
     )
+    inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
     return Run(
         system=system,
         signals=signals,
         tableau=options.tableau,
         controls=controls,
-        stops=np.unique(np.append(inner[(inner > initial.time) & (inner < times[-1])], times[-1])),
+        stops=np.append(inner, times[-1]),
+        jumps=jump_times(signals, len(system.mechanism.motors), inner),
         state=state,
         workspace=workspace,
         slow=system.workspace(),

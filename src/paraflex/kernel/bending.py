@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from paraflex.kernel.compiling import kernel, routine
-from paraflex.kernel.packed import ANGLE, NX, NY, OMEGA2, SLOPE
+from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, NX, NY, OMEGA2, SLOPE
 
 # Rows of Workspace.points: slopes at the Gauss points, their two derivatives, and the axial force carried there.
 W0, W1, W2, AXIAL = range(4)
@@ -36,7 +36,7 @@ def bent_equations(p, i, q, v, a, f, points):
             s2 += slope * a[e + l]
         points[W0, j], points[W1, j], points[W2, j], points[AXIAL, j] = s0, s1, s2, 0.0
     for l in range(n):
-        f[e + l] = p.modal[OMEGA2, body.flex + l] * q[e + l]
+        f[e + l] = p.modal[OMEGA2, body.flex + l] * q[e + l] + p.modal[DAMPING, body.flex + l] * v[e + l]
     fx, fy, torque = 0.0, 0.0, 0.0
     for k in range(body.mass, body.mass_end):
         point = p.masses[k]
@@ -211,7 +211,10 @@ def note_axial_forces(p, i, q, v, a, lam, ws):
         bending = p.markers[port.marker].bending
         if port.kind == ANGLE or bending < 0:
             continue
-        force = port.sign * (c * lam[port.row] + s * lam[port.row + 1])
+        if port.kind == AXIS:
+            force = port.sign * lam[port.row] * (c * ws.axes[port.axis, 0] + s * ws.axes[port.axis, 1])
+        else:
+            force = port.sign * (c * lam[port.row] + s * lam[port.row + 1])
         for j in range(n * n):
             ws.geometric[at + j] -= force * p.bending[bending + j]
 
@@ -241,7 +244,7 @@ def subtract_geometric(p, i, geometric, scale, u, x):
 
 @routine
 def factor_bent(p, i, b, q, ws, dense):
-    """Mass matrix of body i and Cholesky factor of M + b (K + K_g); without K_g where that is not positive definite.
+    """Mass matrix of body i and Cholesky factor of M + g D + b (K + K_g), g^2 = b; without K_g if that is not definite.
 
     Diagonals of the factor hold reciprocals. Returns whether the body is of second-order geometry; `dense` is
     ws.dense, None where no body is.
@@ -252,13 +255,14 @@ def factor_bent(p, i, b, q, ws, dense):
     if body.slopes == 0:
         return False
     n, width, at = body.nf, 3 + body.nf, body.dense
+    g = sqrt(b)
     bent_mass(p, i, q, ws)
     for attempt in range(2):
         for j in range(width * width):
             ws.dense[at + j] = ws.mass[at + j]
         for l in range(n):
             r = at + (3 + l) * width + 3
-            ws.dense[r + l] += b * p.modal[OMEGA2, body.flex + l]
+            ws.dense[r + l] += b * p.modal[OMEGA2, body.flex + l] + g * p.modal[DAMPING, body.flex + l]
             if attempt == 0:
                 for d in range(l + 1):
                     ws.dense[r + d] += b * ws.geometric[body.square + l * n + d]

@@ -1,6 +1,7 @@
 """Terms of one body: M q'' + h + K u, kinetic and strain energy (formulation of Eqs. 13-36 in closed form).
 
-Flexible coordinates are mass-normalised modes, so M_ff = 1 and K = diag(omega^2).
+Flexible coordinates are mass-normalised modes, so M_ff = 1, K = diag(omega^2) and damping is
+diagonal.
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ from math import cos, sin
 from paraflex.kernel.bending import bent_energy, bent_equations, bent_shortening
 from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.joints import apply_lines, apply_loads
-from paraflex.kernel.packed import GJ, I1, OMEGA2, S2X, S2Y
+from paraflex.kernel.packed import DAMPING, GJ, I1, OMEGA2, S2X, S2Y
 
 
 @inlined
 def body_equations(p, i, q, v, a, f):
-    """M q'' + h + K u of body i, less its weight, into f; the translational part in the ground frame."""
+    """M q'' + h + D u' + K u of body i, less its weight, into f; the translational part in the ground frame."""
     body = p.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
@@ -58,6 +59,7 @@ def body_equations(p, i, q, v, a, f):
             - w * w * (p.modal[I1, k + j] + i_u)
             - 2.0 * w * g_v
             + p.modal[OMEGA2, k + j] * q[e + j]
+            + p.modal[DAMPING, k + j] * v[e + j]
         )
     bx = body.m * ax - sy * dw + fx - w * w * sx - 2.0 * w * vy
     by = body.m * ay + sx * dw + fy - w * w * sy + 2.0 * w * vx
@@ -68,7 +70,7 @@ def body_equations(p, i, q, v, a, f):
 
 @inlined
 def body_terms(p, i, q, v, a, f, points):
-    """M q'' + h + K u of body i, less its weight, into f.
+    """M q'' + h + D u' + K u of body i, less its weight, into f.
 
     `points` is scratch of second-order geometry (Workspace.points), or None.
     """

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from paraflex.kernel.arrays import copy, fill, largest
+from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.compiling import kernel, routine
+from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.dense import solve_dense
 from paraflex.kernel.joints import (
     apply_force,
     apply_torque,
     body_joints,
-    constraint_values,
-    fill_jacobian,
     marker_angle,
     marker_motion,
     start_rows,
@@ -107,7 +107,8 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
     jacobian = np.zeros((n, n))
     single, zero, guess = np.zeros((n, 1)), np.zeros(n), np.zeros(n)
     phi, dphi, lam = np.zeros(m), np.zeros(m), np.zeros(m)
-    unused = np.zeros(n)
+    # Motors do not matter here, but those along an axis read their force.
+    unused, idle = np.zeros(n), np.zeros(signals.start.size)
     right = np.zeros((n, 1 + tasks))
     before, change = np.zeros((n, n)), np.zeros((n, n))
     for k in range(times.size):
@@ -163,6 +164,7 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
         start_rows(p, signals, t, 0.0, 0.0, phi)
         for i in range(p.bodies.size):
             body_joints(p, i, q[k], v[k], zero, lam, 0.0, 0.0, unused, phi)
+        apply_axes(p, q[k], v[k], zero, lam, 0.0, 0.0, idle, unused, phi)
         here = task_values(p, marker, coordinates, q[k], v[k], zero)
         for r in range(m):
             single[r, 0] = -phi[r]

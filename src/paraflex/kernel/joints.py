@@ -8,11 +8,10 @@ lose f/2, f'/2 and f''/2 along x.
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import cos, sin, sqrt, tanh
 
-from paraflex.kernel.arrays import fill
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.packed import ANGLE, CONSTRAINT, DAMPER, NX, NY, SLOPE, SPRING
+from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, DAMPING, FRICTION, NX, NY, SLOPE, SPRING
 from paraflex.kernel.signals import evaluate_signal
 
 
@@ -149,10 +148,24 @@ def start_rows(p, signals, t, weight_v, weight_q, rows):
 
 @routine
 def start_compliant_rows(p, lam, rows):
-    """Rows of springs and dampers before any body: less the rest angle, less compliance times the torque."""
+    """Rows of springs, dampers and friction before any body: less the rest value, less compliance times the force."""
     for r in range(p.rows.size):
-        if p.rows[r].kind != CONSTRAINT:
+        if p.rows[r].kind == FRICTION:
+            rows[r] = 0.0
+        elif p.rows[r].kind != CONSTRAINT:
             rows[r] = p.rows[r].ground - p.rows[r].compliance * lam[r]
+
+
+@routine
+def finish_friction(p, lam, compliance, rows):
+    """Turn what rows of friction hold, the rate of their joint, into their residual.
+
+    compliance (limit tanh(rate / speed) - lambda) has the slope 1 against the rate where `compliance` was noted.
+    """
+    for r in range(p.rows.size):
+        row = p.rows[r]
+        if row.kind == FRICTION:
+            rows[r] = compliance[r] * (row.limit * tanh(rows[r] / (row.compliance * row.limit)) - lam[r])
 
 
 @routine
@@ -166,12 +179,14 @@ def spring_energy(p, lam):
 
 
 @routine
-def damper_power(p, lam):
-    """What the dampers take, by their torques."""
+def modal_damping_power(p, v):
+    """What the damping of the flexible coordinates takes."""
     power = 0.0
-    for r in range(p.rows.size):
-        if p.rows[r].kind == DAMPER:
-            power += p.rows[r].compliance * lam[r] * lam[r]
+    for i in range(p.bodies.size):
+        body = p.bodies[i]
+        for j in range(body.nf):
+            rate = v[body.offset + 3 + j]
+            power += p.modal[DAMPING, body.flex + j] * rate * rate
     return power
 
 
@@ -258,7 +273,7 @@ def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
         if port.kind == ANGLE:
             if p.rows[r].kind == SPRING:
                 rows[r] += sign * marker_angle(p, marker, q)
-            elif p.rows[r].kind == DAMPER:
+            elif p.rows[r].kind == DAMPER or p.rows[r].kind == FRICTION:
                 rows[r] += sign * marker_angle(p, marker, v)
             else:
                 rows[r] += sign * (
@@ -267,7 +282,7 @@ def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
                     + weight_q * marker_angle(p, marker, q)
                 )
             apply_torque(p, marker, sign * lam[r], f)
-        else:
+        elif port.kind != AXIS:
             px, py, vx, vy, ax, ay, rx, ry = marker_motion(p, marker, q, v, a)
             rows[r] += sign * (ax + weight_v * vx + weight_q * px)
             rows[r + 1] += sign * (ay + weight_v * vy + weight_q * py)
@@ -281,49 +296,3 @@ def body_efforts(p, i, torques, f):
     for k in range(body.effort, body.effort_end):
         effort = p.efforts[k]
         apply_torque(p, p.markers[effort.marker], -effort.sign * torques[effort.signal], f)
-
-
-@kernel
-def constraint_values(p, signals, t, q, v, phi, dphi):
-    """Phi and Phi' at (t, q, v), into phi and dphi; zero for springs and dampers."""
-    for r in range(p.rows.size):
-        row = p.rows[r]
-        phi[r], dphi[r] = row.ground if row.kind == CONSTRAINT else 0.0, 0.0
-        if row.signal >= 0:
-            value, rate, _ = evaluate_signal(signals, row.signal, t)
-            phi[r] -= value
-            dphi[r] -= rate
-    for k in range(p.ports.size):
-        port = p.ports[k]
-        marker = p.markers[port.marker]
-        r, sign = port.row, port.sign
-        if p.rows[r].kind != CONSTRAINT:
-            continue
-        if port.kind == ANGLE:
-            phi[r] += sign * marker_angle(p, marker, q)
-            dphi[r] += sign * marker_angle(p, marker, v)
-        else:
-            # The acceleration slot is not used here: v stands in for an array of the right length.
-            px, py, vx, vy, _, _, _, _ = marker_motion(p, marker, q, v, v)
-            phi[r] += sign * px
-            phi[r + 1] += sign * py
-            dphi[r] += sign * vx
-            dphi[r + 1] += sign * vy
-
-
-@kernel
-def fill_jacobian(p, q, jacobian):
-    """Phi_q into a dense (rows, n) array, zero for springs and dampers; not for the time loop."""
-    for r in range(p.rows.size):
-        fill(jacobian[r], 0.0)
-    for k in range(p.ports.size):
-        port = p.ports[k]
-        marker = p.markers[port.marker]
-        if p.rows[port.row].kind != CONSTRAINT:
-            continue
-        if port.kind == ANGLE:
-            apply_torque(p, marker, port.sign, jacobian[port.row])
-        else:
-            _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
-            apply_force(p, marker, q, port.sign, 0.0, rx, ry, jacobian[port.row])
-            apply_force(p, marker, q, 0.0, port.sign, rx, ry, jacobian[port.row + 1])

@@ -13,12 +13,15 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from paraflex.kernel.arrays import fill
+from paraflex.kernel.axes import add_track, turn_axes
 from paraflex.kernel.bending import bent_mass_square, bent_mass_times, factor_bent, solve_bent
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import marker_shape, marker_shortening, shorten
 from paraflex.kernel.packed import (
     ANGLE,
+    AXIS,
     CONSTRAINT,
+    DAMPING,
     DINV,
     GJ,
     I1,
@@ -44,11 +47,12 @@ SMALLEST_B = 1e-18
 
 @inlined
 def factor_body(p, i, b, q, ws):
-    """Factor M + b K of body i at q: the arrow with its 3 x 3 rigid block."""
+    """Factor M + g D + b K of body i at q, g^2 = b: the arrow with its 3 x 3 rigid block."""
     body = p.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
     fr = ws.frame[i]
+    g = sqrt(b)
     sx, sy, inertia = body.S1x, body.S1y, body.I0
     a00, a10, a11, a20, a21, a22 = body.m, 0.0, body.m, 0.0, 0.0, 0.0
     for j in range(n):
@@ -63,7 +67,7 @@ def factor_body(p, i, b, q, ws):
         sy += S2y * u
         inertia += (2.0 * p.modal[I1, k + j] + i_u) * u
         mpf = p.modal[GJ, k + j] - g_u
-        d = 1.0 / (1.0 + b * p.modal[OMEGA2, k + j])
+        d = 1.0 / (1.0 + g * p.modal[DAMPING, k + j] + b * p.modal[OMEGA2, k + j])
         ws.flex[MPF, k + j] = mpf
         ws.flex[DINV, k + j] = d
         ws.flex[YX, k + j] = S2x * d
@@ -124,7 +128,7 @@ def solve_body(p, i, ws, dense, y, x, at):
 
 @inlined
 def body_jacobian(p, i, q, ws):
-    """Jacobian rows of body i's ports in its own frame, [1, E s, N] or [0, 1, N2'], and J M^-1 J^T of them."""
+    """The parts of body i's constraint rows in its own frame, [1, E s, N] and [0, 1, N2'], and J M^-1 J^T of them."""
     body = p.bodies[i]
     n, width = body.nf, 3 + body.nf
     for k in range(body.port, body.port_end):
@@ -145,9 +149,19 @@ def body_jacobian(p, i, q, ws):
                 ws.jac[x + 3 + j] = p.shape[NX, h + j]
                 ws.jac[y + 3 + j] = p.shape[NY, h + j]
             shorten(p, p.bending, marker, q, -1.0, ws.jac, x + 3)
+            if port.parts > 2:
+                z = y + width
+                ws.jac[z], ws.jac[z + 1], ws.jac[z + 2] = 0.0, 0.0, 1.0
+                for j in range(n):
+                    ws.jac[z + 3 + j] = p.shape[SLOPE, h + j]
+            if port.parts > 3:
+                z = y + 2 * width
+                for j in range(width):
+                    ws.jac[z + j] = 0.0
+                add_track(p, port.axis, ws.axes[port.axis, 3], 1.0, ws.jac, z + 3)
     # The rows of a body lie one after the other, from its first port's on.
     first = p.ports[body.port].jac if body.port < body.port_end else 0
-    for r in range(body.rows):
+    for r in range(body.parts):
         at = first + r * width
         solve_body(p, i, ws, ws.dense, ws.jac, ws.inv, at)
         for s in range(r + 1):
@@ -155,8 +169,45 @@ def body_jacobian(p, i, q, ws):
             dot = 0.0
             for j in range(width):
                 dot += ws.inv[at + j] * ws.jac[other + j]
-            ws.blocks[body.block + r * body.rows + s] = dot
-            ws.blocks[body.block + s * body.rows + r] = dot
+            ws.blocks[body.block + r * body.parts + s] = dot
+            ws.blocks[body.block + s * body.parts + r] = dot
+
+
+@inlined
+def share(ws, port, r, part, c, s):
+    """What one part of a port, in the body frame, gives to its constraint row r; c and s turn that frame."""
+    if port.kind == ANGLE:
+        return port.sign
+    if port.kind == POINT:
+        if r == part:
+            return port.sign * c
+        return port.sign * s if r == 1 else -port.sign * s
+    ex, ey = ws.axes[port.axis, 0], ws.axes[port.axis, 1]
+    if part == 0:
+        return port.sign * (c * ex + s * ey)
+    if part == 1:
+        return port.sign * (c * ey - s * ex)
+    return ws.axes[port.axis, 2] if part == 2 else -1.0
+
+
+@inlined
+def add_entry(p, ws, row, column, value):
+    """Add to an entry of the Schur complement, by its lower half."""
+    high, low = max(row, column), min(row, column)
+    ws.schur[p.rows[high].start + low - p.rows[high].first] += value
+
+
+@routine
+def add_axis_pair(p, ws, body, port, other, same, c, s):
+    """Add the entries between two ports of a body of which at least one is an axis."""
+    for r in range(port.rows):
+        for q in range(r + 1 if same else other.rows):
+            value = 0.0
+            for x in range(port.parts):
+                for y in range(other.parts):
+                    at = body.block + (port.local + x) * body.parts + other.local + y
+                    value += share(ws, port, r, x, c, s) * ws.blocks[at] * share(ws, other, q, y, c, s)
+            add_entry(p, ws, port.row + r, other.row + q, value)
 
 
 @inlined
@@ -168,16 +219,19 @@ def add_schur(p, i, ws):
         port = p.ports[k]
         for l in range(body.port, k + 1):
             other = p.ports[l]
+            if port.kind == AXIS or other.kind == AXIS:
+                add_axis_pair(p, ws, body, port, other, l == k, c, s)
+                continue
             sign = port.sign * other.sign
-            at = body.block + port.local * body.rows + other.local
+            at = body.block + port.local * body.parts + other.local
             # A 2 x 2 block, of which an angle's row or column is missing.
             b00, b01, b10, b11 = ws.blocks[at], 0.0, 0.0, 0.0
             if other.kind == POINT:
                 b01 = ws.blocks[at + 1]
             if port.kind == POINT:
-                b10 = ws.blocks[at + body.rows]
+                b10 = ws.blocks[at + body.parts]
                 if other.kind == POINT:
-                    b11 = ws.blocks[at + body.rows + 1]
+                    b11 = ws.blocks[at + body.parts + 1]
                 b00, b10 = c * b00 - s * b10, s * b00 + c * b10
                 b01, b11 = c * b01 - s * b11, s * b01 + c * b11
             if other.kind == POINT:
@@ -186,8 +240,7 @@ def add_schur(p, i, ws):
             for r in range(port.rows):
                 for q in range(other.rows if l < k else r + 1):
                     value = (b00 if q == 0 else b01) if r == 0 else (b10 if q == 0 else b11)
-                    high, low = max(port.row + r, other.row + q), min(port.row + r, other.row + q)
-                    ws.schur[p.rows[high].start + low - p.rows[high].first] += sign * value
+                    add_entry(p, ws, port.row + r, other.row + q, sign * value)
 
 
 @routine
@@ -239,6 +292,7 @@ def solve_schur(p, ws, x):
 def factor_bodies(p, b, q, ws):
     """Factor every body's M + b K at its deformation in q, in its own frame."""
     ws.step[0] = max(b, SMALLEST_B)
+    turn_axes(p, q, ws.axes)
     for i in range(p.bodies.size):
         if not factor_bent(p, i, b, q, ws, ws.dense):
             factor_body(p, i, b, q, ws)
@@ -247,7 +301,7 @@ def factor_bodies(p, b, q, ws):
 
 @inlined
 def row_scale(p, r, ws, scale):
-    """What makes the iteration matrix symmetric: scale for a constraint, 1/b for a spring and 1/g for a damper."""
+    """What makes the iteration matrix symmetric: scale for a constraint, 1/b for a spring, else 1/g."""
     kind = p.rows[r].kind
     if kind == SPRING:
         return 1.0 / ws.step[0]
@@ -258,13 +312,14 @@ def row_scale(p, r, ws, scale):
 def orient(p, q, ws):
     """Turn the factored bodies to their angles in q and factor the Schur complement; number of dependent rows."""
     fill(ws.schur, 0.0)
+    turn_axes(p, q, ws.axes)
     for i in range(p.bodies.size):
         phi = q[p.bodies[i].offset + 2]
         ws.frame[i, 0], ws.frame[i, 1] = cos(phi), sin(phi)
         add_schur(p, i, ws)
     for r in range(p.rows.size):
         if p.rows[r].kind != CONSTRAINT:
-            ws.schur[p.rows[r].start + r - p.rows[r].first] += p.rows[r].compliance * row_scale(p, r, ws, 1.0)
+            ws.schur[p.rows[r].start + r - p.rows[r].first] += ws.compliance[r] * row_scale(p, r, ws, 1.0)
     return factor_schur(p, ws)
 
 
@@ -300,12 +355,21 @@ def jacobian_times(p, i, ws, x, scale, spring_scale, damper_scale, rows):
     for k in range(body.port, body.port_end):
         port = p.ports[k]
         kind = p.rows[port.row].kind
-        factor = port.sign * (scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else damper_scale))
+        kind_scale = scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else damper_scale)
+        factor = port.sign * kind_scale
         d0, d1 = 0.0, 0.0
         for j in range(width):
             d0 += ws.jac[port.jac + j] * x[o + j]
         if port.kind == ANGLE:
             rows[port.row] += factor * d0
+            continue
+        if port.kind == AXIS:
+            rows[port.row] += kind_scale * share(ws, port, 0, 0, c, s) * d0
+            for part in range(1, port.parts):
+                d1 = 0.0
+                for j in range(width):
+                    d1 += ws.jac[port.jac + part * width + j] * x[o + j]
+                rows[port.row] += kind_scale * share(ws, port, 0, part, c, s) * d1
             continue
         for j in range(width):
             d1 += ws.jac[port.jac + width + j] * x[o + j]
@@ -325,6 +389,12 @@ def subtract_reactions(p, i, ws, mu, x):
             torque = port.sign * mu[port.row]
             for j in range(width):
                 x[o + j] -= torque * ws.inv[port.jac + j]
+            continue
+        if port.kind == AXIS:
+            for part in range(port.parts):
+                force = mu[port.row] * share(ws, port, 0, part, c, s)
+                for j in range(width):
+                    x[o + j] -= force * ws.inv[port.jac + part * width + j]
             continue
         fx, fy = port.sign * mu[port.row], port.sign * mu[port.row + 1]
         bx, by = c * fx + s * fy, c * fy - s * fx

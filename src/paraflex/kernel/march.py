@@ -5,7 +5,8 @@ from __future__ import annotations
 from paraflex.kernel.arrays import copy
 from paraflex.kernel.bodies import system_energy, weight_work
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import constraint_values, line_energy, spring_energy
+from paraflex.kernel.constraints import constraint_values, note_friction
+from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import factor_system, right_hand_side, solve_system
 from paraflex.kernel.run_state import (
     AGE,
@@ -85,6 +86,7 @@ def write_samples(p, tableau, t, h, m, ws, out):
 def first_stage(p, signals, t, controls, m, ws):
     """Accelerations and multipliers at (t, q, v), solved exactly, as the first stage; number of dependent rows."""
     a, lam = m.stage_a[1, 0], m.stage_lam[0]
+    note_friction(p, m.q, m.v, ws.mu, ws.compliance)
     dependent = factor_system(p, 0.0, m.q, ws)
     m.clock[FACTOR_G] = -1.0
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
@@ -109,7 +111,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     m.stage_t[1, 0] = t
     copy(m.q, m.stage_q[0])
     copy(m.v, m.stage_v[0])
-    m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques)
+    m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques, ws)
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
     strain += spring_energy(p, lam) + line_energy(p, m.q, m.v)[0]
     m.clock[ENERGY_0] = kinetic + strain

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Rows of PackedSystem.modal.
-S2X, S2Y, I1, GJ, OMEGA2 = range(5)
+S2X, S2Y, I1, GJ, OMEGA2, DAMPING = range(6)
 # Rows of PackedSystem.shape.
 NX, NY, SLOPE = range(3)
-# Kinds of port.
-POINT, ANGLE = range(2)
-# Kinds of row: Phi = 0, or a multiplier that is the torque of a spring or of a damper.
-CONSTRAINT, SPRING, DAMPER = range(3)
+# Kinds of port: both coordinates of a point, an angle, one end of an axis.
+POINT, ANGLE, AXIS = range(3)
+# Kinds of row: Phi = 0, or a multiplier that is the torque or force of a spring, of a damper or of dry friction.
+CONSTRAINT, SPRING, DAMPER, FRICTION = range(4)
 # Rows of Workspace.flex: M_phif, 1/(1 + b omega^2), and B D^-1 of the three rigid rows.
 MPF, DINV, YX, YY, YP = range(5)
 
@@ -33,8 +33,8 @@ BODY = np.dtype(
         ("port_end", np.int64),
         ("effort", np.int64),  # its efforts: effort .. effort_end
         ("effort_end", np.int64),
-        ("block", np.int64),  # first entry of its rows x rows block J M^-1 J^T in Workspace.blocks
-        ("rows", np.int64),  # constraint rows that touch it
+        ("block", np.int64),  # first entry of its parts x parts block J M^-1 J^T in Workspace.blocks
+        ("parts", np.int64),  # rows of its ports' Jacobians
         ("mass", np.int64),  # its mass points, of second-order geometry: mass .. mass_end, none of linear
         ("mass_end", np.int64),
         ("slopes", np.int64),  # the first so many of them are Gauss points
@@ -72,9 +72,13 @@ PORT = np.dtype(
         ("marker", np.int64),
         ("kind", np.int64),
         ("row", np.int64),  # first constraint row
-        ("rows", np.int64),  # 2 for a point, 1 for an angle
-        ("jac", np.int64),  # first entry of its rows in Workspace.jac
-        ("local", np.int64),  # first of its rows among those of its body
+        ("rows", np.int64),  # 2 for a point, else 1
+        # Rows in the body frame that these are made of: x and y of a point, an angle; of an axis x, y, and where the
+        # body carries it the angle, and the deflection along a track.
+        ("parts", np.int64),
+        ("jac", np.int64),  # first entry of these parts in Workspace.jac
+        ("local", np.int64),  # first of them among those of its body
+        ("axis", np.int64),  # which axis it is an end of, -1 for none
         ("sign", np.float64),  # +1 on side b of the joint, -1 on side a
     ],
     align=True,
@@ -103,13 +107,38 @@ LINE = np.dtype(
     ],
     align=True,
 )
+AXIS_RECORD = np.dtype(
+    [
+        ("a", np.int64),  # marker that carries the axis, -1 on the ground
+        ("b", np.int64),  # marker measured along it, -1 on the ground
+        ("ax", np.float64),  # places of ends on the ground
+        ("ay", np.float64),
+        ("bx", np.float64),
+        ("by", np.float64),
+        ("angle", np.float64),  # of the axis against the marker that carries it
+        ("row", np.int64),  # -1 for a motor's
+        ("signal", np.int64),  # of the motor, else -1
+        ("track", np.int64),  # the deflection that a sliding point follows, -1 for none
+    ],
+    align=True,
+)
+TRACK = np.dtype(
+    [
+        ("first", np.int64),  # first of its breaks
+        ("pieces", np.int64),
+        ("coefficients", np.int64),  # first of its coefficients: by piece, power and flexible coordinate
+    ],
+    align=True,
+)
 ROW = np.dtype(
     [
         ("kind", np.int64),
         ("signal", np.int64),  # prescribed value in time, -1 for none
         ("ground", np.float64),  # what points on the ground contribute to Phi, less the rest angle of a spring
-        # Of a spring, angle - rest = compliance * lambda; of a damper, rate = compliance * lambda; else zero.
+        # Of a spring, angle - rest = compliance * lambda; of a damper, rate = compliance * lambda; of friction, the
+        # inverse of its steepest slope; else zero.
         ("compliance", np.float64),
+        ("limit", np.float64),  # of friction: lambda = limit tanh(rate / (compliance limit))
         ("first", np.int64),  # first column of the row in the envelope of the Schur complement
         ("start", np.int64),  # and where that column is stored
     ],
@@ -126,8 +155,12 @@ class PackedSystem(NamedTuple):
     efforts: NDArray[np.void]
     loads: NDArray[np.void]
     lines: NDArray[np.void]  # springs and dampers between points
+    axes: NDArray[np.void]
+    tracks: NDArray[np.void]
+    track_breaks: NDArray[np.float64]
+    track_coefficients: NDArray[np.float64]
     rows: NDArray[np.void]
-    modal: NDArray[np.float64]  # (5, total nf): S2x, S2y, I1, G1 + Jf, omega^2
+    modal: NDArray[np.float64]  # (6, total nf): S2x, S2y, I1, G1 + Jf, omega^2, damping
     I2: NDArray[np.float64]  # nf x nf of every body, row by row
     G2: NDArray[np.float64]
     shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every marker
@@ -158,6 +191,8 @@ class Workspace(NamedTuple):
     q: NDArray[np.float64]
     v: NDArray[np.float64]
     step: NDArray[np.float64]  # (1,) b of the factor
+    axes: NDArray[np.float64]  # (axes, 4): e and n . d at the last `orient`, and where a sliding point stands
+    compliance: NDArray[np.float64]  # (m,) that of friction at the last `note_friction`
     frame: NDArray[np.float64]  # (bodies, 12): cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
     flex: NDArray[np.float64]  # (5, total nf)
     jac: NDArray[np.float64]  # Jacobian rows of every port, wholly in the body frame
@@ -176,7 +211,7 @@ def make_workspace(p: PackedSystem) -> Workspace:
     """Allocate the workspace of a system."""
     n = int(sum(3 + body["nf"] for body in p.bodies))
     m = p.rows.size
-    widths = [(3 + p.bodies[p.markers[port["marker"]]["body"]]["nf"]) * port["rows"] for port in p.ports]
+    widths = [(3 + p.bodies[p.markers[port["marker"]]["body"]]["nf"]) * port["parts"] for port in p.ports]
     dense = int(sum((3 + body["nf"]) ** 2 for body in p.bodies if body["slopes"]))
     envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(p.rows)))
     return Workspace(
@@ -187,11 +222,13 @@ def make_workspace(p: PackedSystem) -> Workspace:
         q=np.zeros(n),
         v=np.zeros(n),
         step=np.zeros(1),
+        axes=np.zeros((p.axes.size, 4)),
+        compliance=p.rows["compliance"].copy(),
         frame=np.zeros((p.bodies.size, 12)),
         flex=np.zeros((5, p.modal.shape[1])),
         jac=np.zeros(int(sum(widths))),
         inv=np.zeros(int(sum(widths))),
-        blocks=np.zeros(int(np.sum(p.bodies["rows"] ** 2))),
+        blocks=np.zeros(int(np.sum(p.bodies["parts"] ** 2))),
         schur=np.zeros(envelope),
         nf=np.zeros(3 + int(p.bodies["nf"].max(initial=0))),
         points=make_point_scratch(p),

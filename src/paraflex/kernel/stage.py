@@ -14,9 +14,18 @@ from __future__ import annotations
 
 from math import isfinite
 
+from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.bodies import body_terms
 from paraflex.kernel.compiling import kernel, routine
-from paraflex.kernel.joints import apply_lines, apply_loads, body_efforts, body_joints, start_compliant_rows, start_rows
+from paraflex.kernel.joints import (
+    apply_lines,
+    apply_loads,
+    body_efforts,
+    body_joints,
+    finish_friction,
+    start_compliant_rows,
+    start_rows,
+)
 from paraflex.kernel.linear import mass_norm, right_hand_side, solve_system
 from paraflex.kernel.signals import evaluate_signal
 
@@ -40,6 +49,8 @@ def equations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
         body_terms(p, i, q, v, a, ws.f, ws.points)
         body_joints(p, i, q, v, a, lam, weight_v, weight_q, ws.f, ws.rows)
         body_efforts(p, i, torques, ws.f)
+    apply_axes(p, q, v, a, lam, weight_v, weight_q, torques, ws.f, ws.rows)
+    finish_friction(p, lam, ws.compliance, ws.rows)
     apply_loads(p, q, ws.f)
     apply_lines(p, q, v, ws.f)
 

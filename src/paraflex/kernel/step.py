@@ -11,9 +11,11 @@ from __future__ import annotations
 from math import isfinite
 
 from paraflex.kernel.arrays import copy, fill
+from paraflex.kernel.axes import axis_power
 from paraflex.kernel.bending import note_all_axial_forces, subtract_geometric
 from paraflex.kernel.compiling import routine
-from paraflex.kernel.joints import damper_power, line_energy, load_power, marker_angle
+from paraflex.kernel.constraints import dissipated_power, note_friction
+from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
 from paraflex.kernel.linear import (
     factor_bodies,
     factor_system,
@@ -48,9 +50,10 @@ SLOW_AGE = 25
 
 
 @routine
-def input_power(p, signals, t, q, v, lam, torques):
-    """Power of the motors, of prescribed motion and of loads, less what dampers take."""
-    total = load_power(p, q, v) - damper_power(p, lam) - line_energy(p, q, v)[1]
+def input_power(p, signals, t, q, v, lam, torques, ws):
+    """Power of the motors, of prescribed motion and of loads, less what dampers, friction and damping take."""
+    total = load_power(p, q, v) + axis_power(p, q, v, torques) - line_energy(p, q, v)[1]
+    total -= dissipated_power(p, q, v, lam, ws.mu) + modal_damping_power(p, v)
     for k in range(p.efforts.size):
         effort = p.efforts[k]
         total += effort.sign * torques[effort.signal] * marker_angle(p, p.markers[effort.marker], v)
@@ -96,7 +99,7 @@ def filtered_error(p, tableau, h, controls, m, ws, slow):
     no elastic force turns round, and that moves the mechanism by memory times its size before the run ends.
 
     With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
-    (M + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
+    (M + g D + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
     for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2.
     """
     stages = tableau.c.size
@@ -114,6 +117,7 @@ def filtered_error(p, tableau, h, controls, m, ws, slow):
         m.eq[j] += g * ws.x[j]
     position = mass_norm(p, ws, m.eq)
     if m.counts[STEPS] % SLOW_AGE == 0:
+        note_friction(p, m.q, m.v, slow.mu, slow.compliance)
         factor_system(p, controls.memory * controls.memory, m.q, slow)
     for j in range(m.q.size):
         m.eq[j] = 0.0
@@ -169,6 +173,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     fresh = m.clock[FACTOR_G] != g
     if fresh:
         renew_factor(p, g, m, ws)
+    note_friction(p, m.q, m.v, ws.mu, ws.compliance)
     if orient(p, m.q, ws) > controls.dependent_rows:
         return SINGULAR, 0.0
     tolerance = controls.newton_fraction * controls.rate * h
@@ -206,7 +211,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
         slowest = max(slowest, iterations)
         copy(ws.q, m.stage_q[i])
         copy(ws.v, m.stage_v[i])
-        m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques)
+        m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques, ws)
         i += 1
     error_q, error_v = filtered_error(p, tableau, h, controls, m, ws, slow)
     if slowest > ENOUGH_ITERATIONS and m.counts[AGE] >= SERVED:

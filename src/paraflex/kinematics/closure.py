@@ -40,7 +40,7 @@ class RigidMotion:
     mechanism : Mechanism
         Rigid.
     system : System
-        Of it, without its springs and dampers: three coordinates a body (RDM).
+        Of it, without springs, dampers and friction at its joints: three coordinates a body (RDM).
     path : Path
     t : (k,) array
         [s]
@@ -86,7 +86,7 @@ def follow_path(
     assembly : str or Assembly, optional
         Which way the mechanism is put together; the first of the mechanism by default.
     orientation : float
-        Angle of the end-effector where it is a task coordinate [rad].
+        Angle of the end-effector where it is a task coordinate and the path does not say it [rad].
 
     Returns
     -------
@@ -95,7 +95,8 @@ def follow_path(
     Raises
     ------
     InputError
-        No end-effector, or a number of task coordinates other than the degrees of freedom.
+        No end-effector, a number of task coordinates other than the degrees of freedom, or a path with angles for a
+        task without.
     AssemblyError
         The assembly does not close.
     UnreachablePathError
@@ -108,6 +109,11 @@ def follow_path(
     closure.check_degrees_of_freedom()
     chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
     times = np.ascontiguousarray(times, dtype=float)
+    if _turning(path, times[:1]) is not None and "angle" not in mechanism.end_effector.coordinates:
+        raise InputError(
+            "the path gives angles, the task has none", field="end_effector.coordinates",
+            value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
+        )  # fmt: skip
     pose = closure.approach(path, closure.assemble(chosen), times[0])
     grid = np.unique(np.concatenate([times, np.arange(times[0], times[-1], _LONGEST_STEP)]))
     # Union of two grids: points a rounding error apart would divide by nothing when torques are interpolated.
@@ -122,11 +128,12 @@ class _Closure:
         effector = mechanism.end_effector
         assert effector is not None
         self.mechanism = mechanism
-        # Springs and dampers do not constrain.
-        self.system = system = build_system(replace(mechanism, springs=(), dampers=()))
+        # Springs, dampers and friction do not constrain.
+        self.system = system = build_system(replace(mechanism, springs=(), dampers=(), frictions=()))
         self.orientation = orientation
+        end = end if end > 0.0 else 1.0
         self.signals: Signals = pack_signals(
-            system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), end + 1.0), end + 1.0
+            system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), end), end
         )[0]
         self.coordinates = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
         self.packed, self.marker = _with_marker(system, effector.point)
@@ -148,17 +155,13 @@ class _Closure:
         zero = np.zeros_like(q)
         return task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero)[0]
 
-    def target(self, motion: PathMotion) -> NDArray[np.float64]:
+    def target(self, path: Path, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """(3, times, tasks): the task coordinates chosen from x, y, angle."""
-        constant = np.full(len(motion.position), self.orientation)
-        still = np.zeros_like(constant)
-        full = np.stack(
-            [
-                np.column_stack([motion.position, constant]),
-                np.column_stack([motion.velocity, still]),
-                np.column_stack([motion.acceleration, still]),
-            ]
-        )
+        motion, turning = path.evaluate(t), _turning(path, t)
+        if turning is None:
+            turning = np.zeros((3, t.size))
+            turning[0] = self.orientation
+        full = np.concatenate([np.stack(motion), turning[:, :, None]], axis=2)
         return np.ascontiguousarray(full[:, :, self.coordinates])
 
     def run(self, times: NDArray[np.float64], target: NDArray[np.float64], pose: NDArray[np.float64]):
@@ -174,7 +177,7 @@ class _Closure:
 
     def approach(self, path: Path, pose: NDArray[np.float64], start: float) -> NDArray[np.float64]:
         """Move the end-effector from where the assembly has it to the start of the path, staying in that assembly."""
-        goal = self.target(path.evaluate(np.array([start])))[0, 0]
+        goal = self.target(path, np.array([start]))[0, 0]
         here = self.task(pose)
         residual = 0.0
         for steps in _APPROACHES:
@@ -193,7 +196,7 @@ class _Closure:
         """The motion at the instants of the grid to keep, with more instants between where steps prove too long."""
         stretches, gap = [], 0.0
         while True:
-            target = self.target(path.evaluate(grid))
+            target = self.target(path, grid)
             status, index, residual, found = self.run(grid, target, pose)
             last = index - 1
             # Where the path leaves the workspace the Jacobian is singular as well, but beyond nothing closes.
@@ -217,6 +220,12 @@ class _Closure:
         )
         moment = Moment(float(grid[index]), motion.t.size, tuple(target[0, index]))
         raise UnreachablePathError(what, moment, partial=motion)
+
+
+def _turning(path: Path, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """How the end-effector turns at times t (3, k), where a path says so."""
+    says = getattr(path, "turning", None)
+    return None if says is None else says(t)
 
 
 def _with_marker(system: System, ref) -> tuple[PackedSystem, int]:

@@ -196,31 +196,32 @@ class PointPath:
 
     Attributes
     ----------
-    points : sequence of (x, y)
-        At least two [m].
+    points : sequence of (x, y) or (x, y, angle)
+        At least two [m]; the angles of the end-effector there, where they are given [rad].
     motion_time : float
         From the first point to the last [s]; points are passed at times in proportion to the chords between them.
     """
 
-    points: tuple[tuple[float, float], ...]
+    points: tuple[tuple[float, ...], ...]
     motion_time: float
 
     def __post_init__(self) -> None:
-        points = _points(self.points, "points", 2)
+        points = _points(self.points, "points", 2, (2, 3))
         object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
         if not (np.isfinite(self.motion_time) and self.motion_time > 0.0):
             raise InputError(
                 "must be positive", field="motion_time", value=self.motion_time, remedy="give it in seconds"
             )
-        if np.any(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0.0):
+        if np.any(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) == 0.0):
             raise InputError("two neighbouring points coincide", field="points", remedy="drop one of them")
 
     @cached_property
     def _spline(self) -> scipy.interpolate.BSpline:
         points = np.array(self.points)
-        chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        chords = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
         times = self.motion_time * np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
-        rest = [(1, np.zeros(2)), (2, np.zeros(2))]
+        still = np.zeros(points.shape[1])
+        rest = [(1, still), (2, still)]
         return scipy.interpolate.make_interp_spline(times, points, k=5, bc_type=(rest, rest))
 
     @property
@@ -235,12 +236,17 @@ class PointPath:
 
     def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
         """The motion at times t."""
+        return PathMotion(*self._motion(t)[:, :, :2])
+
+    def turning(self, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Angle [rad] of the end-effector, its rate and acceleration at times t (3, k); None without angles."""
+        return self._motion(t)[:, :, 2] if len(self.points[0]) > 2 else None
+
+    def _motion(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         t = np.atleast_1d(np.asarray(t, dtype=float))
         inside = ((t >= 0.0) & (t <= self.motion_time))[:, None]
         x = np.clip(t, 0.0, self.motion_time)
-        return PathMotion(
-            self._spline(x), np.where(inside, self._spline(x, 1), 0.0), np.where(inside, self._spline(x, 2), 0.0)
-        )
+        return np.stack([self._spline(x), *(np.where(inside, self._spline(x, k), 0.0) for k in (1, 2))])
 
 
 def _pair(value: Sequence[float], field: str) -> tuple[float, float]:
@@ -248,15 +254,23 @@ def _pair(value: Sequence[float], field: str) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def _points(values: Sequence[Sequence[float]], field: str, at_least: int) -> NDArray[np.float64]:
+def _points(
+    values: Sequence[Sequence[float]], field: str, at_least: int, columns: Sequence[int] = (2,)
+) -> NDArray[np.float64]:
     try:
         points = np.array(values, dtype=float)
     except (TypeError, ValueError):
         points = np.zeros((0, 0))
-    if points.ndim != 2 or points.shape[1] != 2 or points.shape[0] < at_least or not np.all(np.isfinite(points)):
+    if (
+        points.ndim != 2
+        or points.shape[1] not in columns
+        or points.shape[0] < at_least
+        or not np.all(np.isfinite(points))
+    ):
         raise InputError(
-            "not a list of points", field=field, value=values, remedy=f"give at least {at_least} of [x, y] in metres"
-        )
+            "not a list of points", field=field, value=values,
+            remedy=f"give at least {at_least} of [x, y] in metres{', or all of [x, y, angle]' if 3 in columns else ''}",
+        )  # fmt: skip
     return points
 
 

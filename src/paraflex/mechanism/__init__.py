@@ -1,17 +1,43 @@
 """What the user means: frozen descriptions of bodies, joints, motors and the mechanism they form."""
 
-from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, LumpedMass, Material, RigidBody, Section
+from paraflex.fem import Polynomial, ShapeFunction, Sine
+from paraflex.mechanism.bodies import (
+    AssumedModesBeam,
+    Body,
+    Curvature,
+    FlexibleBeam,
+    LumpedMass,
+    Material,
+    RigidBody,
+    Section,
+    given_shapes,
+)
 from paraflex.mechanism.checks import check_mechanism
+from paraflex.mechanism.damping import Damping, ModalDamping, RayleighDamping
 from paraflex.mechanism.joints import (
     GROUND,
     AngleLaw,
+    Joint,
     Motor,
     PointRef,
     PrescribedAngle,
+    PrismaticJoint,
     RevoluteJoint,
     SampledAngle,
+    SlidingJoint,
+    SlotJoint,
+    WeldJoint,
 )
-from paraflex.mechanism.loads import AppliedTorque, LinearSpring, Load, PointForce, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.laws import ConstantSpeed, PiecewiseLaw, TabulatedLaw
+from paraflex.mechanism.loads import (
+    AppliedTorque,
+    JointFriction,
+    LinearSpring,
+    Load,
+    PointForce,
+    TorsionalDamper,
+    TorsionalSpring,
+)
 from paraflex.mechanism.mechanism import (
     ActuationMode,
     Assembly,
@@ -23,8 +49,17 @@ from paraflex.mechanism.mechanism import (
     parse_geometry,
     parse_mode,
 )
+from paraflex.mechanism.modal import ModalBody, ModalPoint
+from paraflex.mechanism.poses import Pose, approximate_poses
 from paraflex.mechanism.raparm import raparm_i
-from paraflex.mechanism.segments import FIRST_END, LAST_END, Segmented, finite_segments, proportional_segments
+from paraflex.mechanism.segments import (
+    FIRST_END,
+    LAST_END,
+    Segmented,
+    check_segmentable,
+    finite_segments,
+    proportional_segments,
+)
 
 __all__ = [
     "FIRST_END",
@@ -34,29 +69,51 @@ __all__ = [
     "AngleLaw",
     "AppliedTorque",
     "Assembly",
+    "AssumedModesBeam",
     "Body",
+    "ConstantSpeed",
     "Curvature",
+    "Damping",
     "EndEffector",
     "FlexibleBeam",
     "Geometry",
+    "Joint",
+    "JointFriction",
     "LinearSpring",
     "Load",
     "LumpedMass",
     "Material",
     "Mechanism",
+    "ModalBody",
+    "ModalDamping",
+    "ModalPoint",
     "Motor",
+    "PiecewiseLaw",
     "PointForce",
     "PointRef",
+    "Polynomial",
+    "Pose",
     "PrescribedAngle",
+    "PrismaticJoint",
+    "RayleighDamping",
     "RevoluteJoint",
     "RigidBody",
     "SampledAngle",
     "Section",
     "Segmented",
+    "ShapeFunction",
+    "Sine",
+    "SlidingJoint",
+    "SlotJoint",
+    "TabulatedLaw",
     "TorsionalDamper",
     "TorsionalSpring",
+    "WeldJoint",
+    "approximate_poses",
     "check_mechanism",
+    "check_segmentable",
     "finite_segments",
+    "given_shapes",
     "mode_of_motors",
     "mode_of_signs",
     "parse_geometry",

@@ -1,12 +1,28 @@
-"""Bodies: rigid ones and flexible beams. Points are named and lie in the body frame."""
+"""Bodies: rigid ones, flexible beams and bars of assumed modes. Points are named and lie in the body frame."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import TypeVar
 
-from paraflex.fem import BeamMesh, ReferenceCondition, mesh_beam
+from paraflex.errors import InputError
+from paraflex.fem import (
+    AssumedShapes,
+    BeamMesh,
+    PlacedLump,
+    ReferenceCondition,
+    ShapeFunction,
+    ShapeIntegrals,
+    SpanProperties,
+    assumed_integrals,
+    mesh_beam,
+)
+from paraflex.mechanism.damping import Damping
+from paraflex.mechanism.modal import ModalBody
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -45,8 +61,8 @@ class Curvature(Enum):
         The paper's element: one value for both sides, zero at the tip. Converges with the first power of the element
         there.
     SEPARATE
-        A value on either side, and a free one at the tip. Converges with the eighth power; one coordinate more for
-        each such node.
+        A value on either side of such a node, and a free one at the tip, where a weld, a motor or a lump may bring in
+        a moment. Converges with the eighth power; one coordinate more for each such node and for the tip.
     """
 
     SHARED = "shared"
@@ -95,8 +111,10 @@ class FlexibleBeam:
     name : str
     length : float
         [m]
-    section : Section
-    material : Material
+    section : Section or tuple of Section
+        One for the whole beam, or one a span between neighbouring points and ends.
+    material : Material or tuple of Material
+        Likewise.
     points : mapping
         Distance of each named point from the first end [m]; every one becomes a node.
     elements : int or tuple of int
@@ -105,23 +123,27 @@ class FlexibleBeam:
     reference : ReferenceCondition
         How the floating frame is fixed to the beam; the paper's is the cantilever.
     curvature : Curvature
-        At nodes with a lumped moment of inertia; the paper's is shared.
+        At nodes with a lumped moment of inertia; the paper's is shared. Where sections of different bending stiffness
+        meet there is always one on either side.
     modes : int, optional
         Modes of lowest frequency kept as flexible coordinates, in its frame; all by default.
+    damping : RayleighDamping or ModalDamping, optional
+        Of its material; none by default.
     flexible : bool
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
 
     name: str
     length: float
-    section: Section
-    material: Material
+    section: Section | tuple[Section, ...]
+    material: Material | tuple[Material, ...]
     points: Mapping[str, float] = field(default_factory=dict)
     elements: int | tuple[int, ...] = 1
     lumps: tuple[LumpedMass, ...] = ()
     reference: ReferenceCondition = ReferenceCondition.CANTILEVER
     curvature: Curvature = Curvature.SHARED
     modes: int | None = None
+    damping: Damping | None = None
     flexible: bool = True
 
     @property
@@ -131,16 +153,131 @@ class FlexibleBeam:
         Raises
         ------
         InputError
-            See `fem.mesh_beam`.
+            See `fem.mesh_beam` and `spans`.
         """
         mesh = mesh_beam(self.length, self.points, self.elements)
+        spans = self._spans_of(mesh)
+        stiffness = [spans[span].bending_stiffness for span in mesh.spans]
+        # At a step of E I the moment is continuous: a shared curvature would be wrong on one side at least.
+        separate = {node for node in range(1, mesh.n_elements) if stiffness[node - 1] != stiffness[node]}
         if self.curvature is Curvature.SEPARATE:
-            mesh = mesh.with_separate_curvature(mesh.points[lump.point] for lump in self.lumps if lump.inertia > 0.0)
-        return mesh
+            separate |= {mesh.points[lump.point] for lump in self.lumps if lump.inertia > 0.0} | {mesh.n_elements}
+        return mesh.with_separate_curvature(separate)
+
+    @property
+    def spans(self) -> tuple[SpanProperties, ...]:
+        """Mass and stiffness of every span.
+
+        Raises
+        ------
+        InputError
+            A number of sections or materials that is not that of the spans.
+        """
+        return self._spans_of(mesh_beam(self.length, self.points, self.elements))
+
+    def _spans_of(self, mesh: BeamMesh) -> tuple[SpanProperties, ...]:
+        sections = _per_span(self.section, mesh.n_spans, "section")
+        materials = _per_span(self.material, mesh.n_spans, "material")
+        return tuple(map(span_properties, sections, materials))
 
     def as_rigid(self) -> FlexibleBeam:
         """The same beam with its flexibility switched off."""
         return replace(self, flexible=False)
 
 
-Body = RigidBody | FlexibleBeam
+def span_properties(section: Section, material: Material) -> SpanProperties:
+    """Mass and stiffness of a bar of one section and material."""
+    return SpanProperties(
+        mass_per_length=material.density * section.area,
+        axial_stiffness=material.youngs_modulus * section.area,
+        bending_stiffness=material.youngs_modulus * section.second_moment,
+    )
+
+
+def _per_span(value: T | tuple[T, ...], count: int, field: str) -> tuple[T, ...]:
+    if not isinstance(value, tuple):
+        return (value,) * count
+    if len(value) != count:
+        raise InputError(
+            f"the beam has {count} span(s) between its points and ends",
+            field=field,
+            value=len(value),
+            remedy=f"give one {field} for all spans or one a span",
+        )
+    return value
+
+
+@dataclass(frozen=True)
+class AssumedModesBeam:
+    """A straight bar along the x axis of its body frame that deforms in shape functions of the user's choice.
+
+    The functions fix the frame: they must contain no rigid motion of the bar. Its geometry is linear, whatever that of
+    the mechanism.
+
+    Attributes
+    ----------
+    name : str
+    length : float
+        [m]
+    section : Section
+    material : Material
+    transverse : tuple of ShapeFunction
+        Of x/L, `Sine` or `Polynomial`: transverse displacement per coordinate.
+    axial : tuple of ShapeFunction
+        Axial displacement per coordinate; none for a bar that does not stretch.
+    points : mapping
+        Distance of each named point from the first end [m].
+    lumps : tuple of LumpedMass
+    modes : int, optional
+        Modes of lowest frequency kept as flexible coordinates; all by default.
+    damping : RayleighDamping or ModalDamping, optional
+        Of its material; none by default.
+    flexible : bool
+        False holds all flexible coordinates at zero: the same inertia, rigid.
+    """
+
+    name: str
+    length: float
+    section: Section
+    material: Material
+    transverse: tuple[ShapeFunction, ...] = ()
+    axial: tuple[ShapeFunction, ...] = ()
+    points: Mapping[str, float] = field(default_factory=dict)
+    lumps: tuple[LumpedMass, ...] = ()
+    modes: int | None = None
+    damping: Damping | None = None
+    flexible: bool = True
+
+    @property
+    def shapes(self) -> AssumedShapes:
+        """Its shape functions."""
+        return AssumedShapes(self.length, self.transverse, self.axial)
+
+    @property
+    def integrals(self) -> ShapeIntegrals:
+        """Its shape integrals.
+
+        Raises
+        ------
+        InputError
+            See `fem.assumed_integrals`.
+        """
+        lumps = [PlacedLump(self.points[lump.point], lump.mass, lump.inertia) for lump in self.lumps]
+        return assumed_integrals(self.shapes, span_properties(self.section, self.material), lumps)
+
+    @property
+    def n_flexible(self) -> int:
+        """Number of flexible coordinates before any reduction."""
+        return self.shapes.count
+
+    def as_rigid(self) -> AssumedModesBeam:
+        """The same bar with its flexibility switched off."""
+        return replace(self, flexible=False)
+
+
+Body = RigidBody | FlexibleBeam | AssumedModesBeam | ModalBody
+
+
+def given_shapes(bodies: Iterable[Body]) -> list[str]:
+    """Names of the flexible bodies whose shapes are the user's own: no mesh of ours can be made finer."""
+    return [body.name for body in bodies if isinstance(body, AssumedModesBeam | ModalBody) and body.flexible]

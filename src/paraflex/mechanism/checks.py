@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError, suggestion
-from paraflex.fem import mesh_beam
-from paraflex.mechanism.bodies import Body, RigidBody
-from paraflex.mechanism.joints import GROUND, PointRef
+from paraflex.mechanism.bodies import FlexibleBeam
+from paraflex.mechanism.body_checks import check_body
+from paraflex.mechanism.joints import GROUND, PointRef, SlidingJoint, WeldJoint
 from paraflex.mechanism.loads import PointForce
+from paraflex.mechanism.poses import approximate_poses
+from paraflex.mechanism.quantities import finite, not_negative, positive
 
 if TYPE_CHECKING:
     from paraflex.mechanism.mechanism import Mechanism
@@ -44,6 +44,7 @@ def check_names(mechanism: Mechanism) -> None:
         "prescribed": mechanism.prescribed,
         "spring": mechanism.springs,
         "damper": mechanism.dampers,
+        "friction": mechanism.frictions,
         "linear_spring": mechanism.linear_springs,
         "load": mechanism.loads,
         "assembly": mechanism.assemblies,
@@ -62,51 +63,10 @@ def check_names(mechanism: Mechanism) -> None:
         raise InputError("a mechanism needs at least one body", field="body", remedy="add a beam or a rigid body")
 
 
-def check_body(body: Body) -> None:
-    """Masses, lengths and stiffnesses are numbers that make sense; lumps sit on points that exist."""
-    field = f"body.{body.name}"
-    if isinstance(body, RigidBody):
-        _positive(body.mass, f"{field}.mass", "kg")
-        _positive(body.inertia, f"{field}.inertia", "kg m^2")
-        _finite(body.centre_of_mass, f"{field}.centre_of_mass")
-        for name, position in body.points.items():
-            _finite(position, f"{field}.points.{name}")
-        return
-    _positive(body.length, f"{field}.length", "m")
-    _positive(body.section.area, f"{field}.section.area", "m^2")
-    _positive(body.section.second_moment, f"{field}.section.second_moment", "m^4")
-    _positive(body.material.youngs_modulus, f"{field}.material.youngs_modulus", "Pa")
-    _positive(body.material.density, f"{field}.material.density", "kg/m^3")
-    _finite(body.points.values(), f"{field}.points")
-    try:
-        mesh_beam(body.length, body.points, body.elements)
-    except InputError as error:
-        raise InputError(
-            error.problem, field=f"{field}.{error.field}", value=error.value, remedy=error.remedy
-        ) from error
-    for lump in body.lumps:
-        if lump.point not in body.points:
-            raise InputError(
-                "a lump on an unknown point",
-                field=f"{field}.lumps",
-                value=lump.point,
-                remedy=suggestion(lump.point, body.points),
-            )
-        _not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
-        _not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
-    if body.modes is not None and not 1 <= body.modes <= body.mesh.n_flexible:
-        raise InputError(
-            "no such number of modes",
-            field=f"{field}.modes",
-            value=body.modes,
-            remedy=f"from 1 to {body.mesh.n_flexible}, or leave it out for all",
-        )
-
-
 def check_ground(mechanism: Mechanism) -> None:
     """Ground points are finite."""
     for name, position in mechanism.ground.items():
-        _finite(position, f"ground.{name}")
+        finite(position, f"ground.{name}")
 
 
 def check_references(mechanism: Mechanism) -> None:
@@ -124,34 +84,54 @@ def check_references(mechanism: Mechanism) -> None:
                 value=f"{joint.a}, {joint.b}",
                 remedy="one side must lie on another body or on the ground",
             )
-    for motor in mechanism.motors:
-        _known(motor.joint, joints, f"motor.{motor.name}.joint", "joint")
-    for prescribed in mechanism.prescribed:
-        _known(prescribed.joint, joints, f"prescribed.{prescribed.name}.joint", "joint")
+        if isinstance(joint, SlidingJoint):
+            body = None if joint.a.on_ground else mechanism.body(joint.a.body)
+            if not isinstance(body, FlexibleBeam):
+                raise InputError(
+                    "a sliding joint needs a beam to slide on",
+                    field=f"joint.{joint.name}",
+                    value=str(joint.a),
+                    remedy='name a point of a beam first; on other bodies use a "slot"',
+                )
+        finite([getattr(joint, "direction", 0.0)], f"joint.{joint.name}.direction")
+        finite([getattr(joint, "angle", 0.0)], f"joint.{joint.name}.angle")
+    groups = {
+        "motor": mechanism.motors,
+        "prescribed": mechanism.prescribed,
+        "spring": mechanism.springs,
+        "damper": mechanism.dampers,
+        "friction": mechanism.frictions,
+    }
+    for kind, members in groups.items():
+        for member in members:
+            field = f"{kind}.{member.name}.joint"
+            _known(member.joint, joints, field, "joint")
+            if isinstance(mechanism.joint(member.joint), WeldJoint):
+                raise InputError("a weld does not move", field=field, value=member.joint, remedy="name another joint")
     for spring in mechanism.springs:
         field = f"spring.{spring.name}"
-        _known(spring.joint, joints, f"{field}.joint", "joint")
-        _positive(spring.stiffness, f"{field}.stiffness", "N m/rad")
-        _finite([spring.rest], f"{field}.rest")
+        positive(spring.stiffness, f"{field}.stiffness", "N m/rad, or N/m")
+        finite([spring.rest], f"{field}.rest")
     for damper in mechanism.dampers:
-        field = f"damper.{damper.name}"
-        _known(damper.joint, joints, f"{field}.joint", "joint")
-        _positive(damper.coefficient, f"{field}.coefficient", "N m s/rad")
+        positive(damper.coefficient, f"damper.{damper.name}.coefficient", "N m s/rad, or N s/m")
+    for friction in mechanism.frictions:
+        positive(friction.limit, f"friction.{friction.name}.limit", "N m, or N")
+        positive(friction.speed, f"friction.{friction.name}.speed", "rad/s, or m/s")
     for mode in mechanism.modes:
         for name in mode.motors:
             _known(name, motors, f"mode.{mode.name}", "motor")
     for assembly in mechanism.assemblies:
         for name, angle in assembly.angles.items():
             _known(name, bodies, f"assembly.{assembly.name}", "body")
-            _finite([angle], f"assembly.{assembly.name}.{name}")
-        for name in bodies:
-            if name not in assembly.angles:
-                raise InputError(
-                    "no angle for a body",
-                    field=f"assembly.{assembly.name}",
-                    value=name,
-                    remedy="give its approximate angle in rad",
-                )
+            finite([angle], f"assembly.{assembly.name}.{name}")
+        for ref, place in assembly.points.items():
+            field = f"assembly.{assembly.name}.points"
+            _known_point(mechanism, ref, field)
+            finite(place, f"{field}.{ref}")
+            if ref.on_ground:
+                raise InputError("ground points are known", field=field, value=str(ref), remedy="name a body's point")
+        # It names the body that neither angles nor points place.
+        approximate_poses(mechanism, assembly)
 
 
 def check_connected(mechanism: Mechanism) -> None:
@@ -197,7 +177,7 @@ def check_task(mechanism: Mechanism) -> None:
 
 def check_loads(mechanism: Mechanism) -> None:
     """Loads are finite and act on bodies; so is gravity."""
-    _finite(mechanism.gravity, "gravity")
+    finite(mechanism.gravity, "gravity")
     for spring in mechanism.linear_springs:
         field = f"linear_spring.{spring.name}"
         _known_point(mechanism, spring.a, f"{field}.points")
@@ -209,9 +189,9 @@ def check_loads(mechanism: Mechanism) -> None:
                 value=f"{spring.a}, {spring.b}",
                 remedy="one end must be on another body or on the ground",
             )
-        _not_negative(spring.stiffness, f"{field}.stiffness", "N/m")
-        _not_negative(spring.length, f"{field}.length", "m")
-        _not_negative(spring.damping, f"{field}.damping", "N s/m")
+        not_negative(spring.stiffness, f"{field}.stiffness", "N/m")
+        not_negative(spring.length, f"{field}.length", "m")
+        not_negative(spring.damping, f"{field}.damping", "N s/m")
     for load in mechanism.loads:
         field = f"load.{load.name}"
         _known_point(mechanism, load.point, f"{field}.point")
@@ -220,9 +200,9 @@ def check_loads(mechanism: Mechanism) -> None:
                 "the ground does not move", field=f"{field}.point", value=str(load.point), remedy="name a body's point"
             )
         if isinstance(load, PointForce):
-            _finite(load.force, f"{field}.force")
+            finite(load.force, f"{field}.force")
         else:
-            _finite([load.torque], f"{field}.torque")
+            finite([load.torque], f"{field}.torque")
 
 
 def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
@@ -235,19 +215,3 @@ def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
 def _known(name: str, known: list[str], field: str, kind: str) -> None:
     if name not in known:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))
-
-
-def _finite(values: Iterable[float], field: str) -> None:
-    for value in values:
-        if not math.isfinite(value):
-            raise InputError("not a finite number", field=field, value=value, remedy="give a number")
-
-
-def _positive(value: float, field: str, unit: str) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError("must be positive", field=field, value=value, remedy=f"give it in {unit}")
-
-
-def _not_negative(value: float, field: str, unit: str) -> None:
-    if not (math.isfinite(value) and value >= 0.0):
-        raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")

@@ -57,6 +57,69 @@ class RevoluteJoint:
     b: PointRef
 
 
+@dataclass(frozen=True)
+class PrismaticJoint:
+    """Body b slides along an axis that body a carries, and does not turn against it.
+
+    The axis goes through point a, at `direction` against body a's x axis there (against the ground's, on the ground);
+    on a beam it turns with the slope at a. The joint's coordinate is its travel: how far point b is along the axis [m].
+
+    Attributes
+    ----------
+    name : str
+    a, b : PointRef
+    direction : float
+        Of the axis against body a [rad].
+    angle : float
+        Of body b against body a, constant [rad]; slopes of beams included.
+    """
+
+    name: str
+    a: PointRef
+    b: PointRef
+    direction: float = 0.0
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class SlotJoint:
+    """A pin in a slot: point b stays on an axis through point a of body a, and body b turns freely.
+
+    The axis is that of a `PrismaticJoint`, and so is the joint's coordinate.
+    """
+
+    name: str
+    a: PointRef
+    b: PointRef
+    direction: float = 0.0
+
+
+@dataclass(frozen=True)
+class WeldJoint:
+    """Two points held together, and body b at a constant angle [rad] against body a, slopes of beams included."""
+
+    name: str
+    a: PointRef
+    b: PointRef
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class SlidingJoint:
+    """Point b slides along the centre line of a beam, bent as it is, and body b turns freely.
+
+    Point a says which beam. The joint's coordinate is how far point b is beyond point a along the x axis of the beam's
+    frame [m]. Deflections are taken where the point stands in the undeformed beam, as a linear theory does.
+    """
+
+    name: str
+    a: PointRef
+    b: PointRef
+
+
+Joint = RevoluteJoint | PrismaticJoint | SlotJoint | SlidingJoint | WeldJoint
+
+
 @runtime_checkable
 class AngleLaw(Protocol):
     """An angle given in time."""

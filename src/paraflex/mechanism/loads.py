@@ -33,6 +33,28 @@ class TorsionalDamper:
 
 
 @dataclass(frozen=True)
+class JointFriction:
+    """Dry friction at a joint, regularised: force or torque -limit tanh(rate / speed) against the joint's rate.
+
+    It acts as a damper of limit / speed below that speed and as Coulomb's friction well above it.
+
+    Attributes
+    ----------
+    name : str
+    joint : str
+    limit : float
+        [N m] at a revolute joint, [N] at a prismatic joint or slot.
+    speed : float
+        At which three quarters of the limit are reached [rad/s or m/s].
+    """
+
+    name: str
+    joint: str
+    limit: float
+    speed: float
+
+
+@dataclass(frozen=True)
 class LinearSpring:
     """A spring with a damper between two points, at most one of them on the ground.
 

@@ -8,10 +8,10 @@ from enum import Enum
 
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
-from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam
+from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.joints import Motor, PointRef, PrescribedAngle, RevoluteJoint
-from paraflex.mechanism.loads import LinearSpring, Load, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.joints import Joint, Motor, PointRef, PrescribedAngle
+from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
 
 TASK_COORDINATES = ("x", "y", "angle")
 # The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
@@ -31,10 +31,19 @@ class Assembly:
     """One way of putting the mechanism together, given by an approximate angle [rad] of each body.
 
     The solver closes the loops from there; several assemblies of one mechanism differ in their elbows.
+
+    Attributes
+    ----------
+    name : str
+    angles : mapping of str to float
+        Of all bodies, or of those whose angles do not follow from points [rad].
+    points : mapping of PointRef to (x, y)
+        Approximate places in the ground frame [m].
     """
 
     name: str
     angles: Mapping[str, float]
+    points: Mapping[PointRef, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -68,14 +77,15 @@ class Mechanism:
     name : str
     ground : mapping
         Named points fixed in the ground frame [m].
-    bodies : tuple of RigidBody or FlexibleBeam
-    joints : tuple of RevoluteJoint
+    bodies : tuple of RigidBody, FlexibleBeam, AssumedModesBeam or ModalBody
+    joints : tuple of RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint or WeldJoint
     motors : tuple of Motor
         Their order is that of the signs in a mode such as "+-+-".
     prescribed : tuple of PrescribedAngle
         Joint angles given in time.
     springs : tuple of TorsionalSpring
     dampers : tuple of TorsionalDamper
+    frictions : tuple of JointFriction
     linear_springs : tuple of LinearSpring
     loads : tuple of PointForce or AppliedTorque
     gravity : (x, y)
@@ -98,7 +108,7 @@ class Mechanism:
     name: str
     ground: Mapping[str, tuple[float, float]]
     bodies: tuple[Body, ...]
-    joints: tuple[RevoluteJoint, ...]
+    joints: tuple[Joint, ...]
     motors: tuple[Motor, ...] = ()
     prescribed: tuple[PrescribedAngle, ...] = ()
     end_effector: EndEffector | None = None
@@ -106,6 +116,7 @@ class Mechanism:
     modes: tuple[ActuationMode, ...] = ()
     springs: tuple[TorsionalSpring, ...] = ()
     dampers: tuple[TorsionalDamper, ...] = ()
+    frictions: tuple[JointFriction, ...] = ()
     linear_springs: tuple[LinearSpring, ...] = ()
     loads: tuple[Load, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
@@ -119,7 +130,7 @@ class Mechanism:
         """The body of that name."""
         return next(body for body in self.bodies if body.name == name)
 
-    def joint(self, name: str) -> RevoluteJoint:
+    def joint(self, name: str) -> Joint:
         """The joint of that name."""
         return next(joint for joint in self.joints if joint.name == name)
 
@@ -155,8 +166,8 @@ class Mechanism:
         for name in names:
             if name not in known:
                 raise InputError("unknown body", field="rigid", value=name, remedy=f"choose from {', '.join(known)}")
-        beams = [self.body(name) for name in names]
-        return self.with_bodies(beam.as_rigid() for beam in beams if isinstance(beam, FlexibleBeam))
+        bodies = [self.body(name) for name in names]
+        return self.with_bodies(body.as_rigid() for body in bodies if not isinstance(body, RigidBody))
 
     def with_beams(
         self,
@@ -175,8 +186,16 @@ class Mechanism:
         reference : ReferenceCondition, optional
         curvature : Curvature, optional
         modes : int, optional
-            Modes of lowest frequency kept of each.
+            Modes of lowest frequency kept of each, and of each other flexible body.
+
+        Raises
+        ------
+        InputError
+            Another mesh, condition or curvature for a flexible body of given shapes.
         """
+        asked = {"elements": elements, "reference": reference, "curvature": curvature}
+        for what in [name for name, value in asked.items() if value is not None]:
+            self._refuse_given_shapes(what)
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
         if elements is not None:
             beams = [replace(beam, elements=elements) for beam in beams]
@@ -184,18 +203,36 @@ class Mechanism:
             beams = [replace(beam, reference=reference) for beam in beams]
         if curvature is not None:
             beams = [replace(beam, curvature=curvature) for beam in beams]
-        if modes is not None:
-            beams = [replace(beam, modes=modes) for beam in beams]
-        return self.with_bodies(beams)
+        changed = self.with_bodies(beams)
+        if modes is None:
+            return changed
+        bodies = [body for body in changed.bodies if not isinstance(body, RigidBody)]
+        return changed.with_bodies(replace(body, modes=modes) for body in bodies)
 
     def refined(self, factor: int) -> Mechanism:
-        """The mechanism with so many times the elements on every span of its flexible beams."""
+        """The mechanism with so many times the elements on every span of its flexible beams.
+
+        Raises
+        ------
+        InputError
+            A flexible body of given shapes, which has no elements, and a factor other than 1.
+        """
+        if factor != 1:
+            self._refuse_given_shapes("elements")
 
         def times(elements: int | tuple[int, ...]) -> int | tuple[int, ...]:
             return elements * factor if isinstance(elements, int) else tuple(count * factor for count in elements)
 
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam) and body.flexible]
         return self.with_bodies(replace(beam, elements=times(beam.elements)) for beam in beams)
+
+    def _refuse_given_shapes(self, what: str) -> None:
+        for name in given_shapes(self.bodies):
+            raise InputError(
+                "the shapes of this body are given",
+                field=f"body.{name}.{what}",
+                remedy="change them in the body itself, or leave it out",
+            )
 
     def with_geometry(self, geometry: Geometry | str) -> Mechanism:
         """The mechanism with linear or second-order geometry of its flexible beams.

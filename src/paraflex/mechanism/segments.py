@@ -8,10 +8,13 @@ from itertools import pairwise
 from math import ceil
 
 from paraflex.errors import InputError, suggestion
-from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody
+from paraflex.fem import SpanProperties
+from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
+from paraflex.mechanism.damping import RayleighDamping
 from paraflex.mechanism.joints import PointRef, RevoluteJoint
-from paraflex.mechanism.loads import TorsionalSpring
-from paraflex.mechanism.mechanism import Mechanism
+from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.mechanism import Assembly, Mechanism
+from paraflex.mechanism.poses import approximate_poses
 
 # Points at which segments hang together.
 FIRST_END, LAST_END = "_first", "_last"
@@ -46,8 +49,9 @@ def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, i
 def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8) -> Segmented:
     """Replace each flexible beam by n equal rigid segments, hinged in a row with springs of n E I / L between them.
 
-    A joint of two half segments bends as they do together: k = E I / (L / n). Lumped masses move with the segment they
-    lie on. The model is another discretisation of the same beam, without stretch, and knows nothing of shape functions.
+    A joint of two half segments bends as they do together: k = E I / (L / n), of spans of several stiffnesses the
+    reciprocal of int dx / E I over the two halves. Lumped masses move with the segment they lie on. The model is
+    another discretisation of the same beam, without stretch, and knows nothing of shape functions.
 
     Parameters
     ----------
@@ -63,13 +67,16 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
     Raises
     ------
     InputError
-        Fewer than one segment, a beam without a number, or a name that is no flexible beam's.
+        Fewer than one segment, a beam without a number, a name that is no flexible beam's, or a flexible body of given
+        shapes.
     """
+    check_segmentable(mechanism)
     beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.flexible]
     counts = _counts([beam.name for beam in beams], segments)
     bodies: list[Body] = []
     joints: list[RevoluteJoint] = []
     springs: list[TorsionalSpring] = []
+    dampers: list[TorsionalDamper] = []
     carriers: dict[str, tuple[str, float]] = {}
     places: dict[tuple[str, str], str] = {}
     for body in mechanism.bodies:
@@ -78,18 +85,20 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
             carriers[body.name] = (body.name, 0.0)
             continue
         assert isinstance(body, FlexibleBeam)
-        n = counts[body.name]
+        n, lag = counts[body.name], _stiffness_damping(body)
         length = body.length / n
-        stiffness = body.material.youngs_modulus * body.section.second_moment / length
         names = [f"{body.name}_{i + 1}" for i in range(n)]
         owners = {point: min(int(x / length + 1e-9), n - 1) for point, x in body.points.items()}
         for i, name in enumerate(names):
             bodies.append(_segment(body, name, i, length, owners))
             carriers[name] = (body.name, i * length)
-        for a, b in pairwise(names):
+        for i, (a, b) in enumerate(pairwise(names)):
             hinge = f"{a}-{b}"
             joints.append(RevoluteJoint(hinge, PointRef(a, LAST_END), PointRef(b, FIRST_END)))
+            stiffness = _stiffness(body, (i + 0.5) * length, (i + 1.5) * length)
             springs.append(TorsionalSpring(hinge, hinge, stiffness))
+            if lag:
+                dampers.append(TorsionalDamper(hinge, hinge, lag * stiffness))
         places |= {(body.name, point): names[i] for point, i in owners.items()}
 
     def moved(ref: PointRef) -> PointRef:
@@ -102,17 +111,37 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         bodies=tuple(bodies),
         joints=(*(replace(joint, a=moved(joint.a), b=moved(joint.b)) for joint in mechanism.joints), *joints),
         springs=(*mechanism.springs, *springs),
+        dampers=(*mechanism.dampers, *dampers),
         linear_springs=tuple(
             replace(spring, a=moved(spring.a), b=moved(spring.b)) for spring in mechanism.linear_springs
         ),
         loads=tuple(replace(load, point=moved(load.point)) for load in mechanism.loads),
         end_effector=None if effector is None else replace(effector, point=moved(effector.point)),
-        assemblies=tuple(
-            replace(assembly, angles={name: assembly.angles[carrier] for name, (carrier, _) in carriers.items()})
-            for assembly in mechanism.assemblies
-        ),
+        assemblies=tuple(_assembly(mechanism, assembly, carriers) for assembly in mechanism.assemblies),
     )
     return Segmented(segmented, carriers)
+
+
+def check_segmentable(mechanism: Mechanism) -> None:
+    """Nothing, if every flexible body can be cut into segments.
+
+    Raises
+    ------
+    InputError
+        A flexible body of given shapes cannot.
+    """
+    for name in given_shapes(mechanism.bodies):
+        raise InputError(
+            "a body of given shapes cannot be cut into segments",
+            field=f"body.{name}",
+            remedy='make it a flexible beam (type = "beam") or rigid, or leave out finite segments',
+        )
+
+
+def _assembly(mechanism: Mechanism, assembly: Assembly, carriers: Mapping[str, tuple[str, float]]) -> Assembly:
+    """Segments lie as their beams do; angles that follow from points follow before beams are cut."""
+    poses = approximate_poses(mechanism, assembly)
+    return replace(assembly, angles={name: poses[carrier].angle for name, (carrier, _) in carriers.items()}, points={})
 
 
 def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, int]:
@@ -128,16 +157,47 @@ def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, in
     return counts
 
 
+def _stiffness_damping(beam: FlexibleBeam) -> float:
+    """Coefficient of stiffness-proportional damping [s]: all that hinges can have."""
+    if beam.damping is None:
+        return 0.0
+    if isinstance(beam.damping, RayleighDamping) and beam.damping.mass == 0.0:
+        return beam.damping.stiffness
+    raise InputError(
+        "finite segments can be damped in proportion to stiffness only",
+        field=f"body.{beam.name}.damping",
+        value=beam.damping,
+        remedy="give damping = { stiffness = ... }, or none",
+    )
+
+
+def _pieces(beam: FlexibleBeam, start: float, end: float) -> list[tuple[float, float, SpanProperties]]:
+    """Pieces of a beam between two places, each of one span: where it starts and ends [m], and what it is made of."""
+    pieces = []
+    for (a, b), span in zip(pairwise(beam.mesh.knots.tolist()), beam.spans, strict=True):
+        if min(b, end) > max(a, start):
+            pieces.append((max(a, start), min(b, end), span))
+    return pieces
+
+
+def _stiffness(beam: FlexibleBeam, start: float, end: float) -> float:
+    """Of the spring that bends as the beam does between two places: its pieces are springs in series [N m/rad]."""
+    return 1.0 / sum((b - a) / span.bending_stiffness for a, b, span in _pieces(beam, start, end))
+
+
 def _segment(beam: FlexibleBeam, name: str, i: int, length: float, owners: Mapping[str, int]) -> RigidBody:
     """Segment i: its part of the bar and the lumps on it, about their common centre of mass."""
-    bar = beam.material.density * beam.section.area * length
-    parts = [(bar, 0.5 * length, bar * length**2 / 12.0)]
+    start = i * length
+    parts = []
+    for a, b, span in _pieces(beam, start, start + length):
+        bar = span.mass_per_length * (b - a)
+        parts.append((bar, 0.5 * (a + b) - start, bar * (b - a) ** 2 / 12.0))
     for lump in beam.lumps:
         if owners[lump.point] == i:
-            parts.append((lump.mass, beam.points[lump.point] - i * length, lump.inertia))
+            parts.append((lump.mass, beam.points[lump.point] - start, lump.inertia))
     mass = sum(m for m, _, _ in parts)
     centre = sum(m * x for m, x, _ in parts) / mass
-    points = {point: (beam.points[point] - i * length, 0.0) for point, owner in owners.items() if owner == i}
+    points = {point: (beam.points[point] - start, 0.0) for point, owner in owners.items() if owner == i}
     return RigidBody(
         name=name,
         mass=mass,

@@ -8,10 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import Marker, System
-from paraflex.fem import node_weights
-from paraflex.fem.element import AXIAL, SLOPE, TRANSVERSE
-from paraflex.mechanism import PointRef
+from paraflex.dynamics import Marker, System, axis_angle, end_markers
+from paraflex.mechanism import PointRef, PrismaticJoint, SlidingJoint, SlotJoint
 
 
 class PointMotion(NamedTuple):
@@ -60,26 +58,43 @@ def marker_motion(
     )
 
 
-def joint_forces(system: System, names: Sequence[str], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Forces (k, joints, 2) of joints by name on their second bodies in the ground frame [N]."""
-    rows = [[system.rows.index(f"{name} {axis}") for axis in ("x", "y")] for name in names]
-    # Phi = p_b - p_a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
-    return -multipliers[:, np.array(rows, dtype=int).reshape(-1, 2)]
+def joint_forces(
+    system: System, names: Sequence[str], q: NDArray[np.float64], multipliers: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Forces (k, joints, 2) of joints by name on their second bodies in the ground frame [N].
+
+    Those of a prismatic joint or slot are normal to its axis; those of a sliding joint are told by their part normal to
+    the beam's unbent axis.
+    """
+    row = {label: i for i, label in enumerate(system.rows)}
+    forces = np.zeros((len(q), len(names), 2))
+    for i, name in enumerate(names):
+        joint = system.mechanism.joint(name)
+        # Phi is of b less of a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
+        if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+            along = axis_angle(system, joint, q)
+            normal = np.column_stack([-np.sin(along), np.cos(along)])
+            forces[:, i] = -multipliers[:, row[f"{name} normal"], None] * normal
+        else:
+            forces[:, i] = -multipliers[:, [row[f"{name} x"], row[f"{name} y"]]]
+    return forces
 
 
 def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Axial [m] and transverse [m] displacement and slope [rad] of a beam's last node in its body frame: (k, 3).
+    """Axial [m] and transverse [m] displacement and slope [rad] of a beam's last end in its body frame: (k, 3).
 
     Zero for a body without flexible coordinates. The axial displacement is the stretch, less the shortening by bending
-    where the geometry is of second order.
+    where the geometry is of second order. Of a modal body, displacements along x and y and turn of its last point; NaN
+    where it has no two points apart.
     """
     body = system.body(name)
     if body.nf == 0:
         return np.zeros((q.shape[0], 3))
-    u = q[:, body.flexible]
-    assert body.mesh is not None
-    tip = u @ body.integrals.D[[body.mesh.column(-1, k) for k in (AXIAL, TRANSVERSE, SLOPE)]].T
-    if body.points is not None:
-        bending = body.points.bending(node_weights(body.mesh, body.mesh.n_elements))
-        tip[:, 0] -= 0.5 * np.sum(u * (u @ bending), axis=1)
+    ends = end_markers(system.index[name], body)
+    if not ends:
+        return np.full((q.shape[0], 3), np.nan)
+    u, last = q[:, body.flexible], ends[-1]
+    tip = u @ np.vstack([last.N, last.slope]).T
+    if last.bending is not None:
+        tip[:, 0] -= 0.5 * np.sum(u * (u @ last.bending), axis=1)
     return tip

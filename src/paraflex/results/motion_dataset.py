@@ -64,7 +64,7 @@ def motion_dataset(
         "tip_slope": (("body",), tips[:, :, 2]),
         "point_position": (("point", "axis"), _stacked([motion.position for motion in motions], len(q))),
         "point_velocity": (("point", "axis"), _stacked([motion.velocity for motion in motions], len(q))),
-        "joint_force": (("joint", "axis"), joint_forces(system, joints, solution.multipliers)),
+        "joint_force": (("joint", "axis"), joint_forces(system, joints, q, solution.multipliers)),
         "multiplier": (("row",), solution.multipliers),
         "kinetic_energy": ((), solution.kinetic_energy),
         "strain_energy": ((), solution.strain_energy),

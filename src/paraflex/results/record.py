@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import System, node_marker
-from paraflex.mechanism import FIRST_END, LAST_END, FlexibleBeam, PointRef
+from paraflex.dynamics import Marker, System, end_markers
+from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.motion import PointMotion, joint_forces, marker_motion, point_motion, tip_deflection
 from paraflex.simulate import TrackingRun, TrackingTask
 
@@ -52,10 +52,11 @@ class Record:
     angle, rate, acceleration : (k, bodies) arrays
         Of the body frames; in a model without them the tangent at a beam's first end [rad, rad/s, rad/s^2].
     chord, chord_rate : (k, bodies) arrays
-        Of the line from a beam's first end to its last, which no choice of frame touches; a rigid body's angle
-        [rad, rad/s].
+        Of the line from a beam's first end to its last, which no choice of frame touches; of a modal body's first
+        point to its last, less its angle undeformed; a rigid body's angle [rad, rad/s].
     tip : (k, bodies, 3) array
-        Axial, transverse displacement and slope of a beam's last end in its body frame [m, m, rad].
+        Axial, transverse displacement and slope of a beam's last end (a modal body's last point) in its body frame
+        [m, m, rad].
     points : (k, points, 2) array
         Positions [m].
     joint_force : (k, joints, 2) array
@@ -115,7 +116,7 @@ def record(run: TrackingRun) -> Record:
         chord_rate=np.stack([rate for _, rate in chords], axis=1),
         tip=np.stack([_tip(system, names, q) for names in parts], axis=1),
         points=np.stack(points, axis=1) if points else np.zeros((q.shape[0], 0, 2)),
-        joint_force=joint_forces(system, [joint.name for joint in whole.mechanism.joints], solution.multipliers),
+        joint_force=joint_forces(system, [joint.name for joint in whole.mechanism.joints], q, solution.multipliers),
         kinetic_energy=solution.kinetic_energy,
         strain_energy=solution.strain_energy,
         work=solution.work,
@@ -139,30 +140,32 @@ def _owner(task: TrackingTask, names: list[str], point: str) -> str:
 
 def _ends(system: System, names: list[str], q: NDArray[np.float64], v: NDArray[np.float64]) -> list[PointMotion]:
     """Motion of the first and last end of a beam, or of what it was cut into."""
-    out = []
-    for name, node, segment_end in ((names[0], 0, FIRST_END), (names[-1], -1, LAST_END)):
-        body = system.body(name)
-        if body.mesh is None:
-            marker = system.marker(PointRef(name, segment_end))
-        else:
-            marker = node_marker(system.index[name], body, node % body.mesh.nodes.size)
-        out.append(marker_motion(system, marker, q, v, np.zeros_like(q)))
-    return out
+    return [marker_motion(system, marker, q, v, np.zeros_like(q)) for marker in _end_markers(system, names)]
 
 
-def _is_beam(system: System, names: list[str]) -> bool:
-    return len(names) > 1 or isinstance(system.mechanism.body(names[0]), FlexibleBeam)
+def _end_markers(system: System, names: list[str]) -> tuple[Marker, ...]:
+    """First and last end of a body, or of what it was cut into; none of what has no ends."""
+    if len(names) == 1:
+        return end_markers(system.index[names[0]], system.body(names[0]))
+    return system.marker(PointRef(names[0], FIRST_END)), system.marker(PointRef(names[-1], LAST_END))
 
 
 def _chord(
     system: System, names: list[str], q: NDArray[np.float64], v: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Angle and rate of the line from a beam's first end to its last; a rigid body's own."""
-    angle = system.body(names[0]).angle
-    if not _is_beam(system, names):
+    """Angle and rate of the line from a beam's first end to its last; a rigid body's own.
+
+    Less the line's angle in the undeformed body, which is zero of a beam.
+    """
+    angle, ends = system.body(names[0]).angle, _end_markers(system, names)
+    if not ends:
         return q[:, angle], v[:, angle]
     first, last = _ends(system, names, q, v)
-    return line_angle(last.position - first.position, last.velocity - first.velocity, q[:, angle])
+    x, y = ends[1].x0 - ends[0].x0
+    offset = np.arctan2(y, x)
+    line, rate = last.position - first.position, last.velocity - first.velocity
+    chord, chord_rate = line_angle(line, rate, q[:, angle] + offset)
+    return chord - offset, chord_rate
 
 
 def line_angle(

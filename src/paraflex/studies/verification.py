@@ -15,7 +15,14 @@ from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
 from paraflex.errors import InputError, IntegrationError, NumericalError, suggestion
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
+from paraflex.mechanism import (
+    ActuationMode,
+    Geometry,
+    Mechanism,
+    check_segmentable,
+    given_shapes,
+    proportional_segments,
+)
 from paraflex.results import tracking_dataset
 from paraflex.results.record import Record, record
 from paraflex.simulate import TrackingTask, simulate
@@ -170,7 +177,11 @@ def verify(
         check_model(name, task.mechanism)
     chosen = list(dict.fromkeys(task.mode(mode) for mode in modes))
     plan = [
-        (mode, name, level) for mode in chosen for name in models for level in Refinement if _has_meaning(name, level)
+        (mode, name, level)
+        for mode in chosen
+        for name in models
+        for level in Refinement
+        if _has_meaning(name, level, task.mechanism)
     ]
     runs: dict[str, dict[str, ModelRuns]] = {mode.name: {} for mode in chosen}
     for number, (mode, name, level) in enumerate(plan):
@@ -238,10 +249,12 @@ def check_model(name: str, mechanism: Mechanism) -> None:
     """
     if name not in FIDELITIES + ENGINES:
         raise InputError("unknown model", field="model", value=name, remedy=suggestion(name, FIDELITIES + ENGINES))
+    if name == "segments":
+        check_segmentable(mechanism)
     if name in ENGINES:
         check_engine(name, mechanism)
 
 
-def _has_meaning(name: str, level: Refinement) -> bool:
-    """A rigid mechanism has no mesh; MuJoCo's is that of our own segments, run by our own kernels."""
-    return level is not Refinement.MESH or name not in ("rigid", "mujoco")
+def _has_meaning(name: str, level: Refinement, mechanism: Mechanism) -> bool:
+    """Rigid bodies and given shapes have no mesh; MuJoCo's is that of our own segments, run by our own kernels."""
+    return level is not Refinement.MESH or not (name in ("rigid", "mujoco") or given_shapes(mechanism.bodies))

@@ -1,0 +1,106 @@
+"""What a joint's motor turns or moves: the angle of a revolute joint, the travel of a prismatic joint or slot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
+from paraflex.dynamics.system import System
+from paraflex.mechanism import PointRef, PrismaticJoint, SlidingJoint, SlotJoint
+
+
+class JointCoordinate(NamedTuple):
+    """A joint's coordinate over time [rad, m], (k,), its rate, and its derivative by all coordinates, (k, n)."""
+
+    value: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    rows: NDArray[np.float64]
+
+
+def joint_coordinate(
+    system: System, name: str, q: NDArray[np.float64], v: NDArray[np.float64] | None = None
+) -> JointCoordinate:
+    """The coordinate of a joint for coordinates (k, n) and velocities (k, n); at rest without these.
+
+    Slopes of beams are included. Angle: that of body b less that of body a. Travel: e . (p_b - p_a), e the axis.
+    """
+    joint = system.mechanism.joint(name)
+    v = np.zeros_like(q) if v is None else v
+    if not isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+        value_a, rows_a = _angle(system, joint.a, q)
+        value_b, rows_b = _angle(system, joint.b, q)
+        rows = rows_b - rows_a
+        return JointCoordinate(value_b - value_a, np.sum(rows * v, axis=1), rows)
+    carrier = axis_marker(system, joint)
+    theta, turn = _marker_angle(system, carrier, q)
+    theta = theta + axis_direction(joint)
+    e = np.column_stack([np.cos(theta), np.sin(theta)])
+    (pa, rows_a), (pb, rows_b) = _place(system, carrier, q), _place(system, system.marker(joint.b), q)
+    d = pb - pa
+    lever = e[:, 0] * d[:, 1] - e[:, 1] * d[:, 0]
+    rows = np.einsum("ki,kij->kj", e, rows_b - rows_a) + lever[:, None] * turn
+    return JointCoordinate(np.sum(e * d, axis=1), np.sum(rows * v, axis=1), rows)
+
+
+def axis_marker(system: System, joint: PrismaticJoint | SlotJoint | SlidingJoint) -> Marker:
+    """What carries a joint's axis: the material at point a, of a sliding joint the body's frame there."""
+    marker = system.marker(joint.a)
+    if isinstance(joint, SlidingJoint):
+        still = np.zeros_like(marker.N)
+        return replace(marker, N=still, slope=still[0], bending=None)
+    return marker
+
+
+def axis_direction(joint: PrismaticJoint | SlotJoint | SlidingJoint) -> float:
+    """Of a joint's axis against what carries it [rad]."""
+    return 0.0 if isinstance(joint, SlidingJoint) else joint.direction
+
+
+def axis_angle(
+    system: System, joint: PrismaticJoint | SlotJoint | SlidingJoint, q: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Angle (k,) of a joint's axis in the ground frame [rad]."""
+    return _marker_angle(system, axis_marker(system, joint), q)[0] + axis_direction(joint)
+
+
+def _angle(system: System, ref: PointRef, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Angle of the material at a point (k,), and its derivative (k, n)."""
+    return _marker_angle(system, system.marker(ref), q)
+
+
+def _marker_angle(
+    system: System, marker: Marker, q: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    rows = np.zeros(q.shape)
+    if marker.body == GROUND_INDEX:
+        return np.zeros(q.shape[0]), rows
+    body = system.bodies[marker.body]
+    rows[:, body.angle] = 1.0
+    rows[:, body.flexible] = marker.slope
+    return np.sum(rows * q, axis=1), rows
+
+
+def _place(system: System, marker: Marker, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position (k, 2) of a material point in the ground frame, and its derivative (k, 2, n): [1, R E s, R ds/du]."""
+    rows = np.zeros((q.shape[0], 2, q.shape[1]))
+    if marker.body == GROUND_INDEX:
+        return np.broadcast_to(marker.x0, (q.shape[0], 2)), rows
+    body = system.bodies[marker.body]
+    c, s = np.cos(q[:, body.angle]), np.sin(q[:, body.angle])
+    R = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
+    u = q[:, body.flexible]
+    local = marker.x0 + u @ marker.N.T
+    shape = np.broadcast_to(marker.N, (q.shape[0], *marker.N.shape)).copy()
+    if marker.bending is not None:
+        bent = u @ marker.bending
+        local[:, 0] -= 0.5 * np.sum(u * bent, axis=1)
+        shape[:, 0] -= bent
+    arm = np.einsum("kij,kj->ki", R, local)
+    rows[:, 0, body.offset] = rows[:, 1, body.offset + 1] = 1.0
+    rows[:, 0, body.angle], rows[:, 1, body.angle] = -arm[:, 1], arm[:, 0]
+    rows[:, :, body.flexible] = R @ shape
+    return q[:, body.position] + arm, rows

@@ -1,0 +1,97 @@
+"""What a body is made of, whatever kind it is: shape integrals and material points in its own coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.fem import BeamMesh, Lump, ShapeIntegrals, beam_integrals, rigid_integrals
+from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam, ModalBody, RigidBody
+
+Array = NDArray[np.float64]
+
+
+class PointShape(NamedTuple):
+    """A material point: its place in the undeformed body (2,) and shape rows (2, own), (own,) of own coordinates."""
+
+    x0: Array
+    N: Array
+    slope: Array
+
+
+@dataclass(frozen=True)
+class BodyShape:
+    """A body in its own coordinates, to which the D of its integrals leads.
+
+    Attributes
+    ----------
+    integrals : ShapeIntegrals
+    mesh : BeamMesh or None
+        Of a flexible beam, whose named points are nodes.
+    points : mapping of str to PointShape
+        Named points of any other body.
+    ends : tuple of PointShape
+        First and last end of what has such but no mesh, else none.
+    slopes : (k, own) array
+        Slope rows at places along the body that tell how far it bends.
+    """
+
+    integrals: ShapeIntegrals
+    mesh: BeamMesh | None = None
+    points: Mapping[str, PointShape] = field(default_factory=dict)
+    ends: tuple[PointShape, ...] = ()
+    slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def body_shape(body: Body) -> BodyShape:
+    """Integrals and points of a body.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A mass matrix that is not positive definite.
+    """
+    if isinstance(body, RigidBody):
+        points = {
+            name: PointShape(np.array(place, dtype=float), np.zeros((2, 0)), np.zeros(0))
+            for name, place in body.points.items()
+        }
+        return BodyShape(rigid_integrals(body.mass, body.centre_of_mass, body.inertia), points=points)
+    if isinstance(body, AssumedModesBeam):
+        return _assumed(body)
+    if isinstance(body, ModalBody):
+        return _modal(body)
+    mesh = body.mesh
+    slopes = np.eye(mesh.n_nodal)[[mesh.slope_column(node) for node in range(mesh.nodes.size)]]
+    return BodyShape(beam_integrals(mesh, body.spans, beam_lumps(body), body.reference), mesh, slopes=slopes)
+
+
+def beam_lumps(beam: FlexibleBeam) -> list[Lump]:
+    """Lumps of a beam at its nodes."""
+    points = beam.mesh.points
+    return [Lump(points[lump.point], lump.mass, lump.inertia) for lump in beam.lumps]
+
+
+def _assumed(bar: AssumedModesBeam) -> BodyShape:
+    shapes = bar.shapes
+
+    def at(x: float) -> PointShape:
+        return PointShape(np.array([x, 0.0]), *shapes.shape_at(x))
+
+    ends = at(0.0), at(bar.length)
+    inner = [at(x) for x in shapes.quadrature()[0].tolist()]
+    points = {name: at(x) for name, x in bar.points.items()}
+    slopes = np.array([point.slope for point in (ends[0], *inner, ends[1])])
+    return BodyShape(bar.integrals, points=points, ends=ends, slopes=slopes)
+
+
+def _modal(body: ModalBody) -> BodyShape:
+    points = {name: PointShape(*body.point(name)) for name in body.points}
+    listed = tuple(points.values())
+    slopes = np.array([point.slope for point in listed]).reshape(-1, body.n_flexible)
+    ends = (listed[0], listed[-1]) if listed and np.any(listed[0].x0 != listed[-1].x0) else ()
+    return BodyShape(body.integrals, points=points, ends=ends, slopes=slopes)

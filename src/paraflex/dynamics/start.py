@@ -1,0 +1,360 @@
+"""A start as the user describes it, by names: deflections, velocities, or all coordinates of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics.coordinates import BodyCoordinates
+from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.state import State, mass_matrix, reference_pose
+from paraflex.dynamics.system import System
+from paraflex.errors import InputError, suggestion
+from paraflex.kernel.packed import Signals
+from paraflex.mechanism import Assembly, Mechanism, PointRef, RigidBody
+
+_MAX_ITERATIONS = 50
+# What closes no further is closed [m, rad].
+_CLOSED = 1e-12
+# What joints may be open by at a start that is given [m, rad], and velocities by, as a fraction of them.
+_GAP = 1e-6
+_SLIP = 1e-6
+# Given deflections of one beam may contradict each other by this fraction of them.
+_SAME = 1e-9
+# Weight of stiffness against mass [s^2]: links move and do not begin to bend, unless they must.
+_POSITION_STIFFNESS, _VELOCITY_STIFFNESS = 1.0, 1e3
+
+
+@dataclass(frozen=True)
+class Deflection:
+    """How far a point of a beam is off its place in the body frame; None leaves it to the others.
+
+    Attributes
+    ----------
+    axial, transverse : float, optional
+        Stretch and displacement across [m]; what bending takes from the length comes on top in second-order geometry.
+    slope : float, optional
+        [rad]
+    """
+
+    axial: float | None = None
+    transverse: float | None = None
+    slope: float | None = None
+
+
+@dataclass(frozen=True)
+class BodyValues:
+    """All coordinates of a body, or their rates.
+
+    Attributes
+    ----------
+    x, y, phi : float
+        Of the body frame [m, rad], or [m/s, rad/s].
+    flexible : tuple of float, optional
+        Its own flexible coordinates: those its reference condition leaves of the nodes', `modes.vectors @ eta` of the
+        modal ones. Zeros where None.
+    """
+
+    x: float
+    y: float
+    phi: float
+    flexible: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Start:
+    """What is known of the start of a motion.
+
+    Attributes
+    ----------
+    deflection : mapping of str to mapping of str to Deflection
+        Of points, by body and point: the shape is that of least elastic energy.
+    angular : mapping of str to float
+        Rates of bodies' angles [rad/s].
+    point : mapping of PointRef to (x, y)
+        Velocities of points in the ground frame [m/s]. What these and the joints leave open has least kinetic energy,
+        with links that do not begin to bend.
+    coordinates, rates : mapping of str to BodyValues
+        Taken as they are.
+    """
+
+    deflection: Mapping[str, Mapping[str, Deflection]] = field(default_factory=dict)
+    angular: Mapping[str, float] = field(default_factory=dict)
+    point: Mapping[PointRef, tuple[float, float]] = field(default_factory=dict)
+    coordinates: Mapping[str, BodyValues] = field(default_factory=dict)
+    rates: Mapping[str, BodyValues] = field(default_factory=dict)
+
+    @property
+    def places(self) -> bool:
+        """Whether it says anything of coordinates, and not of velocities alone."""
+        return bool(self.deflection or self.coordinates)
+
+
+def check_start(mechanism: Mechanism, start: Start) -> None:
+    """Nothing, if a start speaks of bodies and points that exist, and says each thing once.
+
+    Raises
+    ------
+    InputError
+        It names the field under "start".
+    """
+    bodies = {body.name: body for body in mechanism.bodies}
+    for table in ("deflection", "velocity.angular", "coordinates", "rates"):
+        for name in getattr(start, table.rpartition(".")[2]):
+            _known(name, bodies, f"start.{table}", "body")
+    for name, points in start.deflection.items():
+        where = f"start.deflection.{name}"
+        if isinstance(bodies[name], RigidBody) or not getattr(bodies[name], "flexible", True):
+            raise InputError("a rigid body has no deflection", field=where, remedy="name a flexible beam")
+        if name in start.coordinates:
+            raise InputError("its coordinates are given", field=where, remedy="give one of deflection and coordinates")
+        for point in points:
+            _known(point, bodies[name].points, where, "point")
+    for ref in start.point:
+        _known(ref.body, bodies, "start.velocity.point", "body")
+        _known(ref.point, bodies[ref.body].points, "start.velocity.point", "point")
+    if start.rates and (start.angular or start.point):
+        raise InputError("given beside velocities", field="start.rates", remedy="give one of rates and velocity")
+
+
+def start_state(
+    system: System,
+    start: Start,
+    assembly: Assembly | None = None,
+    *,
+    q: NDArray[np.float64] | None = None,
+    time: float = 0.0,
+) -> State:
+    """The state a start describes; bodies it does not place come from an assembly, joints closed.
+
+    Parameters
+    ----------
+    system : System
+    start : Start
+    assembly : Assembly, optional
+        Not needed where the coordinates of every body are given.
+    q : (n,) array, optional
+        Coordinates from elsewhere, of a static equilibrium say: then the start gives velocities only.
+    time : float
+        [s], for prescribed laws.
+
+    Raises
+    ------
+    InputError
+        See `check_start`; coordinates at which joints are open, or velocities they do not allow, with the residual.
+    """
+    check_start(system.mechanism, start)
+    signals = moment_signals(system.mechanism, time)
+    if q is None:
+        q = _coordinates(system, signals, start, assembly, time)
+    return State(time, q, _velocities(system, signals, start, time, q))
+
+
+def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> NDArray[np.float64]:
+    """Modal coordinates (nf,) of a beam of least elastic energy at given deflections of its points.
+
+    Raises
+    ------
+    InputError
+        Deflections that the body frame does not allow or that contradict each other.
+    """
+    body = system.body(name)
+    rows, values, fields = [], [], []
+    for point, deflection in points.items():
+        marker = system.marker(PointRef(name, point))
+        for what, row in (("axial", marker.N[0]), ("transverse", marker.N[1]), ("slope", marker.slope)):
+            value = getattr(deflection, what)
+            if value is not None:
+                rows.append(row)
+                values.append(value)
+                fields.append(f"{point}.{what}")
+    if not rows:
+        return np.zeros(body.nf)
+    C, d = np.array(rows), np.array(values)
+    compliant = C.T / body.modes.omega[:, None] ** 2
+    # Rows of one length: displacements and slopes differ in size.
+    size = 1.0 / np.sqrt(np.maximum(np.sum(C * compliant.T, axis=1), np.finfo(float).tiny))
+    force = size * np.linalg.lstsq((C @ compliant) * size * size[:, None], d * size, rcond=1e-12)[0]
+    u = compliant @ force
+    left = C @ u - d
+    worst = int(np.argmax(np.abs(left)))
+    if abs(left[worst]) > _SAME * np.max(np.abs(d), initial=0.0):
+        raise InputError(
+            f"the body frame or the other deflections do not allow it: {abs(left[worst]):.3g} is left",
+            field=f"start.deflection.{name}.{fields[worst]}", value=values[worst],
+            remedy="displacements count from the body frame: see the beam's reference",
+        )  # fmt: skip
+    return u
+
+
+def point_rows(system: System, q: NDArray[np.float64], ref: PointRef) -> NDArray[np.float64]:
+    """Rows (2, n) that take velocities of the coordinates to the velocity of a point of a body at q."""
+    marker = system.marker(ref)
+    body = system.bodies[marker.body]
+    u = q[body.flexible]
+    c, s = np.cos(q[body.angle]), np.sin(q[body.angle])
+    R = np.array([[c, -s], [s, c]])
+    x, y = marker.place(u)
+    shape = marker.N.copy()
+    if marker.bending is not None:
+        shape[0] -= marker.bending @ u
+    rows = np.zeros((2, system.n))
+    rows[:, body.position] = np.eye(2)
+    rows[:, body.angle] = R @ [-y, x]
+    rows[:, body.flexible] = R @ shape
+    return rows
+
+
+def _coordinates(
+    system: System, signals: Signals, start: Start, assembly: Assembly | None, time: float
+) -> NDArray[np.float64]:
+    if set(start.coordinates) == set(system.index):
+        q = np.zeros(system.n)
+    elif assembly is None:
+        missing = next(name for name in system.index if name not in start.coordinates)
+        raise InputError(
+            "no coordinates of a body, and no assembly to take them from", field="start.coordinates", value=missing,
+            remedy="give them, or an [assembly.NAME] table",
+        )  # fmt: skip
+    else:
+        q = reference_pose(system, assembly)
+    held = np.zeros(system.n, dtype=bool)
+    for name, values in start.coordinates.items():
+        body = system.body(name)
+        q[body.all] = _all_values(body, values, f"start.coordinates.{name}")
+        held[body.all] = True
+    for name, points in start.deflection.items():
+        body = system.body(name)
+        q[body.flexible] = static_shape(system, name, points)
+        held[body.flexible] = True
+    return _closed(system, signals, time, q, held)
+
+
+def _closed(
+    system: System, signals: Signals, time: float, q: NDArray[np.float64], held: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Joints closed by the least change of the coordinates that are not held."""
+    free, still, q = ~held, np.zeros(system.n), q.copy()
+    phi, _ = system.constraints(signals, time, q, still)
+    for _ in range(_MAX_ITERATIONS):
+        if not np.any(free) or np.max(np.abs(phi), initial=0.0) < _CLOSED:
+            break
+        metric = _metric(system, q, _POSITION_STIFFNESS)[np.ix_(free, free)]
+        q[free] -= _least(metric, system.jacobian(q)[:, free], phi)
+        phi, _ = system.constraints(signals, time, q, still)
+    gap = np.max(np.abs(phi), initial=0.0)
+    if gap > _GAP:
+        raise InputError(
+            f"the joints do not close at this start: a gap of {gap:.3g} remains in "
+            f"{system.rows[int(np.argmax(np.abs(phi)))]}",
+            field="start.coordinates" if np.all(held) or not np.any(held) else "start",
+            remedy=f"give coordinates at which they close to {_GAP:g} m or rad, or leave more open",
+        )
+    return q
+
+
+def _velocities(
+    system: System, signals: Signals, start: Start, time: float, q: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    _, rate = system.constraints(signals, time, q, np.zeros(system.n))
+    given = _given_velocities(system, start, q)
+    C = np.vstack([system.jacobian(q), *(entry.row for entry in given)])
+    wanted = np.concatenate([-rate, [entry.value for entry in given]])
+    if set(start.rates) == set(system.index):
+        v = np.zeros(system.n)
+        for name, values in start.rates.items():
+            body = system.body(name)
+            v[body.all] = _all_values(body, values, f"start.rates.{name}")
+    else:
+        metric = _metric(system, q, _VELOCITY_STIFFNESS)
+        v = _least(metric, C, wanted)
+        # Stiffness and mass lie many powers of ten apart: what rounding left is taken away.
+        v += _least(metric, C, wanted - C @ v)
+    slip = np.abs(C @ v - wanted)
+    # Metres and radians a second beside those of the terms a row adds up.
+    size = np.maximum(np.abs(C) @ np.abs(v), np.abs(wanted))
+    bad = slip > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SLIP)
+    if np.any(bad):
+        _refuse_velocities(system, given, slip, bad)
+    return v
+
+
+class _Given(NamedTuple):
+    """One number of a start's velocities: its row of the coordinates' velocities, its value, where it stands."""
+
+    row: NDArray[np.float64]
+    value: float
+    field: str
+
+
+def _given_velocities(system: System, start: Start, q: NDArray[np.float64]) -> list[_Given]:
+    unit = np.eye(system.n) if start.angular or start.rates else np.zeros((0, 0))
+    given = [
+        _Given(unit[system.body(name).angle], rate, f"start.velocity.angular.{name}")
+        for name, rate in start.angular.items()
+    ]
+    for ref, velocity in start.point.items():
+        rows = point_rows(system, q, ref)
+        given += [_Given(rows[k], velocity[k], f"start.velocity.point.{ref}") for k in range(2)]
+    for name, values in start.rates.items():
+        body, field = system.body(name), f"start.rates.{name}"
+        given += [_Given(unit[body.offset + k], rate, field) for k, rate in enumerate(_all_values(body, values, field))]
+    return given
+
+
+def _refuse_velocities(system: System, given: list[_Given], slip: NDArray[np.float64], bad: NDArray[np.bool_]) -> None:
+    worst = int(np.argmax(np.where(bad, slip, 0.0)))
+    where = system.rows[worst] if worst < system.m else "what is given"
+    of_given = slip[system.m :]
+    entry = given[int(np.argmax(of_given))] if given else None
+    raise InputError(
+        f"joints, prescribed laws and given velocities contradict each other by {slip[worst]:.3g} m/s or rad/s in "
+        f"{where}",
+        field="start" if entry is None else entry.field,
+        value=None if entry is None else entry.value,
+        remedy="give fewer velocities, or such as the joints allow",
+    )
+
+
+def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> NDArray[np.float64]:
+    """A body's coordinates as they stand in q, or their rates."""
+    frame = [values.x, values.y, values.phi]
+    if values.flexible is None:
+        return np.concatenate([frame, np.zeros(body.nf)])
+    own, count = np.array(values.flexible, dtype=float), body.modes.vectors.shape[0]
+    if own.size != count:
+        raise InputError(
+            f"the body has {count} flexible coordinates", field=f"{field}.flexible", value=len(values.flexible),
+            remedy=f"give {count} numbers, or leave them out for zeros",
+        )  # fmt: skip
+    eta = np.linalg.lstsq(body.modes.vectors, own, rcond=None)[0]
+    missed = np.max(np.abs(body.modes.vectors @ eta - own), initial=0.0)
+    if missed > _GAP * np.max(np.abs(own), initial=0.0):
+        raise InputError(
+            f"the modes kept of the body miss them by {missed:.3g}", field=f"{field}.flexible",
+            remedy="keep all modes, or give a shape of those kept",
+        )  # fmt: skip
+    return np.concatenate([frame, eta])
+
+
+def _metric(system: System, q: NDArray[np.float64], stiffness: float) -> NDArray[np.float64]:
+    metric = mass_matrix(system, q)
+    for body in system.bodies:
+        k = np.arange(body.flexible.start, body.flexible.stop)
+        metric[k, k] += stiffness * body.modes.omega**2
+    return metric
+
+
+def _least(metric: NDArray, C: NDArray, wanted: NDArray) -> NDArray[np.float64]:
+    """The smallest d in a metric with C d = wanted; least squares for dependent rows."""
+    weighted = np.linalg.solve(metric, C.T)
+    return weighted @ np.linalg.lstsq(C @ weighted, wanted, rcond=1e-12)[0]
+
+
+def _known(name: str, known: Iterable[str], field: str, kind: str) -> None:
+    if name not in known:
+        raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))

@@ -1,0 +1,120 @@
+"""Prescribed laws as a file gives them: a constant speed, an expression of t, pieces of them, or a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.files.expressions import ExpressionError, evaluate, evaluate_in_time, is_constant
+from paraflex.files.schema import PieceTable, PrescribedTable
+from paraflex.mechanism import AngleLaw, ConstantSpeed, PiecewiseLaw, TabulatedLaw
+from paraflex.mechanism.laws import Values
+
+# Instants at which a law is tried when it is read.
+_TRIALS = 257
+
+
+@dataclass(frozen=True)
+class ExpressionLaw:
+    """An expression of the time t and of parameters, with its exact derivatives.
+
+    Attributes
+    ----------
+    text : str
+    parameters : mapping of str to float
+    field : str
+        Where it stands, for errors.
+    """
+
+    text: str
+    parameters: Mapping[str, float]
+    field: str = "angle"
+    knots: tuple[float, ...] = ()
+
+    def evaluate(self, t: NDArray[np.float64]) -> Values:
+        """Value, rate and acceleration at times t.
+
+        Raises
+        ------
+        InputError
+            One of them is no finite number at some time.
+        """
+        try:
+            jet = evaluate_in_time(self.text, self.parameters, t)
+        except ExpressionError as error:
+            raise InputError(error.problem, field=self.field, value=self.text, remedy=error.remedy) from None
+        return jet.value, jet.rate, jet.acceleration
+
+
+def read_law(entry: PrescribedTable, parameters: Mapping[str, float], duration: float | None) -> AngleLaw:
+    """The law of a [prescribed.NAME] table; tried where it will be used, as far as the study says.
+
+    Raises
+    ------
+    InputError
+        Not exactly one way of saying it, a speed beside anything but a number, pieces that do not meet, an expression
+        without finite derivatives, or a table that is none or does not cover the study.
+    """
+    given = [name for name in ("angle", "displacement", "pieces", "table") if getattr(entry, name) is not None]
+    if len(given) > 1:
+        raise InputError(
+            "a law is given in one way", field=given[-1], value=", ".join(given), remedy=f"drop all but {given[0]}"
+        )
+    law = _law(entry, parameters)
+    if entry.speed is not None and not isinstance(law, ConstantSpeed):
+        raise InputError(
+            "a speed goes with a constant start only", field="speed", value=entry.speed, remedy="write it into the law"
+        )
+    # A duration that makes no sense is refused with the study.
+    law.evaluate(np.linspace(0.0, duration, _TRIALS) if duration is not None and duration > 0.0 else np.zeros(1))
+    return law
+
+
+def quantities(entry: PrescribedTable) -> set[str]:
+    """Which of "angle" and "displacement" a [prescribed.NAME] table speaks of."""
+    said: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
+    return {name for table in said for name in ("angle", "displacement") if getattr(table, name) is not None}
+
+
+def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
+    if entry.table is not None:
+        times, values = zip(*entry.table, strict=True) if entry.table else ((), ())
+        return TabulatedLaw(times, values)
+    if entry.pieces is not None:
+        return _pieces(entry.pieces, parameters)
+    field = "angle" if entry.displacement is None else "displacement"
+    given = entry.angle if entry.displacement is None else entry.displacement
+    return _expression(0.0 if given is None else given, parameters, field, entry.speed or 0.0)
+
+
+def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseLaw:
+    laws, ends = [], []
+    for number, piece in enumerate(pieces):
+        field = f"pieces.{number}"
+        if (piece.angle is None) == (piece.displacement is None):
+            raise InputError(
+                "a piece has one law", field=field, remedy="give its angle, or its displacement where the joint slides"
+            )
+        if (piece.until is None) != (number == len(pieces) - 1):
+            raise InputError(
+                "every piece but the last has an end", field=f"{field}.until", value=piece.until,
+                remedy="give the time in s at which the next one takes over; the last goes on",
+            )  # fmt: skip
+        name = "angle" if piece.displacement is None else "displacement"
+        given = piece.angle if piece.displacement is None else piece.displacement
+        assert given is not None
+        laws.append(_expression(given, parameters, f"{field}.{name}"))
+        ends += [] if piece.until is None else [piece.until]
+    return PiecewiseLaw(tuple(laws), tuple(ends))
+
+
+def _expression(given: float | str, parameters: Mapping[str, float], field: str, speed: float = 0.0) -> AngleLaw:
+    if not isinstance(given, str):
+        return ConstantSpeed(given, speed)
+    if is_constant(given):
+        return ConstantSpeed(evaluate(given, parameters), speed)
+    return ExpressionLaw(given, parameters, field)

@@ -1,0 +1,83 @@
+"""Rows of two numbers from a text file, such as a motion measured or computed elsewhere."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from paraflex.errors import InputError
+
+# Millions of rows are no motion to prescribe; the file is a wrong one.
+_LARGEST_FILE = 5_000_000
+_SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
+
+
+def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """A model's data with the rows of the files its prescribed tables name in place of the names.
+
+    Parameters
+    ----------
+    data : dict
+        As parsed.
+    folder : Path
+        Where the model file is; names are relative to it.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read or has anything but two columns of numbers below one line of headings.
+    """
+    prescribed = data.get("prescribed")
+    if not isinstance(prescribed, dict):
+        return data
+    read = {
+        name: entry | {"table": _read_rows(folder / entry["table"], entry["table"], f"prescribed.{name}.table")}
+        if isinstance(entry, dict) and isinstance(entry.get("table"), str)
+        else entry
+        for name, entry in prescribed.items()
+    }
+    return data | {"prescribed": read}
+
+
+def _read_rows(path: Path, name: str, field: str) -> list[list[float]]:
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise InputError("too large a file", field=field, value=name, remedy="at most 5 MB of two columns")
+        # Some spreadsheets put a mark before the first line.
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise InputError("not a text file in UTF-8", field=field, value=name, remedy="save it as CSV") from None
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        remedy = "name a file, seen from the model file's folder"
+        raise InputError(f"cannot be read ({reason})", field=field, value=name, remedy=remedy) from None
+    rows: list[list[float]] = []
+    headed = False
+    for number, line in enumerate(lines, start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        row = _numbers(line)
+        if row is None and not rows and not headed and not any(map(_is_number, _SEPARATOR.split(line.strip()))):
+            headed = True
+        elif row is None:
+            raise InputError(
+                f"line {number} of {name} is not two numbers", field=field, value=line.strip(),
+                remedy="give a time in s and a value in every line below the headings",
+            )  # fmt: skip
+        else:
+            rows.append(row)
+    return rows
+
+
+def _numbers(line: str) -> list[float] | None:
+    parts = _SEPARATOR.split(line.strip())
+    return [float(part) for part in parts] if len(parts) == 2 and all(map(_is_number, parts)) else None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,51 @@
+"""A run in stretches between times at which something given jumps: a step that ends there must not see what follows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.kernel.packed import Signals
+
+# A jump smaller than this fraction of the signal is rounding.
+_SMOOTH = 1e-9
+
+
+def jump_times(signals: Signals, n_torques: int, knots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The knots at which a torque jumps, or a prescribed law in its value, rate or acceleration.
+
+    Parameters
+    ----------
+    signals : Signals
+        Torques first, then laws.
+    n_torques : int
+    knots : (k,) array
+        Times to look at [s].
+    """
+    found = [t for t in knots if any(_jumps(signals, k, t, 1 if k < n_torques else 3) for k in range(_count(signals)))]
+    return np.array(found)
+
+
+def hidden_from(signals: Signals, time: float) -> Signals:
+    """The same signals, each going on after a time as it was before."""
+    return signals._replace(breaks=np.where(signals.breaks >= time, np.inf, signals.breaks))
+
+
+def _count(signals: Signals) -> int:
+    return signals.start.size - 1
+
+
+def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
+    first, last = int(signals.start[k]), int(signals.start[k + 1]) - 1
+    breaks = signals.breaks[first:last]
+    piece = int(np.searchsorted(breaks, time, side="right")) - 1
+    if piece < 1 or breaks[piece] != time:
+        return False
+    before = np.polynomial.Polynomial(signals.coefficients[first + piece - 1])
+    after = np.polynomial.Polynomial(signals.coefficients[first + piece])
+    x = time - breaks[piece - 1]
+    for order in range(derivatives):
+        left, right = before.deriv(order)(x), after.deriv(order)(0.0)
+        if abs(right - left) > _SMOOTH * max(abs(left), abs(right), 1.0):
+            return True
+    return False

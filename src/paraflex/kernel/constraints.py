@@ -1,0 +1,110 @@
+"""Constraints of the whole system: their values and Jacobian, and the rates and slopes of what is compliant."""
+
+from __future__ import annotations
+
+from math import cosh
+
+from paraflex.kernel.arrays import fill
+from paraflex.kernel.axes import axis_motion, axis_values, fill_axis_rows
+from paraflex.kernel.compiling import kernel, routine
+from paraflex.kernel.joints import apply_force, apply_torque, marker_angle, marker_motion
+from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION
+from paraflex.kernel.signals import evaluate_signal
+
+# Friction that slides has next to no slope; its compliance is held finite by counting it no flatter than this
+# fraction of the steepest.
+FLATTEST = 1e-9
+
+
+@kernel
+def constraint_values(p, signals, t, q, v, phi, dphi):
+    """Phi and Phi' at (t, q, v), into phi and dphi; zero in rows that are no constraints."""
+    for r in range(p.rows.size):
+        row = p.rows[r]
+        phi[r], dphi[r] = row.ground if row.kind == CONSTRAINT else 0.0, 0.0
+        if row.signal >= 0:
+            value, rate, _ = evaluate_signal(signals, row.signal, t)
+            phi[r] -= value
+            dphi[r] -= rate
+    for k in range(p.ports.size):
+        port = p.ports[k]
+        marker = p.markers[port.marker]
+        r, sign = port.row, port.sign
+        if p.rows[r].kind != CONSTRAINT:
+            continue
+        if port.kind == ANGLE:
+            phi[r] += sign * marker_angle(p, marker, q)
+            dphi[r] += sign * marker_angle(p, marker, v)
+        elif port.kind != AXIS:
+            # The acceleration slot is not used here: v stands in for an array of the right length.
+            px, py, vx, vy, _, _, _, _ = marker_motion(p, marker, q, v, v)
+            phi[r] += sign * px
+            phi[r + 1] += sign * py
+            dphi[r] += sign * vx
+            dphi[r + 1] += sign * vy
+    axis_values(p, q, v, phi, dphi)
+
+
+@kernel
+def fill_jacobian(p, q, jacobian):
+    """Phi_q into a dense (rows, n) array, zero in rows that are no constraints; not for the time loop."""
+    for r in range(p.rows.size):
+        fill(jacobian[r], 0.0)
+    for k in range(p.ports.size):
+        port = p.ports[k]
+        marker = p.markers[port.marker]
+        if p.rows[port.row].kind != CONSTRAINT:
+            continue
+        if port.kind == ANGLE:
+            apply_torque(p, marker, port.sign, jacobian[port.row])
+        elif port.kind != AXIS:
+            _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
+            apply_force(p, marker, q, port.sign, 0.0, rx, ry, jacobian[port.row])
+            apply_force(p, marker, q, 0.0, port.sign, rx, ry, jacobian[port.row + 1])
+    fill_axis_rows(p, q, jacobian)
+
+
+@routine
+def damped(p, r):
+    """Whether row r holds the rate of a joint."""
+    return p.rows[r].kind == DAMPER or p.rows[r].kind == FRICTION
+
+
+@routine
+def joint_rates(p, q, v, rates):
+    """Rates of the joints of dampers and friction into their entries of rates."""
+    for r in range(p.rows.size):
+        if damped(p, r):
+            rates[r] = 0.0
+    for k in range(p.ports.size):
+        port = p.ports[k]
+        if port.kind == ANGLE and damped(p, port.row):
+            rates[port.row] += port.sign * marker_angle(p, p.markers[port.marker], v)
+    for k in range(p.axes.size):
+        row = p.axes[k].row
+        if row >= 0:
+            if damped(p, row):
+                rates[row] = axis_motion(p, k, q, v, v)[1]
+
+
+@routine
+def dissipated_power(p, q, v, lam, rates):
+    """What dampers and friction take; `rates` is scratch (m,)."""
+    power = 0.0
+    joint_rates(p, q, v, rates)
+    for r in range(p.rows.size):
+        if damped(p, r):
+            power += lam[r] * rates[r]
+    return power
+
+
+@kernel
+def note_friction(p, q, v, rates, compliance):
+    """Inverse slopes of friction at the rates in v, for the iteration matrix; `rates` is scratch (m,)."""
+    joint_rates(p, q, v, rates)
+    for r in range(p.rows.size):
+        row = p.rows[r]
+        if row.kind == FRICTION:
+            # d tanh(x) / dx = 1 / cosh^2 x; beyond x = 20 it is below rounding.
+            c = cosh(min(abs(rates[r]) / (row.compliance * row.limit), 20.0))
+            compliance[r] = row.compliance / max(1.0 / (c * c), FLATTEST)

@@ -1,0 +1,128 @@
+"""Checks of one body: numbers that make sense, points on it, shapes that can be integrated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TypeVar
+
+from paraflex.errors import InputError, suggestion
+from paraflex.fem import Polynomial, mesh_beam
+from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam, RigidBody
+from paraflex.mechanism.damping import Damping, ModalDamping, RayleighDamping
+from paraflex.mechanism.modal import ModalBody
+from paraflex.mechanism.quantities import finite, not_negative, positive
+
+T = TypeVar("T")
+
+
+def check_body(body: Body) -> None:
+    """Masses, lengths and stiffnesses are numbers that make sense; lumps sit on points that exist.
+
+    Raises
+    ------
+    InputError
+        The first thing found wrong.
+    """
+    field = f"body.{body.name}"
+    if isinstance(body, RigidBody):
+        positive(body.mass, f"{field}.mass", "kg")
+        positive(body.inertia, f"{field}.inertia", "kg m^2")
+        finite(body.centre_of_mass, f"{field}.centre_of_mass")
+        for name, position in body.points.items():
+            finite(position, f"{field}.points.{name}")
+        return
+    if isinstance(body, ModalBody):
+        _check_modal(body, field)
+        n = body.n_flexible
+    elif isinstance(body, AssumedModesBeam):
+        _check_bar(body, field)
+        _check_shapes(body, field)
+        n = body.n_flexible
+    else:
+        _check_bar(body, field)
+        with _within(field):
+            n = body.mesh.n_flexible
+    check_damping(body.damping, f"{field}.damping")
+    if body.modes is not None and not 1 <= body.modes <= n:
+        raise InputError(
+            "no such number of modes",
+            field=f"{field}.modes",
+            value=body.modes,
+            remedy=f"from 1 to {n}, or leave it out for all",
+        )
+
+
+def check_damping(damping: Damping | None, field: str) -> None:
+    """Coefficients are not negative."""
+    if isinstance(damping, RayleighDamping):
+        not_negative(damping.mass, f"{field}.mass", "1/s")
+        not_negative(damping.stiffness, f"{field}.stiffness", "s")
+    if isinstance(damping, ModalDamping):
+        if not damping.ratios:
+            raise InputError("no damping ratio", field=f"{field}.ratios", value=[], remedy="give one, say [0.01]")
+        for ratio in damping.ratios:
+            not_negative(ratio, f"{field}.ratios", "parts of critical damping, say 0.01")
+
+
+def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
+    """Length, sections, materials, points and lumps."""
+    positive(body.length, f"{field}.length", "m")
+    for where, section in _each(body.section, f"{field}.section"):
+        positive(section.area, f"{where}.area", "m^2")
+        positive(section.second_moment, f"{where}.second_moment", "m^4")
+    for where, material in _each(body.material, f"{field}.material"):
+        positive(material.youngs_modulus, f"{where}.youngs_modulus", "Pa")
+        positive(material.density, f"{where}.density", "kg/m^3")
+    finite(body.points.values(), f"{field}.points")
+    with _within(field):
+        mesh_beam(body.length, body.points, body.elements if isinstance(body, FlexibleBeam) else 1)
+    for lump in body.lumps:
+        if lump.point not in body.points:
+            raise InputError(
+                "a lump on an unknown point",
+                field=f"{field}.lumps",
+                value=lump.point,
+                remedy=suggestion(lump.point, body.points),
+            )
+        not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
+        not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
+
+
+def _each(value: T | tuple[T, ...], field: str) -> Iterator[tuple[str, T]]:
+    """A beam's section or material, or those of its spans, each with its field's name."""
+    if isinstance(value, tuple):
+        yield from ((f"{field}.{k}", each) for k, each in enumerate(value))
+    else:
+        yield field, value
+
+
+def _check_shapes(body: AssumedModesBeam, field: str) -> None:
+    for kind in ("transverse", "axial"):
+        for function in getattr(body, kind):
+            if isinstance(function, Polynomial):
+                if not function.coefficients:
+                    raise InputError("has no coefficients", field=f"{field}.{kind}", remedy="give at least one")
+                finite(function.coefficients, f"{field}.{kind}")
+    with _within(field):
+        _ = body.integrals
+
+
+def _check_modal(body: ModalBody, field: str) -> None:
+    positive(body.mass, f"{field}.mass", "kg")
+    positive(body.inertia, f"{field}.inertia", "kg m^2")
+    with _within(field):
+        _ = body.integrals
+        for name in body.points:
+            body.point(name)
+
+
+@contextmanager
+def _within(field: str) -> Iterator[None]:
+    """Name the body in front of the field an error names."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            error.problem, field=f"{field}.{error.field}", value=error.value, remedy=error.remedy
+        ) from error

@@ -1,0 +1,160 @@
+"""Laws in time that a file can give: constant speed, pieces, a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import scipy.interpolate
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.mechanism.joints import AngleLaw
+
+Values = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+# What a law and its rate may jump by at a knot, as a fraction of their size: rounding of its expressions.
+_SMOOTH = 1e-9
+# A run may end this far beyond a table, as a fraction of it: rounding of times.
+_SAME_TIME = 1e-9
+_DEGREE = 5
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """A start value [rad or m] and a constant speed [rad/s or m/s]."""
+
+    angle: float
+    speed: float
+    knots: tuple[float, ...] = ()
+
+    def evaluate(self, t: NDArray[np.float64]) -> Values:
+        """Value, rate and acceleration at times t."""
+        return self.angle + self.speed * t, np.full_like(t, self.speed), np.zeros_like(t)
+
+
+@dataclass(frozen=True)
+class PiecewiseLaw:
+    """Laws one after the other; their accelerations may jump where one takes over, nothing else may.
+
+    Attributes
+    ----------
+    pieces : tuple of AngleLaw
+        Each a function of the same time.
+    ends : tuple of float
+        Of all pieces but the last, ascending [s].
+
+    Raises
+    ------
+    InputError
+        Ends that do not ascend, or a jump of the law or its rate.
+    """
+
+    pieces: tuple[AngleLaw, ...]
+    ends: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for before, end in pairwise((0.0, *self.ends)):
+            if not end > before:
+                raise InputError(
+                    "the times of pieces must ascend from 0", field="pieces", value=end,
+                    remedy=f"let this one end after t = {before:g} s",
+                )  # fmt: skip
+        for end, (left, right) in zip(self.ends, pairwise(self.pieces), strict=True):
+            at = np.array([end])
+            for what, a, b in zip(("law", "rate"), left.evaluate(at), right.evaluate(at), strict=False):
+                jump = float(b[0] - a[0])
+                if abs(jump) > _SMOOTH * max(1.0, abs(float(a[0]))):
+                    raise InputError(
+                        f"the {what} jumps by {jump:.6g} at t = {end:g} s", field="pieces",
+                        value=f"{float(a[0]):.9g} before, {float(b[0]):.9g} after",
+                        remedy="make value and rate of the pieces meet; t is the same time in all",
+                    )  # fmt: skip
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Where a piece takes over, and the knots of the pieces themselves [s]."""
+        starts, ends = (-np.inf, *self.ends), (*self.ends, np.inf)
+        inner = [k for a, piece, b in zip(starts, self.pieces, ends, strict=True) for k in piece.knots if a < k < b]
+        return tuple(sorted([*self.ends, *inner]))
+
+    def evaluate(self, t: NDArray[np.float64]) -> Values:
+        """Value, rate and acceleration at times t; at a knot those of the later piece."""
+        t = np.asarray(t, dtype=float)
+        which = np.searchsorted(self.ends, t, side="right")
+        out = np.zeros((3, *t.shape))
+        for k, piece in enumerate(self.pieces):
+            here = which == k
+            if np.any(here):
+                out[:, here] = piece.evaluate(t[here])
+        return out[0], out[1], out[2]
+
+
+@dataclass(frozen=True)
+class TabulatedLaw:
+    """A quintic spline through values at times: four continuous derivatives.
+
+    Fewer than six points are passed by the polynomial through them.
+
+    Attributes
+    ----------
+    times : tuple of float
+        Ascending, at least two [s].
+    values : tuple of float
+        [rad or m]
+
+    Raises
+    ------
+    InputError
+        Too few rows, numbers that are not finite, or times that do not ascend.
+    """
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+    knots: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.times) < 2 or len(self.times) != len(self.values):
+            raise InputError(
+                "a table needs two rows", field="table", value=len(self.times), remedy="give at least 2 of [t, value]"
+            )
+        for row in zip(self.times, self.values, strict=True):
+            if not np.all(np.isfinite(row)):
+                raise InputError("not a finite number", field="table", value=row, remedy="give times and values")
+        for row, (before, after) in enumerate(pairwise(self.times), start=2):
+            if not after > before:
+                raise InputError(
+                    f"its times must ascend, row {row} does not", field="table", value=after,
+                    remedy=f"it follows t = {before:g} s",
+                )  # fmt: skip
+
+    @cached_property
+    def _spline(self) -> scipy.interpolate.BSpline:
+        degree = min(_DEGREE, len(self.times) - 1)
+        return scipy.interpolate.make_interp_spline(self.times, self.values, k=degree)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Times between which it is one polynomial of degree five at most [s]."""
+        return self.times
+
+    def evaluate(self, t: NDArray[np.float64]) -> Values:
+        """Value, rate and acceleration at times t.
+
+        Raises
+        ------
+        InputError
+            A time that the table does not cover.
+        """
+        first, last = self.times[0], self.times[-1]
+        slack = _SAME_TIME * (last - first)
+        for time, beyond in ((np.min(t), np.min(t) < first - slack), (np.max(t), np.max(t) > last + slack)):
+            if beyond:
+                raise InputError(
+                    f"it covers t = {first:g} to {last:g} s, the run goes to t = {time:g} s", field="table",
+                    remedy="add rows, or shorten the run",
+                )  # fmt: skip
+        x = np.clip(t, first, last)
+        return self._spline(x), self._spline(x, 1), self._spline(x, 2)

@@ -1,0 +1,220 @@
+"""A flexible body by its own matrices: from any finite-element program, or worked out by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from paraflex.errors import InputError
+from paraflex.fem import ShapeIntegrals
+from paraflex.mechanism.damping import Damping
+
+Row = Sequence[float]
+Matrix = Sequence[Sequence[float]]
+
+# How far a matrix may be from symmetric or skew, as a fraction of its largest entry: digits lost on the way.
+_ASYMMETRY = 1e-6
+# Smallest eigenvalue of a matrix scaled to a unit diagonal that counts as positive.
+_SMALLEST = 1e-12
+
+
+@dataclass(frozen=True)
+class ModalPoint:
+    """A material point of a body of given matrices; nf flexible coordinates.
+
+    Attributes
+    ----------
+    position : (x, y)
+        Undeformed, in the body frame [m].
+    shape : (2, nf) nested sequence
+        Displacement per flexible coordinate in the body frame, N.
+    slope : (nf,) sequence
+        Turn of the material there per flexible coordinate, N2'.
+    """
+
+    position: Row
+    shape: Matrix
+    slope: Row
+
+    def __post_init__(self) -> None:
+        _freeze(self, ("position", "shape", "slope"))
+
+
+@dataclass(frozen=True)
+class ModalBody:
+    """A flexible body whose constants are given, its displacement linear in nf flexible coordinates u of any kind.
+
+    The symbols are those of the theory, with s0 the place of a mass element dm in the undeformed body and N its
+    displacement per coordinate. Lumped moments of inertia count in `inertia`, `mass_matrix` and `G1`. Coordinates
+    must not move the body as a whole.
+
+    Attributes
+    ----------
+    name : str
+    mass : float
+        [kg]
+    first_moment : (2,) sequence
+        int s0 dm [kg m].
+    inertia : float
+        About the body frame's origin [kg m^2].
+    mass_matrix : (nf, nf) nested sequence
+        Of the flexible coordinates.
+    stiffness : (nf, nf) nested sequence
+    S2 : (2, nf) nested sequence
+        int N dm.
+    I1 : (nf,) sequence
+        int s0^T N dm.
+    G1 : (nf,) sequence
+        int (x N_y - y N_x) dm, and sum J N2' of lumped moments of inertia.
+    G2 : (nf, nf) nested sequence
+        int N_x^T N_y - N_y^T N_x dm, skew.
+    I2 : (nf, nf) nested sequence, optional
+        int N^T N dm; the mass matrix, unless lumped moments of inertia add to that.
+    points : mapping of str to ModalPoint
+        The first and the last are its ends, of which results tell.
+    modes : int, optional
+        Modes of lowest frequency kept as flexible coordinates; all by default.
+    damping : RayleighDamping or ModalDamping, optional
+        None by default.
+    flexible : bool
+        False holds all flexible coordinates at zero: the same inertia, rigid.
+    """
+
+    name: str
+    mass: float
+    first_moment: Row
+    inertia: float
+    mass_matrix: Matrix
+    stiffness: Matrix
+    S2: Matrix
+    I1: Row
+    G1: Row
+    G2: Matrix
+    I2: Matrix | None = None
+    points: Mapping[str, ModalPoint] = field(default_factory=dict)
+    modes: int | None = None
+    damping: Damping | None = None
+    flexible: bool = True
+
+    def __post_init__(self) -> None:
+        _freeze(self, ("first_moment", "mass_matrix", "stiffness", "S2", "I1", "G1", "G2", "I2"))
+
+    @property
+    def n_flexible(self) -> int:
+        """Number of flexible coordinates before any reduction."""
+        return len(self.stiffness)
+
+    @property
+    def integrals(self) -> ShapeIntegrals:
+        """Its constants, checked.
+
+        Raises
+        ------
+        InputError
+            Sizes that do not fit together, a number that is not finite, a matrix that is not symmetric, skew or
+            positive definite.
+        """
+        n = self.n_flexible
+        if not n:
+            raise InputError("has no flexible coordinates", field="stiffness", remedy="make it a rigid body")
+        Mff = _symmetric(_array(self.mass_matrix, (n, n), "mass_matrix"), "mass_matrix")
+        I2 = Mff if self.I2 is None else _symmetric(_array(self.I2, (n, n), "I2"), "I2")
+        integrals = ShapeIntegrals(
+            m=self.mass,
+            S1=_array(self.first_moment, (2,), "first_moment"),
+            S2=_array(self.S2, (2, n), "S2"),
+            I0=self.inertia,
+            I1=_array(self.I1, (n,), "I1"),
+            I2=I2,
+            G1=_array(self.G1, (n,), "G1"),
+            G2=_symmetric(_array(self.G2, (n, n), "G2"), "G2", sign=-1.0),
+            J=0.0,
+            Jf=np.zeros(n),
+            Jff=Mff - I2,
+            K=_symmetric(_array(self.stiffness, (n, n), "stiffness"), "stiffness"),
+            D=np.eye(n),
+        )
+        _check_definite(integrals)
+        return integrals
+
+    def as_rigid(self) -> ModalBody:
+        """The same body with its flexibility switched off."""
+        return replace(self, flexible=False)
+
+    def point(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position (2,), shape (2, nf) and slope (nf,) of a named point.
+
+        Raises
+        ------
+        InputError
+            Sizes that do not fit, or a number that is not finite.
+        """
+        n, point, where = self.n_flexible, self.points[name], f"points.{name}"
+        return (
+            _array(point.position, (2,), f"{where}.position"),
+            _array(point.shape, (2, n), f"{where}.shape"),
+            _array(point.slope, (n,), f"{where}.slope"),
+        )
+
+
+def _check_definite(s: ShapeIntegrals) -> None:
+    """Mass matrix of the whole undeformed body and its stiffness are positive definite, lumps take nothing away."""
+    _definite(s.Mff, "mass_matrix", "check it for coordinates that others make up")
+    _definite(s.K, "stiffness", "leave out coordinates that move the body as a whole: its frame does that")
+    rigid = np.array([[s.m, 0.0, -s.S1[1]], [0.0, s.m, s.S1[0]], [-s.S1[1], s.S1[0], s.I0]])
+    _definite(rigid, "inertia", "check mass, first_moment and inertia: the latter is about the frame's origin")
+    coupling = np.vstack([s.S2, s.G1])
+    _definite(
+        np.block([[rigid, coupling], [coupling.T, s.Mff]]), "mass_matrix", "check S2 and G1: they couple too much"
+    )
+    sizes = np.sqrt(np.diag(s.Mff))
+    if np.linalg.eigvalsh(s.Jff / np.outer(sizes, sizes))[0] < -_ASYMMETRY:
+        raise InputError(
+            "is more than the mass matrix", field="I2", remedy="lumped moments of inertia only add to that"
+        )
+
+
+def _definite(matrix: np.ndarray, field: str, remedy: str) -> None:
+    diagonal = np.diag(matrix)
+    if np.all(diagonal > 0.0):
+        sizes = np.sqrt(diagonal)
+        if np.linalg.eigvalsh(matrix / np.outer(sizes, sizes))[0] > _SMALLEST:
+            return
+    raise InputError("is not positive definite", field=field, remedy=remedy)
+
+
+def _symmetric(matrix: np.ndarray, field: str, sign: float = 1.0) -> np.ndarray:
+    """The symmetric part of a matrix that is so to within lost digits; with sign -1 the skew part."""
+    other = sign * matrix.T
+    if np.max(np.abs(matrix - other)) > _ASYMMETRY * np.max(np.abs(matrix)):
+        raise InputError("is not symmetric" if sign > 0.0 else "is not skew", field=field, remedy="check its entries")
+    return 0.5 * (matrix + other)
+
+
+def _array(values: Any, shape: tuple[int, ...], field: str) -> np.ndarray:
+    size = " x ".join(map(str, shape))
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("is not a table of numbers", field=field, remedy=f"give {size} of them") from None
+    if array.shape != shape:
+        found = " x ".join(map(str, array.shape)) or "one"
+        raise InputError("not of the size of the stiffness", field=field, value=found, remedy=f"give {size} numbers")
+    if not np.all(np.isfinite(array)):
+        raise InputError("not all finite numbers", field=field, remedy=f"give {size} of them")
+    return array
+
+
+def _freeze(instance: Any, names: Iterable[str]) -> None:
+    """Turn arrays and lists into tuples, which compare by value."""
+    for name in names:
+        object.__setattr__(instance, name, _tuples(getattr(instance, name)))
+
+
+def _tuples(values: Any) -> Any:
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    return tuple(map(_tuples, values)) if isinstance(values, (list, tuple)) else values

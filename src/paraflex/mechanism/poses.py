@@ -1,0 +1,109 @@
+"""Approximate poses of bodies from what an assembly says: angles, places of points, and the joints between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import atan2, cos, hypot, sin
+from typing import TYPE_CHECKING
+
+from paraflex.errors import InputError
+from paraflex.mechanism.bodies import Body, RigidBody
+from paraflex.mechanism.joints import GROUND, PointRef, RevoluteJoint, WeldJoint
+from paraflex.mechanism.modal import ModalBody
+
+if TYPE_CHECKING:
+    from paraflex.mechanism.mechanism import Assembly, Mechanism
+
+Place = tuple[float, float]
+# Joints that hold two points together; others do not tell where a point is.
+_POINT_JOINTS = (RevoluteJoint, WeldJoint)
+# Points of a body nearer one another than this do not tell its angle [m].
+_APART = 1e-9
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a body is: its angle [rad], and the place of its frame's origin [m] where points tell it."""
+
+    angle: float
+    position: Place | None = None
+
+
+def approximate_poses(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:
+    """The pose of every body, undeformed: its angle as given, or from two of its points that are known.
+
+    Known are points on the ground, points the assembly gives, points joined to known ones, and all points of a body
+    whose pose is known.
+
+    Raises
+    ------
+    InputError
+        A body whose angle is neither given nor follows.
+    """
+    poses: dict[str, Pose] = {name: Pose(angle) for name, angle in assembly.angles.items()}
+    if assembly.points:
+        poses |= _from_points(mechanism, assembly)
+    for body in mechanism.bodies:
+        if body.name not in poses:
+            remedy = "give its approximate angle in rad, or the places of two of its points"
+            raise InputError("no angle for a body", field=f"assembly.{assembly.name}", value=body.name, remedy=remedy)
+    return poses
+
+
+def _from_points(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:
+    """Poses with places; passes over joints and bodies until nothing more is known."""
+    poses: dict[str, Pose] = {}
+    known: dict[PointRef, Place] = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()}
+    known |= assembly.points
+    before = -1
+    while before < len(known) + len(poses):
+        before = len(known) + len(poses)
+        for joint in mechanism.joints:
+            if isinstance(joint, _POINT_JOINTS):
+                for one, other in ((joint.a, joint.b), (joint.b, joint.a)):
+                    if one in known:
+                        known.setdefault(other, known[one])
+        for body in mechanism.bodies:
+            if body.name not in poses:
+                local = _points(body)
+                found = {name: known[ref] for name in local if (ref := PointRef(body.name, name)) in known}
+                pose = _fit(local, found, assembly.angles.get(body.name))
+                if pose is not None:
+                    poses[body.name] = pose
+                    for name, place in local.items():
+                        known.setdefault(PointRef(body.name, name), _placed(pose, place))
+    return poses
+
+
+def _points(body: Body) -> Mapping[str, Place]:
+    if isinstance(body, RigidBody):
+        return body.points
+    if isinstance(body, ModalBody):
+        return {name: (float(point.position[0]), float(point.position[1])) for name, point in body.points.items()}
+    return {name: (x, 0.0) for name, x in body.points.items()}
+
+
+def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | None) -> Pose | None:
+    """The pose that brings points of a body nearest to their known places; None where these are too few."""
+    if not found:
+        return None
+    n = len(found)
+    cx, cy = (sum(local[name][k] for name in found) / n for k in range(2))
+    gx, gy = (sum(place[k] for place in found.values()) / n for k in range(2))
+    if angle is None:
+        arms = [(local[name][0] - cx, local[name][1] - cy, x - gx, y - gy) for name, (x, y) in found.items()]
+        if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) < _APART:
+            return None
+        # Best fit in the sense of least squares.
+        angle = atan2(
+            sum(ax * by - ay * bx for ax, ay, bx, by in arms), sum(ax * bx + ay * by for ax, ay, bx, by in arms)
+        )
+    turned = _placed(Pose(angle, (0.0, 0.0)), (cx, cy))
+    return Pose(angle, (gx - turned[0], gy - turned[1]))
+
+
+def _placed(pose: Pose, local: Place) -> Place:
+    assert pose.position is not None
+    c, s = cos(pose.angle), sin(pose.angle)
+    return pose.position[0] + c * local[0] - s * local[1], pose.position[1] + s * local[0] + c * local[1]
