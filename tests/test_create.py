@@ -69,6 +69,7 @@ def test_every_library_mechanism_is_sound_and_makes_a_template(name, tmp_path):
         "andrews": 1,
         "four_bar": 0,
         "pendulum": 1,
+        "spin_up": 0,
     }.get(name, 2)
 
 
