@@ -10,7 +10,6 @@ import scipy.optimize
 
 import twins
 from conftest import SQUARE
-from paraflex.dynamics import build_system
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.kinematics import Circle, Line, Polygon, TrapezoidalLaw, follow_path
 from paraflex.mechanism import (
@@ -346,10 +345,9 @@ def test_a_path_needs_an_end_effector_and_a_known_assembly(raparm, square):
 def test_an_assembly_that_cannot_close_says_which_joint_is_open():
     # A rocker that cannot reach: 0.1 + 0.3 + 0.25 m of links over 0.8 m.
     wide = replace(four_bar(("x",)), ground={"O": (0.0, 0.0), "D": (0.8, 0.0)})
-    with pytest.raises(AssemblyError, match="do not close") as caught:
+    # Stretched out, put together from the ground on, all of what is missing is open at the joint that closes the loop.
+    with pytest.raises(AssemblyError, match=r"do not close: a gap of 0\.15 remains in D at"):
         follow_path(wide, Line((0.0, 0.0), (0.1, 0.0), 1.0), [0.0])
-    system = build_system(wide)
-    assert any(row in str(caught.value) for row in system.rows)
 
 
 def test_the_square_is_the_one_of_the_paper(square):

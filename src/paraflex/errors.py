@@ -15,6 +15,8 @@ from typing import Any
 __all__ = [
     "ActuationError",
     "AssemblyError",
+    "ConstraintDriftError",
+    "InconsistentConstraintsError",
     "InputError",
     "IntegrationError",
     "NumericalError",
@@ -136,6 +138,10 @@ class UnreachablePathError(AssemblyError):
     """The end-effector cannot follow the path: out of reach, or past a Type I singularity."""
 
 
+class InconsistentConstraintsError(NumericalError):
+    """Constraints that contradict one another in velocity or acceleration, though the loops are closed."""
+
+
 class ActuationError(NumericalError):
     """A set of motors that cannot drive the mechanism."""
 
@@ -146,3 +152,7 @@ class SingularActuationError(ActuationError):
 
 class IntegrationError(NumericalError):
     """Forward simulation stopped before its end: singular constraints, no convergence, or too many steps."""
+
+
+class ConstraintDriftError(IntegrationError):
+    """Joints came apart, or a prescribed motion was left, further than errors of integration explain."""

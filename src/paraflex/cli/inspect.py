@@ -11,8 +11,7 @@ from rich.table import Table
 from paraflex.actuation import actuation_condition
 from paraflex.actuation.allocation import check_mode
 from paraflex.cli.tables import plain_console
-from paraflex.dynamics import build_system, consistent_state
-from paraflex.dynamics.state import redundant_rows
+from paraflex.dynamics import build_system, consistent_state, redundant_rows
 from paraflex.errors import ActuationError, NumericalError
 from paraflex.files import library_names, load
 from paraflex.simulate import plan_tracking

@@ -3,6 +3,8 @@
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, end_markers, node_marker
 from paraflex.dynamics.equilibrium import static_equilibrium
 from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate
+from paraflex.dynamics.linearise import Vibration, natural_frequencies
+from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.start import BodyValues, Deflection, Start, check_start, start_state
 from paraflex.dynamics.state import (
@@ -11,7 +13,6 @@ from paraflex.dynamics.state import (
     momentum,
     project_position,
     project_velocity,
-    redundant_rows,
     reference_pose,
 )
 from paraflex.dynamics.system import System, build_system
@@ -20,21 +21,25 @@ __all__ = [
     "BodyCoordinates",
     "BodyValues",
     "Deflection",
+    "Dependence",
     "InputSignals",
     "JointCoordinate",
     "Marker",
     "Start",
     "State",
     "System",
+    "Vibration",
     "axis_angle",
     "build_system",
     "check_start",
     "consistent_state",
     "constant_signals",
+    "dependence",
     "end_markers",
     "joint_coordinate",
     "moment_signals",
     "momentum",
+    "natural_frequencies",
     "node_marker",
     "pack_signals",
     "piecewise_quintic",

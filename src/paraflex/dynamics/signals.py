@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.kernel.packed import Signals
+from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.mechanism import AngleLaw, Mechanism, PrescribedAngle
 
 # Breaks of a prescribed law: its quintic Hermite pieces are this short, as a fraction of the run.
@@ -57,6 +57,12 @@ def constant_signals(values: Sequence[float], end: float) -> list[InputSignals]:
         coefficients[0, 0] = value
         signals.append(InputSignals(np.array([0.0, end]), coefficients))
     return signals
+
+
+def no_signals(packed: PackedSystem) -> Signals:
+    """Zero for every motor torque and prescribed value that a packed system asks for."""
+    numbers = [packed.rows["signal"], packed.efforts["signal"]]
+    return _pack(constant_signals([0.0] * (1 + max(int(group.max(initial=-1)) for group in numbers)), 1.0))
 
 
 def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: float) -> tuple[Signals, list[float]]:

@@ -325,14 +325,16 @@ def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> NDArra
     frame = [values.x, values.y, values.phi]
     if values.flexible is None:
         return np.concatenate([frame, np.zeros(body.nf)])
-    own, count = np.array(values.flexible, dtype=float), body.modes.vectors.shape[0]
+    # A beam's D leads on to its nodes; that of given shapes to the coordinates they are given for.
+    basis = body.integrals.D if body.mesh is None else body.modes.vectors
+    own, count = np.array(values.flexible, dtype=float), basis.shape[0]
     if own.size != count:
         raise InputError(
             f"the body has {count} flexible coordinates", field=f"{field}.flexible", value=len(values.flexible),
             remedy=f"give {count} numbers, or leave them out for zeros",
         )  # fmt: skip
-    eta = np.linalg.lstsq(body.modes.vectors, own, rcond=None)[0]
-    missed = np.max(np.abs(body.modes.vectors @ eta - own), initial=0.0)
+    eta = np.linalg.lstsq(basis, own, rcond=None)[0]
+    missed = np.max(np.abs(basis @ eta - own), initial=0.0)
     if missed > _GAP * np.max(np.abs(own), initial=0.0):
         raise InputError(
             f"the modes kept of the body miss them by {missed:.3g}", field=f"{field}.flexible",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,19 +10,21 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from paraflex.dynamics.projection import NAMED, joint_gaps, least_change, refuse_conflict
 from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.bodies import body_terms
-from paraflex.kernel.packed import CONSTRAINT, Signals, make_point_scratch
-from paraflex.mechanism import Assembly
+from paraflex.kernel.packed import CONSTRAINT, Signals
+from paraflex.kernel.stage import equations
+from paraflex.mechanism import GROUND, Assembly, Joint, RevoluteJoint, WeldJoint
 from paraflex.mechanism.poses import approximate_poses
 
 _MAX_ITERATIONS = 50
+# Where Newton's iteration fails, a damped one goes downhill to the smallest gap: how it begins and ends.
+_MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
 # Closure error that counts as closed [m, rad]: a few rounding errors of a metre-sized mechanism.
 CLOSED = 1e-12
-# A constraint row whose independent part is smaller than this fraction of the largest follows from the others.
-DEPENDENT = 1e-9
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
 _POSITION_STIFFNESS = 1.0
 # The same for a start in motion: rates of deflection are to be none beside those of links.
@@ -38,23 +41,13 @@ class State:
 
 
 def mass_matrix(system: System, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Dense mass matrix (n, n) at q: the equations of motion are linear in the accelerations."""
-    M = np.zeros((system.n, system.n))
-    base, column = np.zeros(system.n), np.zeros(system.n)
-    still, points = np.zeros(system.n), make_point_scratch(system.packed)
-    for i, body in enumerate(system.bodies):
-        body_terms(system.packed, i, q, still, still, base, points)
-        for j in range(body.all.start, body.all.stop):
-            unit = np.zeros(system.n)
-            unit[j] = 1.0
-            body_terms(system.packed, i, q, still, unit, column, points)
-            M[body.all, j] = column[body.all] - base[body.all]
-    return M
+    """Dense mass matrix (n, n) at q; of many bodies see `dynamics.sparse.sparse_mass`."""
+    return np.asarray(scipy.linalg.block_diag(*body_masses(system, q)))
 
 
 def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
     """Linear momentum (2,) [kg m/s] and angular momentum about the ground frame's origin [kg m^2/s]."""
-    p = mass_matrix(system, state.q) @ state.v
+    p = sparse_mass(system, state.q) @ state.v
     linear, angular = np.zeros(2), 0.0
     for body in system.bodies:
         linear += p[body.position]
@@ -64,48 +57,43 @@ def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
     return linear, angular
 
 
-def redundant_rows(system: System, q: NDArray[np.float64], threshold: float = DEPENDENT) -> list[str]:
-    """Names of constraint rows that follow from the others at q, by a pivoted QR factorisation of Phi_q^T.
-
-    A row counts as such when its independent part is smaller than the threshold, as a fraction of the largest.
-    """
-    if system.n_constraints == 0:
-        return []
-    rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
-    factors = scipy.linalg.qr(system.jacobian(q)[rigid].T, mode="r", pivoting=True)
-    size, order = np.abs(np.diag(factors[0])), factors[-1]
-    rank = int(np.sum(size > threshold * size.max(initial=0.0)))
-    return sorted(system.rows[i] for i in rigid[order[rank:]])
-
-
 def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
     """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
 
-    Loops are not closed yet. Bodies the tree does not reach are where the assembly's points have them.
+    Bodies whose places follow from the assembly's points are there. Loops are not closed yet.
     """
     q = np.zeros(system.n)
-    poses = approximate_poses(system.mechanism, assembly)
-    for body in system.bodies:
-        pose = poses[body.name]
+    placed = set()
+    for name, pose in approximate_poses(system.mechanism, assembly).items():
+        body = system.body(name)
         q[body.angle] = pose.angle
-        q[body.position] = (0.0, 0.0) if pose.position is None else pose.position
-    placed: set[str] = set()
-    joints = list(system.mechanism.joints)
-    if not any(joint.a.on_ground or joint.b.on_ground for joint in joints):
+        if pose.position is not None:
+            q[body.position] = pose.position
+            placed.add(name)
+    joints: dict[str, list[Joint]] = {body.name: [] for body in system.bodies} | {GROUND: []}
+    for joint in system.mechanism.joints:
+        joints[joint.a.body].append(joint)
+        joints[joint.b.body].append(joint)
+    if not joints[GROUND] and not placed:
         placed.add(system.bodies[0].name)
-    while joints:
-        for joint in joints:
-            known, new = (joint.a, joint.b) if joint.a.on_ground or joint.a.body in placed else (joint.b, joint.a)
-            if not (known.on_ground or known.body in placed):
-                continue
-            if not new.on_ground and new.body not in placed:
-                target = point_position(system, q, known)
-                q[system.body(new.body).position] += target - point_position(system, q, new)
-                placed.add(new.body)
-            joints.remove(joint)
-            break
-        else:  # what is left floats free of everything placed
-            break
+    # Joints that hold points together say where the next body is; others only where nothing better does.
+    firm: deque[tuple[Joint, str]] = deque()
+    loose: deque[tuple[Joint, str]] = deque()
+
+    def reach(name: str) -> None:
+        for joint in joints[name]:
+            (firm if isinstance(joint, RevoluteJoint | WeldJoint) else loose).append((joint, name))
+
+    for name in (GROUND, *placed):
+        reach(name)
+    while firm or loose:
+        joint, name = firm.popleft() if firm else loose.popleft()
+        known, new = (joint.a, joint.b) if joint.a.body == name else (joint.b, joint.a)
+        if not new.on_ground and new.body not in placed:
+            target = point_position(system, q, known)
+            q[system.body(new.body).position] += target - point_position(system, q, new)
+            placed.add(new.body)
+            reach(new.body)
     return q
 
 
@@ -126,20 +114,41 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     Raises
     ------
     AssemblyError
-        The loops cannot be closed from there.
+        The loops cannot be closed from there; its partial result is where they come closest to it.
     """
-    q = q.copy()
+    start, q = q, q.copy()
     zero = np.zeros(system.n)
-    phi = np.zeros(system.m)
     for _ in range(_MAX_ITERATIONS):
         phi, _ = system.constraints(signals, t, q, zero)
         if np.max(np.abs(phi), initial=0.0) < CLOSED:
             return q
-        q -= _least_change(system, q, phi, stiffness=_POSITION_STIFFNESS)
-    worst = system.rows[int(np.argmax(np.abs(phi)))]
+        q -= least_change(system, q, phi, stiffness=_POSITION_STIFFNESS)
+    closest = _closest(system, signals, t, start)
+    gaps = joint_gaps(system, system.constraints(signals, t, closest, zero)[0])
+    where = " and ".join(list(gaps)[:NAMED])
     raise AssemblyError(
-        f"the loops do not close: a gap of {np.max(np.abs(phi)):.3g} remains in {worst}", Moment(t, 0), partial=q
+        f"the loops do not close: a gap of {max(gaps.values()):.3g} remains in {where}", Moment(t, 0), partial=closest
     )
+
+
+def _closest(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where loops that do not close come closest to it, downhill from q.
+
+    All joints share the gap there; put together along the tree of joints, undeformed, those that close loops have it.
+    """
+    still = np.zeros(system.n)
+    phi = system.constraints(signals, t, q, still)[0]
+    damping = _FIRST_DAMPING
+    for _ in range(_MAX_DESCENT):
+        trial = q - least_change(system, q, phi, _POSITION_STIFFNESS, damping)
+        gap = system.constraints(signals, t, trial, still)[0]
+        gain = 1.0 - np.linalg.norm(gap) / np.linalg.norm(phi)
+        if gain > 0.0:
+            q, phi = trial, gap
+        if 0.0 <= gain < _NO_GAIN or damping > _LARGEST_DAMPING:
+            break
+        damping *= 0.2 if gain > 0.0 else 5.0
+    return reference_pose(system, Assembly("closest", {body.name: float(q[body.angle]) for body in system.bodies}))
 
 
 def project_velocity(
@@ -153,23 +162,16 @@ def project_velocity(
     """The nearest velocities, in the metric of mass, at which the constraints' first derivative vanishes.
 
     That is what a blow does. With a weight of stiffness [s^2] against mass links move and do not begin to bend.
+
+    Raises
+    ------
+    InconsistentConstraintsError
+        There are none: two prescribed laws contradict one another.
     """
     _, rate = system.constraints(signals, t, q, v)
-    return v - _least_change(system, q, rate, stiffness)
-
-
-def _least_change(
-    system: System, q: NDArray[np.float64], residual: NDArray[np.float64], stiffness: float = 0.0
-) -> NDArray[np.float64]:
-    """The smallest d in the metric M + stiffness K with Phi_q d = residual; least squares for dependent rows."""
-    jacobian = system.jacobian(q)
-    metric = mass_matrix(system, q)
-    for body in system.bodies:
-        k = np.arange(body.flexible.start, body.flexible.stop)
-        metric[k, k] += stiffness * body.modes.omega**2
-    weighted = np.linalg.solve(metric, jacobian.T)
-    multipliers = np.linalg.lstsq(jacobian @ weighted, residual, rcond=1e-12)[0]
-    return weighted @ multipliers
+    v = v - least_change(system, q, rate, stiffness)
+    refuse_conflict(system, "velocities", t, q, rate, system.constraints(signals, t, q, v)[1])
+    return v
 
 
 def consistent_state(
@@ -199,6 +201,8 @@ def consistent_state(
     ------
     AssemblyError
         The loops cannot be closed.
+    InconsistentConstraintsError
+        Nor can velocities or accelerations be found that all constraints allow.
     """
     q = reference_pose(system, assembly)
     for name, nodal in (deflection or {}).items():
@@ -206,6 +210,31 @@ def consistent_state(
         q[body.flexible] = np.linalg.lstsq(body.integrals.D, nodal, rcond=None)[0]
     signals = moment_signals(system.mechanism, time)
     q = project_position(system, signals, time, q)
-    if velocity is not None:
-        return State(time, q, project_velocity(system, signals, time, q, velocity))
-    return State(time, q, project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS))
+    if velocity is None:
+        v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)
+    else:
+        v = project_velocity(system, signals, time, q, velocity)
+    check_accelerations(system, signals, time, q, v)
+    return State(time, q, v)
+
+
+def check_accelerations(
+    system: System, signals: Signals, t: float, q: NDArray[np.float64], v: NDArray[np.float64]
+) -> None:
+    """Whether there are accelerations that all constraints allow at a consistent position and velocity.
+
+    Raises
+    ------
+    InconsistentConstraintsError
+        There are none: two prescribed laws, or a singular position in motion.
+    """
+    workspace, torques = system.workspace(), np.zeros(len(system.mechanism.motors))
+    no_force = np.zeros(system.m)
+
+    def rows(a: NDArray[np.float64]) -> NDArray[np.float64]:
+        equations(system.packed, signals, t, 0.0, 0.0, q, v, a, no_force, torques, workspace)
+        return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
+
+    wanted = rows(np.zeros(system.n))
+    if np.any(wanted):
+        refuse_conflict(system, "accelerations", t, q, wanted, rows(-least_change(system, q, wanted)))

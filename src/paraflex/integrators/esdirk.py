@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, redundant_rows
-from paraflex.errors import InputError, IntegrationError, Moment
+from paraflex.errors import ConstraintDriftError, InputError, IntegrationError, Moment
 from paraflex.integrators.stretches import hidden_from, jump_times
 from paraflex.integrators.tableaux import TR_BDF2
+from paraflex.integrators.watch import bent_too_far, come_apart, least_norm
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Signals, Workspace
@@ -54,8 +55,6 @@ _NEWTON_MEMORY = 0.002
 _MEMORY = 0.25
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
-# Slopes of a beam this large are beyond any theory of small slopes [rad]: what computes them diverges.
-_LARGEST_SLOPE = 2.0
 _CAUSES = {
     NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
     SINGULAR: "the constraints lose rank, a singular position",
@@ -124,7 +123,8 @@ class Solution:
     q, v, a : (k, n) arrays
         Coordinates and their derivatives; flexible ones modal.
     multipliers : (k, m) array
-        Constraint forces [N, N m], one a constraint row of the system.
+        Constraint forces [N, N m], one a constraint row of the system; where rows depend on one another, of all that
+        give the same motion those with the least sum of squares.
     kinetic_energy, strain_energy, work : (k,) arrays
         [J]; work is that of motors, prescribed motion, weight and loads, less what dampers take.
     status : str
@@ -196,47 +196,43 @@ def integrate(
     ------
     IntegrationError
         The run cannot go on; it carries the partial solution.
+    ConstraintDriftError
+        Constraints are left further than errors of integration explain; it carries the partial solution as well.
     InputError
         Times that do not ascend from the start.
     """
     began = time.perf_counter()
     options = options or IntegrationOptions()
     run = prepare(system, signals, initial, times, knots, options)
-    status, message, bent, state = "complete", "", "", run.state
-    code = run.start()
+    status, message, bent, drift, state = "complete", "", "", "", run.state
+    code, limits = run.start(), (run.controls.dependent_rows, options.tolerance)
     try:
         while code == PAUSED:
             attempts = int(state.counts[STEPS] + state.counts[REJECTED])
             if attempts >= options.max_steps:
                 break
             code = run.march(min(_SLICE, options.max_steps - attempts))
-            bent = _bent_too_far(system, state.q)
-            if bent:
+            bent, drift = (
+                bent_too_far(system, state.q),
+                come_apart(system, signals, state.clock[TIME], state.q, *limits),
+            )
+            if bent or drift:
                 break
             if on_progress is not None:
                 on_progress(float(state.clock[TIME]))
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {state.clock[TIME]:.6g} s"
-    solution = _solution(run.samples, state, time.perf_counter() - began, status, message)
-    if (code == FINISHED and not bent) or status == "interrupted":
+    solution = _solution(run, time.perf_counter() - began, status, message)
+    if (code == FINISHED and not (bent or drift)) or status == "interrupted":
         return solution
-    cause = bent or (f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code])
+    cause = bent or drift or (f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code])
     # Near a singular position it may be Newton or the error test that gives up first.
-    lost = redundant_rows(system, state.q, _NEARLY_DEPENDENT) if code != PAUSED and not bent else []
+    lost = redundant_rows(system, state.q, _NEARLY_DEPENDENT) if code != PAUSED and not (bent or drift) else []
     if len(lost) > run.controls.dependent_rows:
         cause = f"the constraints lose rank, a singular position ({', '.join(lost)})"
     moment = Moment(float(state.clock[TIME]), int(state.counts[STEPS]))
-    raise IntegrationError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
-
-
-def _bent_too_far(system: System, q: NDArray[np.float64]) -> str:
-    """Which beam is bent beyond what the theory can describe, and how far; empty for none."""
-    for body in system.bodies:
-        slope = float(np.max(np.abs(body.slopes(q)), initial=0.0))
-        if slope > _LARGEST_SLOPE:
-            geometry = system.mechanism.geometry.value
-            return f"{body.name} bends by {slope:.1f} rad, too far for {geometry} geometry: the motion diverges"
-    return ""
+    error = ConstraintDriftError if drift and not bent else IntegrationError
+    raise error(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
 
 
 @dataclass(frozen=True)
@@ -333,14 +329,15 @@ def _samples(times: NDArray[np.float64], system: System) -> Samples:
     )
 
 
-def _solution(samples: Samples, state: March, wall_time: float, status: str, message: str) -> Solution:
+def _solution(run: Run, wall_time: float, status: str, message: str) -> Solution:
+    samples, state = run.samples, run.state
     reached = slice(0, int(state.counts[SAMPLE]))
     return Solution(
         t=samples.times[reached],
         q=samples.q[reached],
         v=samples.v[reached],
         a=samples.a[reached],
-        multipliers=samples.lam[reached],
+        multipliers=least_norm(run.system, samples.q[reached], samples.lam[reached], run.controls.dependent_rows),
         kinetic_energy=samples.energy[reached, 0],
         strain_energy=samples.energy[reached, 1],
         work=samples.energy[reached, 2],

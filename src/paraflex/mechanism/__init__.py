@@ -38,6 +38,7 @@ from paraflex.mechanism.loads import (
     TorsionalDamper,
     TorsionalSpring,
 )
+from paraflex.mechanism.loops import loops
 from paraflex.mechanism.mechanism import (
     ActuationMode,
     Assembly,
@@ -114,6 +115,7 @@ __all__ = [
     "check_segmentable",
     "finite_segments",
     "given_shapes",
+    "loops",
     "mode_of_motors",
     "mode_of_signs",
     "parse_geometry",

@@ -1,0 +1,176 @@
+"""Small vibrations of a mechanism about a pose: natural frequencies and shapes of the assembled system at rest.
+
+With lambda the constraint forces at rest, displacements x that the constraints allow, C x = 0, obey
+
+    M x'' + K x + C^T mu = 0,   K = d/dq (K_elastic u + springs - weight - loads + Phi_q^T lambda), lambda kept
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+
+from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.dynamics.state import State
+from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
+from paraflex.dynamics.system import System
+
+Array = NDArray[np.float64]
+Sparse = scipy.sparse.csr_matrix
+
+# More coordinates than these make a dense eigenvalue problem a matter of minutes: then the lowest are sought.
+DENSE_COORDINATES, LOWEST = 600, 10
+# A square of a frequency that is smaller than this part of the typical one is that of a free motion.
+_FREE = 1e-9
+# Constraint rows, scaled, with a smaller singular value than this part of the largest follow from the others.
+_DEPENDENT = 1e-10
+# How often a shift may grow tenfold until it outweighs whatever pushes the mechanism away from the pose.
+_SHIFTS = 15
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """Small vibrations about a pose.
+
+    Attributes
+    ----------
+    squares : (k,) array
+        Squares of the natural frequencies, ascending [rad^2/s^2]. Zero is a free motion, a negative one a motion that
+        grows.
+    shapes : (n, k) array
+        Displacements of the coordinates, of unit modal mass.
+    acceleration : float
+        What the mechanism would start with if let go, root mean square over the mass [m/s^2]: zero at an equilibrium.
+        Elsewhere the frequencies are those of a mechanism held in place by forces that do not change.
+    complete : bool
+        Whether these are all, not only the lowest.
+    """
+
+    squares: Array
+    shapes: Array
+    acceleration: float
+    complete: bool
+
+    @property
+    def frequencies(self) -> Array:
+        """Natural frequencies (k,) [rad/s], zero for motions that are free or grow."""
+        return np.sqrt(np.maximum(self.squares, 0.0))
+
+
+def natural_frequencies(
+    system: System,
+    state: State,
+    held: Sequence[str] = (),
+    *,
+    torque_at: Sequence[str] = (),
+    count: int | None = None,
+) -> Vibration:
+    """Undamped small vibrations about a pose, as if at rest there.
+
+    Parameters
+    ----------
+    system : System
+    state : State
+        A closed pose: its q, at its time for prescribed angles. Its v does not matter.
+    held : sequence of str
+        Joints whose angles, slopes of beams included, are kept.
+    torque_at : sequence of str
+        Joints with motors of constant torque, as much as holds the pose: they turn freely about that.
+    count : int, optional
+        How many of the lowest; all by default, or ten where there are more than 600 coordinates.
+    """
+    M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
+    lam, acceleration = _forces_at_rest(system, state, M, _with_joints(system, J, state.q, [*held, *torque_at]))
+    elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
+    C, typical = _with_joints(system, J, state.q, held), _typical_square(elastic, other, M)
+    K = Sparse(other + scipy.sparse.diags(elastic))
+    if system.n <= DENSE_COORDINATES:
+        squares, shapes = _all(K, M, C, elastic, typical)
+    else:
+        squares, shapes = _lowest(K, M, C, typical, LOWEST if count is None else count)
+    squares = np.where(np.abs(squares) < _FREE * typical, 0.0, squares)
+    kept = slice(squares.size if count is None else count)
+    complete = system.n <= DENSE_COORDINATES and (count is None or count >= squares.size)
+    return Vibration(squares[kept], shapes[:, kept], acceleration, complete)
+
+
+def _with_joints(system: System, jacobian: Sparse, q: Array, joints: Sequence[str]) -> Sparse:
+    """Constraint rows, and below them those of the joints' angles or travels."""
+    rows = [Sparse(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
+    return Sparse(scipy.sparse.vstack([jacobian, *rows]))
+
+
+def _forces_at_rest(system: System, state: State, M: Sparse, C: Sparse) -> tuple[Array, float]:
+    """Multipliers (m,) of joints and springs at rest, motors giving what holds them; the acceleration that is left."""
+    forces, lam = RestingForces(system, state.time), np.zeros(system.m)
+    springs = forces.springs
+    lam[springs] = forces(state.q, lam)[1] / system.packed.rows["compliance"][springs]
+    f = forces(state.q, lam)[0] + stiffness_diagonal(system) * state.q
+    a, mu = Saddle(M, C).solve(-f)
+    return lam + mu[: system.m], float(np.sqrt(max(a @ (M @ a), 0.0) / system.total_mass))
+
+
+def _typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
+    """A square of a frequency to measure others by: the lowest of any body, else by springs and weight, else one."""
+    if np.any(elastic > 0.0):
+        return float(np.min(elastic[elastic > 0.0]))
+    largest = float(np.max(np.abs(other.diagonal()) / np.asarray(M.diagonal()), initial=0.0))
+    return largest if largest > 0.0 else 1.0
+
+
+def _all(K: Sparse, M: Sparse, C: Sparse, elastic: Array, typical: float) -> tuple[Array, Array]:
+    """All squares, ascending, and shapes, in a basis of what the constraints allow.
+
+    Stiff coordinates are scaled down, and 1 / (square + shift) is sought: low frequencies keep all their digits beside
+    high ones.
+    """
+    scale = 1.0 / np.sqrt(1.0 + elastic / typical)
+    rows = C.toarray() * scale
+    size = np.linalg.norm(rows, axis=1)
+    rows = rows[size > 0.0] / size[size > 0.0, None]
+    basis = scale[:, None] * scipy.linalg.null_space(rows, rcond=_DEPENDENT)
+    if basis.shape[1] == 0:
+        return np.zeros(0), np.zeros((scale.size, 0))
+    mass, stiffness = basis.T @ (M @ basis), basis.T @ (K @ basis)
+    shift = _shift(mass, stiffness, typical)
+    inverse, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass)
+    inverse, vectors = inverse[::-1], vectors[:, ::-1]
+    return 1.0 / inverse - shift, basis @ (vectors / np.sqrt(inverse))
+
+
+def _shift(mass: Array, stiffness: Array, typical: float) -> float:
+    """What of the mass, added to the stiffness, outweighs all that pushes the mechanism away from the pose."""
+    shift = typical
+    for _ in range(_SHIFTS):
+        if np.linalg.eigvalsh(stiffness + shift * mass)[0] > 0.0:
+            break
+        shift *= 10.0
+    return shift
+
+
+class _Inverse(scipy.sparse.linalg.LinearOperator):
+    """From forces to the displacements that constraints allow."""
+
+    def __init__(self, solver: Saddle, n: int) -> None:
+        super().__init__(dtype=np.dtype(float), shape=(n, n))
+        self._solver = solver
+
+    def _matvec(self, x: Array) -> Array:
+        return self._solver.solve(x.ravel())[0]
+
+
+def _lowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int) -> tuple[Array, Array]:
+    """The squares nearest to one below zero, ascending, and shapes, by Lanczos' method on the inverse."""
+    n = int(np.asarray(M.diagonal()).size)
+    inverse = _Inverse(Saddle(Sparse(K + typical * M), C), n)
+    start = inverse.matvec(M @ np.random.default_rng(0).standard_normal(n))
+    squares, shapes = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-typical, OPinv=inverse, v0=start)
+    order = np.argsort(squares)
+    return squares[order], shapes[:, order]

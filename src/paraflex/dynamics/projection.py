@@ -1,0 +1,91 @@
+"""Steps back onto the constraints: the least change of coordinates or rates, and what to say where there is none."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+from numpy.typing import NDArray
+
+from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence, involved, joint_of_row
+from paraflex.dynamics.sparse import Saddle, body_masses, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.dynamics.system import System
+from paraflex.errors import InconsistentConstraintsError, Moment
+
+# Joints named in an error.
+NAMED = 6
+# What constraints may leave of each other's rates (m, rad; s), as a fraction of what they ask for.
+_CONFLICT = 1e-6
+
+
+def least_change(
+    system: System,
+    q: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    stiffness: float = 0.0,
+    damping: float = 0.0,
+) -> NDArray[np.float64]:
+    """The smallest d in the metric M + stiffness K with Phi_q d = residual; least squares for dependent rows.
+
+    With damping it goes less far, as Levenberg and Marquardt have it: a fraction of the mean diagonal entry of
+    Phi_q (M + stiffness K)^-1 Phi_q^T.
+    """
+    if system.m > DENSE_ROWS:
+        return _sparse_change(system, q, residual, stiffness, damping)
+    jacobian = system.jacobian(q)
+    metric = np.asarray(scipy.linalg.block_diag(*body_masses(system, q))) + stiffness * np.diag(
+        stiffness_diagonal(system)
+    )
+    weighted = np.linalg.solve(metric, jacobian.T)
+    schur = jacobian @ weighted
+    if damping:
+        schur += damping * np.mean(np.diag(schur)) * np.eye(system.m)
+    return weighted @ np.linalg.lstsq(schur, residual, rcond=1e-12)[0]
+
+
+def _sparse_change(
+    system: System, q: NDArray[np.float64], residual: NDArray[np.float64], stiffness: float, damping: float
+) -> NDArray[np.float64]:
+    jacobian = sparse_jacobian(system, q)
+    metric = sparse_mass(system, q) + scipy.sparse.diags(stiffness * stiffness_diagonal(system))
+    mean = float(np.mean(jacobian.multiply(jacobian) @ (1.0 / np.asarray(metric.diagonal(), dtype=float))))
+    return Saddle(metric, jacobian, np.full(system.m, damping * mean)).solve(r=residual)[0]
+
+
+def joint_gaps(system: System, phi: NDArray[np.float64]) -> dict[str, float]:
+    """What is left open at joints and prescribed motions by name [m, rad]: the largest first, down to a tenth of it."""
+    gaps: dict[str, float] = {}
+    for row, value in zip(system.rows, phi.tolist(), strict=True):
+        gaps[joint_of_row(row)] = math.hypot(gaps.get(joint_of_row(row), 0.0), value)
+    largest = max(gaps.values(), default=0.0)
+    return {name: gap for name, gap in sorted(gaps.items(), key=lambda item: -item[1]) if gap >= 0.1 * largest}
+
+
+def refuse_conflict(
+    system: System, what: str, t: float, q: NDArray[np.float64], wanted: NDArray[np.float64], left: NDArray[np.float64]
+) -> None:
+    """Raise where a projection leaves more of what the rows want (m,) than rounding explains.
+
+    Raises
+    ------
+    InconsistentConstraintsError
+        It names joints and prescribed motions that depend on one another.
+    """
+    if not np.max(np.abs(left), initial=0.0) > _CONFLICT * max(1.0, np.max(np.abs(wanted), initial=0.0)):
+        return
+    raise InconsistentConstraintsError(contradiction(system, wanted, dependence(system, q), what), Moment(t, 0))
+
+
+def contradiction(system: System, wanted: NDArray[np.float64], found: Dependence, what: str) -> str:
+    """Who contradicts whom, and by how much: the dropped row furthest from what its sources have it want."""
+    if found.dropped.size:
+        conflict = np.abs(found.conflict(wanted))
+        k = int(np.argmax(conflict))
+        names, size = involved(system, found, k), float(conflict[k])
+    else:
+        gaps = joint_gaps(system, wanted)
+        names, size = list(gaps), max(gaps.values())
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"the {what} of constraints contradict one another, by {size:.3g}: {', '.join(names[:NAMED])}{more}"

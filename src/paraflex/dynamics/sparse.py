@@ -1,0 +1,176 @@
+"""Mass matrix and constraint Jacobian as sparse matrices, and the linear system they form.
+
+A mechanism of thousands of bodies has a few entries a row: what is done at a single pose (closing loops, ranks,
+frequencies) then costs what the entries cost, not the square of the coordinates.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+
+from paraflex.dynamics.signals import no_signals
+from paraflex.dynamics.system import System
+from paraflex.kernel.bodies import motion_forces
+from paraflex.kernel.constraints import constraint_values
+from paraflex.kernel.packed import OMEGA2, PackedSystem, make_point_scratch
+
+# What stands in for zero on the diagonal of a dependent row, as a fraction of entries of size one, so that the factor
+# exists; iterative refinement takes its effect out again.
+_REGULAR = 1e-10
+_REFINEMENTS = 8
+# Refinement goes on while it shrinks the residual at least this much.
+_WORTH_WHILE = 0.5
+
+
+def width(system: System) -> int:
+    """Coordinates of the body that has most of them."""
+    return max(3 + body.nf for body in system.bodies)
+
+
+def without_stiffness(packed: PackedSystem) -> PackedSystem:
+    """The same system, of beams that no force is needed to bend: their stiffness, known exactly, drowns all else."""
+    modal = packed.modal.copy()
+    modal[OMEGA2] = 0.0
+    return packed._replace(modal=modal)
+
+
+def body_masses(system: System, q: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Mass matrix (3 + nf, 3 + nf) of every body at q.
+
+    The equations of motion are linear in the accelerations, and no body's depend on another's: a unit acceleration of
+    one coordinate of every body gives a column of every matrix.
+    """
+    bare = without_stiffness(system.packed)
+    bare = bare._replace(gravity=np.zeros(2), loads=bare.loads[:0], lines=bare.lines[:0])
+    columns = width(system)
+    a, forces = np.zeros((2, columns, system.n))
+    for body in system.bodies:
+        a[np.arange(3 + body.nf), np.arange(body.all.start, body.all.stop)] = 1.0
+    poses = np.repeat(np.asarray(q, dtype=float)[None], columns, axis=0)
+    motion_forces(bare, poses, np.zeros_like(poses), a, forces, make_point_scratch(bare))
+    return [forces[: 3 + body.nf, body.all].T for body in system.bodies]
+
+
+def sparse_mass(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:
+    """Mass matrix (n, n) at q, one block a body."""
+    return scipy.sparse.csr_matrix(scipy.sparse.block_diag(body_masses(system, q), format="csr"))
+
+
+def stiffness_diagonal(system: System) -> NDArray[np.float64]:
+    """Elastic stiffness (n,) of each coordinate: omega^2 of modal ones, zero of rigid ones."""
+    diagonal = np.zeros(system.n)
+    for body in system.bodies:
+        diagonal[body.flexible] = body.modes.omega**2
+    return diagonal
+
+
+def sparse_jacobian(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:
+    """Phi_q (m, n) at q; zero in the rows of springs and dampers.
+
+    Phi' at rest but for one coordinate is a column. Bodies that no row ties are moved at once, so that the number of
+    columns to compute does not grow with the number of bodies; it holds for whatever kinds of joint there are.
+    """
+    row, owner = tied_bodies(system)
+    offset = np.array([body.offset for body in system.bodies])
+    size = np.array([3 + body.nf for body in system.bodies])
+    colour = _colours(row, owner, len(system.bodies))
+    still, phi, rate = no_signals(system.packed), np.zeros(system.m), np.zeros(system.m)
+    rows, columns, values = [], [], []
+    for group in range(int(colour.max(initial=-1)) + 1):
+        of_group = colour == group
+        for local in range(int(size[of_group].max(initial=0))):
+            v = np.zeros(system.n)
+            v[offset[of_group & (size > local)] + local] = 1.0
+            constraint_values(system.packed, still, 0.0, q, v, phi, rate)
+            here = of_group[owner] & (size[owner] > local)
+            rows.append(row[here])
+            columns.append(offset[owner[here]] + local)
+            values.append(rate[row[here]])
+    if not rows:
+        return scipy.sparse.csr_matrix((system.m, system.n))
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    jacobian = scipy.sparse.csr_matrix(entries, shape=(system.m, system.n))
+    jacobian.eliminate_zeros()
+    return jacobian
+
+
+def tied_bodies(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of a constraint row and a body that it touches, as two arrays."""
+    ports = system.packed.ports
+    owner = system.packed.markers["body"][ports["marker"]]
+    pairs = np.column_stack([np.repeat(ports["row"], ports["rows"]), np.repeat(owner, ports["rows"])])
+    first = np.concatenate([[0], np.cumsum(ports["rows"])])[:-1]
+    pairs[:, 0] += np.arange(len(pairs)) - np.repeat(first, ports["rows"])
+    pairs = np.unique(pairs, axis=0)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def _colours(row: NDArray[np.int64], owner: NDArray[np.int64], bodies: int) -> NDArray[np.int64]:
+    """A colour of every body, another than that of any body it shares a row with."""
+    touched: dict[int, list[int]] = {}
+    for r, body in zip(row.tolist(), owner.tolist(), strict=True):
+        touched.setdefault(r, []).append(body)
+    neighbours: list[set[int]] = [set() for _ in range(bodies)]
+    for group in touched.values():
+        for body in group:
+            neighbours[body].update(group)
+    return greedy_colours(neighbours)
+
+
+def greedy_colours(neighbours: list[set[int]]) -> NDArray[np.int64]:
+    """A colour of every body, one that no neighbour has."""
+    colours = np.full(len(neighbours), -1)
+    for body, others in enumerate(neighbours):
+        taken = {int(colours[other]) for other in others if other != body}
+        colours[body] = next(colour for colour in range(len(taken) + 1) if colour not in taken)
+    return colours
+
+
+class Saddle:
+    """The factored system [[W, C^T], [C, -damping]] [x; mu] = [f; r], W symmetric (n, n), C (m, n).
+
+    Rows and columns are scaled to entries of one size. Dependent rows of C are allowed: the multipliers are then one of
+    many, and where r contradicts itself C x = r holds in the sense of least squares of the scaled rows.
+
+    Parameters
+    ----------
+    W, C : sparse matrices
+    damping : (m,) array, optional
+        In the scale of C W^-1 C^T.
+    """
+
+    def __init__(
+        self, W: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, damping: NDArray[np.float64] | None = None
+    ) -> None:
+        diagonal = np.abs(W.diagonal())
+        diagonal[diagonal == 0.0] = 1.0
+        self._column = 1.0 / np.sqrt(diagonal)
+        columns = scipy.sparse.dia_matrix(scipy.sparse.diags(self._column))
+        scaled = scipy.sparse.csr_matrix(C @ columns)
+        size = np.sqrt(np.asarray(scaled.multiply(scaled).sum(axis=1)).ravel())
+        self._row = 1.0 / np.where(size > 0.0, size, 1.0)
+        scaled = scipy.sparse.csr_matrix(scipy.sparse.diags(self._row) @ scaled)
+        corner = np.zeros(self._row.size) if damping is None else damping * self._row**2
+        blocks = [[columns @ W @ columns, scaled.T], [scaled, -scipy.sparse.diags(corner)]]
+        self._matrix = scipy.sparse.csc_matrix(scipy.sparse.bmat(blocks))
+        self._n = self._column.size
+        regular = np.concatenate([np.zeros(self._n), np.full(self._row.size, -_REGULAR)])
+        self._factor = scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(self._matrix + scipy.sparse.diags(regular)))
+
+    def solve(
+        self, f: NDArray[np.float64] | float = 0.0, r: NDArray[np.float64] | float = 0.0
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Solve for x (n,) and mu (m,) with right-hand sides f (n,) and r (m,); either may be zero."""
+        right = np.concatenate([self._column * f, self._row * r])
+        z = self._factor.solve(right)
+        left = right - self._matrix @ z
+        for _ in range(_REFINEMENTS):
+            better = z + self._factor.solve(left)
+            rest = right - self._matrix @ better
+            if not np.linalg.norm(rest) < _WORTH_WHILE * np.linalg.norm(left):
+                break
+            z, left = better, rest
+        return self._column * z[: self._n], self._row * z[self._n :]

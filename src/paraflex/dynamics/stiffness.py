@@ -1,0 +1,147 @@
+"""Forces at rest and how they change with the pose: stiffness by springs, weight, loads and constraint forces."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+
+from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.sparse import greedy_colours, tied_bodies, without_stiffness
+from paraflex.dynamics.state import point_position
+from paraflex.dynamics.system import System
+from paraflex.kernel.packed import SPRING
+from paraflex.kernel.stage import equations
+
+Array = NDArray[np.float64]
+
+# Differences of fourth order: places and weights, for a step of one.
+_STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
+# The step: so many metres or radians, or as a fraction of a spring between points that is shorter than a metre.
+_STEP, _SHORTEST = 1e-3, 1e-6
+
+
+class RestingForces:
+    """Forces at rest (n,), as they stand on the left of the equations, and rows of springs (m,).
+
+    All forces but the stiffness of beams, which is known exactly and would drown them.
+    """
+
+    def __init__(self, system: System, time: float) -> None:
+        self.packed, self.time = without_stiffness(system.packed), time
+        self.signals, self.workspace = moment_signals(system.mechanism, time), system.workspace()
+        self.still, self.torques = np.zeros(system.n), np.zeros(len(system.mechanism.motors))
+        self.springs = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
+
+    def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
+        """At coordinates (n,) with multipliers (m,)."""
+        ws, still = self.workspace, self.still
+        equations(self.packed, self.signals, self.time, 0.0, 0.0, q, still, still, lam, self.torques, ws)
+        return ws.f.copy(), ws.rows[self.springs]
+
+
+def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.sparse.csr_matrix:
+    """Derivative (n, n) of the forces at rest by the coordinates, constraint forces kept, less that of the beams.
+
+    By differences; bodies between which no force or row reaches are displaced at once.
+
+    Parameters
+    ----------
+    system : System
+    time : float
+        For prescribed angles [s].
+    q : (n,) array
+    lam : (m,) array
+        Multipliers of constraints and torques of springs at joints at that pose.
+    """
+    forces, steps = RestingForces(system, time), _steps(system, q)
+    neighbours, spring_rows = _neighbours(system), _spring_rows(system, forces.springs)
+    colour = greedy_colours([set().union(*(neighbours[other] for other in others)) for others in neighbours])
+    stiffness, slopes = _Entries(), _Entries()
+    for group in range(int(colour.max(initial=-1)) + 1):
+        members = np.nonzero(colour == group)[0].tolist()
+        for local in range(max(3 + system.bodies[i].nf for i in members)):
+            moved = [i for i in members if local < 3 + system.bodies[i].nf]
+            columns = [system.bodies[i].offset + local for i in moved]
+            df, dr = _difference(forces, q, lam, np.array(columns), steps)
+            for i, column in zip(moved, columns, strict=True):
+                for other in neighbours[i]:
+                    stiffness.add(np.arange(*system.bodies[other].all.indices(system.n)), column, df, steps[column])
+                slopes.add(np.array(spring_rows[i], dtype=int), column, dr, steps[column])
+    K = stiffness.matrix(system.n, system.n)
+    # A spring at a joint is a multiplier: its torque is its row over its compliance.
+    J = slopes.matrix(forces.springs.size, system.n)
+    strength = scipy.sparse.diags(1.0 / system.packed.rows["compliance"][forces.springs])
+    return scipy.sparse.csr_matrix(0.5 * (K + K.T) + J.T @ strength @ J)
+
+
+class _Entries:
+    """Entries of a sparse matrix, collected column by column."""
+
+    def __init__(self) -> None:
+        self.rows: list[NDArray[np.int64]] = [np.zeros(0, dtype=int)]
+        self.columns: list[NDArray[np.int64]] = [np.zeros(0, dtype=int)]
+        self.values: list[Array] = [np.zeros(0)]
+
+    def add(self, rows: NDArray[np.int64], column: int, values: Array, step: float) -> None:
+        self.rows.append(rows)
+        self.columns.append(np.full(rows.size, column))
+        self.values.append(values[rows] / step)
+
+    def matrix(self, m: int, n: int) -> scipy.sparse.csr_matrix:
+        places = (np.concatenate(self.rows), np.concatenate(self.columns))
+        return scipy.sparse.csr_matrix((np.concatenate(self.values), places), shape=(m, n))
+
+
+def _difference(
+    forces: RestingForces, q: Array, lam: Array, columns: NDArray[np.int64], steps: Array
+) -> tuple[Array, Array]:
+    """Change of forces and spring rows by one step of the coordinates in the columns."""
+    df, dr = np.zeros(q.size), np.zeros(forces.springs.size)
+    for place, weight in _STENCIL:
+        moved = q.copy()
+        moved[columns] += place * steps[columns]
+        f, rows = forces(moved, lam)
+        df += weight * f
+        dr += weight * rows
+    return df, dr
+
+
+def _steps(system: System, q: Array) -> Array:
+    """A step (n,) of each coordinate, such that points move by a thousandth of a metre or of the shortest spring."""
+    lengths = [1.0]
+    for spring in system.mechanism.linear_springs:
+        if spring.length > 0.0:
+            across = point_position(system, q, spring.b) - point_position(system, q, spring.a)
+            lengths.append(max(float(np.linalg.norm(across)), _SHORTEST))
+    steps = np.full(system.n, _STEP * min(lengths))
+    for body in system.bodies:
+        # Modes of unit mass displace points by about one over the square root of the mass.
+        steps[body.flexible] *= np.sqrt(body.integrals.m)
+    return steps
+
+
+def _neighbours(system: System) -> list[set[int]]:
+    """For each body itself and all that a joint or a spring ties to it."""
+    neighbours = [{i} for i in range(len(system.bodies))]
+    row, owner = tied_bodies(system)
+    tied: dict[int, list[int]] = {}
+    for r, body in zip(row.tolist(), owner.tolist(), strict=True):
+        tied.setdefault(r, []).append(body)
+    groups = list(tied.values())
+    for spring in system.mechanism.linear_springs:
+        groups.append([system.index[ref.body] for ref in (spring.a, spring.b) if not ref.on_ground])
+    for group in groups:
+        for body in group:
+            neighbours[body].update(group)
+    return neighbours
+
+
+def _spring_rows(system: System, springs: NDArray[np.int64]) -> list[list[int]]:
+    """For each body the springs at joints that touch it, counted among springs."""
+    number = {row: k for k, row in enumerate(springs.tolist())}
+    touching: list[list[int]] = [[] for _ in system.bodies]
+    for row, body in zip(*(part.tolist() for part in tied_bodies(system)), strict=True):
+        if row in number:
+            touching[body].append(number[row])
+    return touching

@@ -1,0 +1,80 @@
+"""What a look at a run between slices of the time loop may find, and what is made of dependent rows at its end."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System, dependence
+from paraflex.dynamics.projection import NAMED, contradiction, joint_gaps
+from paraflex.dynamics.rank import DENSE_ROWS
+from paraflex.dynamics.sparse import sparse_jacobian
+from paraflex.kernel.packed import Signals
+
+# Slopes of a beam this large are beyond any theory of small slopes [rad]: what computes them diverges.
+_LARGEST_SLOPE = 2.0
+# Joints that are further apart than this, as a fraction of the largest link, or motions further off [rad], have come
+# apart. Where constraints depend on one another they contradict one another long before.
+_APART, _CONTRADICTION = 1e-2, 1e-3
+# Multipliers that exert the same forces but for this fraction are the same.
+_SAME_FORCES = 1e-9
+
+
+def bent_too_far(system: System, q: NDArray[np.float64]) -> str:
+    """Which beam is bent beyond what the theory can describe, and how far; empty for none."""
+    for body in system.bodies:
+        slope = float(np.max(np.abs(body.slopes(q)), initial=0.0))
+        if slope > _LARGEST_SLOPE:
+            geometry = system.mechanism.geometry.value
+            return f"{body.name} bends by {slope:.1f} rad, too far for {geometry} geometry: the motion diverges"
+    return ""
+
+
+def come_apart(
+    system: System, signals: Signals, t: float, q: NDArray[np.float64], dependent: int, tolerance: float
+) -> str:
+    """Which constraints are left beyond what errors of integration explain, and how far; empty for none.
+
+    Parameters
+    ----------
+    system : System
+    signals : Signals
+    t : float
+        [s]
+    q : (n,) array
+    dependent : int
+        Constraint rows that follow from others: nothing but their consistency holds them.
+    tolerance : float
+        Of the run [m]; what it allows is no fault.
+    """
+    phi, _ = system.constraints(signals, t, q, np.zeros(system.n))
+    bodies = system.packed.bodies
+    # A radius of gyration is there whatever points a body has; angles are measured in rad.
+    size = min(1.0, float(np.sqrt(np.max(bodies["I0"] / bodies["m"]))))
+    bound = max((_CONTRADICTION if dependent else _APART) * size, tolerance)
+    if not np.max(np.abs(phi), initial=0.0) > bound:
+        return ""
+    if dependent:
+        return contradiction(system, phi, dependence(system, q, count=dependent), "positions")
+    gaps = joint_gaps(system, phi)
+    gap, where = max(gaps.values()), " and ".join(list(gaps)[:NAMED])
+    return f"joints come apart, by {gap:.3g} in {where}: choose larger Baumgarte coefficients or a finer tolerance"
+
+
+def least_norm(
+    system: System, q: NDArray[np.float64], multipliers: NDArray[np.float64], dependent: int
+) -> NDArray[np.float64]:
+    """Multipliers (k, m) at poses (k, n) with the least sum of squares, where so many rows are dependent.
+
+    They exert the same forces. Near a singular position other rows nearly depend on one another too, and none of them
+    can be told from the others: there multipliers stay as they are.
+    """
+    if not dependent:
+        return multipliers
+    out = multipliers.copy()
+    for pose, lam in zip(q, out, strict=True):
+        jacobian = sparse_jacobian(system, pose) if system.m > DENSE_ROWS else system.jacobian(pose)
+        least = dependence(system, pose, count=dependent).least_norm(lam)
+        if np.linalg.norm(jacobian.T @ (least - lam)) <= _SAME_FORCES * np.linalg.norm(jacobian.T @ lam):
+            lam[:] = least
+    return out

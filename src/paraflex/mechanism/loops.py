@@ -1,0 +1,59 @@
+"""Closed loops of a mechanism: which joints lead from a body, or the ground, back to it."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from paraflex.mechanism.joints import GROUND
+from paraflex.mechanism.mechanism import Mechanism
+
+
+def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:
+    """Independent loops, each by the names of its joints in the order they come.
+
+    Bodies and the ground are nodes, joints edges. A tree of joints is grown outwards from the ground, nearest bodies
+    first; every joint left over closes a loop with the ways back to where they meet. There are as many as joints less
+    bodies, and they are short where the ground is near.
+    """
+    parent = _tree(mechanism)
+    in_tree = {entry[0] for entry in parent.values() if entry is not None}
+    found = []
+    for joint in mechanism.joints:
+        if joint.name in in_tree:
+            continue
+        up_a, up_b = _way_back(parent, joint.a.body), _way_back(parent, joint.b.body)
+        while up_a and up_b and up_a[-1] == up_b[-1]:
+            up_a.pop()
+            up_b.pop()
+        found.append((*reversed(up_a), joint.name, *up_b))
+    return found
+
+
+def _tree(mechanism: Mechanism) -> dict[str, tuple[str, str] | None]:
+    """For each body the joint and the body that lead towards the root, None for that."""
+    neighbours: dict[str, list[tuple[str, str]]] = {}
+    for joint in mechanism.joints:
+        neighbours.setdefault(joint.a.body, []).append((joint.name, joint.b.body))
+        neighbours.setdefault(joint.b.body, []).append((joint.name, joint.a.body))
+    parent: dict[str, tuple[str, str] | None] = {}
+    for root in (GROUND, *(body.name for body in mechanism.bodies)):
+        if root in parent:
+            continue
+        parent[root] = None
+        queue = deque([root])
+        while queue:
+            here = queue.popleft()
+            for joint, other in neighbours.get(here, []):
+                if other not in parent:
+                    parent[other] = (joint, here)
+                    queue.append(other)
+    return parent
+
+
+def _way_back(parent: dict[str, tuple[str, str] | None], body: str) -> list[str]:
+    """Joints from a body to the root of its tree, the nearest first."""
+    way = []
+    while (step := parent[body]) is not None:
+        way.append(step[0])
+        body = step[1]
+    return way
