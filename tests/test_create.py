@@ -63,7 +63,17 @@ def test_every_library_mechanism_is_sound_and_makes_a_template(name, tmp_path):
     facts = json.loads(paraflex("info", name, "--json").stdout)
     assert facts["assembly_closes"] is True
     assert facts["redundant_constraints"] == []
-    assert facts["degrees_of_freedom"] == {"andrews": 1, "four_bar": 0, "pendulum": 1, "spin_up": 0}.get(name, 2)
+    assert facts["degrees_of_freedom"] == {
+        "3prr": 3,
+        "3rrr": 3,
+        "4rrr": 3,
+        "andrews": 1,
+        "four_bar": 0,
+        "pendulum": 1,
+        "slider_crank": 1,
+        "slider_crank_flexible": 0,
+        "spin_up": 0,
+    }.get(name, 2)
 
 
 def test_the_schema_names_every_table_of_the_library_and_its_fields():

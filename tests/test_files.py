@@ -13,7 +13,7 @@ SOURCE = library_file("raparm_i").read_text(encoding="utf-8")
 def test_shipped_file_is_the_builders_mechanism():
     model = load("raparm_i")
     assert model.mechanism == raparm_i()
-    assert library_names() == ["andrews", "five_bar", "four_bar", "pendulum", "raparm_i", "spin_up"]
+    assert "raparm_i" in library_names()
     assert isinstance(model.path(), Polygon)
     assert isinstance(model.paths["circle"], Circle)
     assert model.study.modes == ("+-+-", "-+-+", "+--+", "+++-", "++-+", "++++")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError, suggestion
@@ -71,9 +72,9 @@ def check_ground(mechanism: Mechanism) -> None:
 
 def check_references(mechanism: Mechanism) -> None:
     """Joints, motors, end-effector, assemblies and modes name things that exist."""
-    joints = [joint.name for joint in mechanism.joints]
-    motors = [motor.name for motor in mechanism.motors]
-    bodies = [body.name for body in mechanism.bodies]
+    joints = {joint.name: joint for joint in mechanism.joints}
+    motors = {motor.name: motor for motor in mechanism.motors}
+    bodies = {body.name: body for body in mechanism.bodies}
     for joint in mechanism.joints:
         _known_point(mechanism, joint.a, f"joint.{joint.name}")
         _known_point(mechanism, joint.b, f"joint.{joint.name}")
@@ -206,12 +207,12 @@ def check_loads(mechanism: Mechanism) -> None:
 
 
 def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
-    points = {GROUND: mechanism.ground} | {body.name: body.points for body in mechanism.bodies}
-    _known(ref.body, list(points), field, "body")
+    points = mechanism.points
+    _known(ref.body, points, field, "body")
     if ref.point not in points[ref.body]:
         raise InputError("unknown point", field=field, value=str(ref), remedy=suggestion(ref.point, points[ref.body]))
 
 
-def _known(name: str, known: list[str], field: str, kind: str) -> None:
+def _known(name: str, known: Collection[str], field: str, kind: str) -> None:
     if name not in known:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.joints import (
+    GROUND,
     Joint,
     Motor,
     PointRef,
@@ -136,11 +138,24 @@ class Mechanism:
 
     def body(self, name: str) -> Body:
         """The body of that name."""
-        return next(body for body in self.bodies if body.name == name)
+        return self._bodies_by_name[name]
 
     def joint(self, name: str) -> Joint:
         """The joint of that name."""
-        return next(joint for joint in self.joints if joint.name == name)
+        return self._joints_by_name[name]
+
+    @cached_property
+    def _bodies_by_name(self) -> dict[str, Body]:
+        return {body.name: body for body in self.bodies}
+
+    @cached_property
+    def _joints_by_name(self) -> dict[str, Joint]:
+        return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def points(self) -> Mapping[str, Mapping[str, object]]:
+        """Named points of every body, and of the ground by its name."""
+        return {GROUND: self.ground} | {body.name: body.points for body in self.bodies}
 
     def motor_units(self) -> tuple[str, ...]:
         """What each motor's torque is counted in: N m, or N where its joint slides."""

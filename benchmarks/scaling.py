@@ -1,0 +1,84 @@
+"""How does a step grow with the mechanism? Rows of rigid four-bars, and hanging chains with torsional springs.
+
+    python benchmarks/scaling.py [--chain] [n ...]
+
+For each n: time to build mechanism and system, to close and start it, and of a step, of one Newton iteration and of one
+factorisation of bodies over the same number of attempted steps, kernels warm, the fastest of a few repeats; memory of
+all arrays of a run. The goal: twice the loops cost at most 2.2 times as much a step.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+from paraflex.dynamics import State, System, build_system, constant_signals, pack_signals
+from paraflex.integrators import IntegrationOptions
+from paraflex.integrators.esdirk import Run, prepare
+from paraflex.kernel.run_state import ITERATIONS, REJECTED, STEPS
+from paraflex.mechanism import Mechanism, chain_of_segments, four_bars_in_a_row
+
+NUMBERS = (10, 20, 50, 100, 200, 500, 1000)
+STEPS_TIMED, REPEATS = 200, 5
+# Away from the first position in line, at 0.71 s.
+DURATION = 0.5
+
+
+def main() -> None:
+    chain = "--chain" in sys.argv
+    numbers = [int(text) for text in sys.argv[1:] if text.isdigit()] or NUMBERS
+    make = chain_of_segments if chain else four_bars_in_a_row
+    heading = ("n", "rows", "build [s]", "start [s]", "us/step", "us/iter.", "iter./step", "MB", "ratio")
+    print("".join(f"{text:>11}" for text in heading))
+    before = None
+    for n in numbers:
+        began = time.perf_counter()
+        mechanism = make(n)
+        system = build_system(mechanism)
+        built = time.perf_counter()
+        start = state_of(mechanism, system)
+        started = time.perf_counter()
+        step, iteration, run = fastest(system, start)
+        ratio = f"{step / before[1] / (n / before[0]) * 2:11.2f}" if before else ""
+        before = (n, step)
+        print(
+            f"{n:11d}{system.m:11d}{built - began:11.3f}{started - built:11.3f}{1e6 * step:11.1f}{1e6 * iteration:11.1f}"
+            f"{step / iteration:11.2f}{megabytes(run):11.2f}{ratio}"
+        )
+
+
+def state_of(mechanism: Mechanism, system: System) -> State:
+    """The benchmark's start: cranks upright and turning at -1 rad/s; a chain straight and at rest."""
+    raise NotImplementedError
+
+
+def fastest(system: System, start: State) -> tuple[float, float, Run]:
+    """Seconds a step and an iteration, of the fastest repeat."""
+    signals, _ = pack_signals(system.mechanism, constant_signals([], DURATION), DURATION)
+    best = None
+    for _ in range(REPEATS):
+        run = prepare(system, signals, start, np.array([DURATION]), None, IntegrationOptions(tolerance=1e-5))
+        run.start()
+        run.march(10)
+        counts = run.state.counts
+        steps, iterations = counts[STEPS] + counts[REJECTED], counts[ITERATIONS]
+        began = time.perf_counter()
+        run.march(STEPS_TIMED)
+        taken = time.perf_counter() - began
+        steps, iterations = counts[STEPS] + counts[REJECTED] - steps, counts[ITERATIONS] - iterations
+        if best is None or taken / steps < best[0]:
+            best = (taken / steps, taken / iterations, run)
+    assert best is not None
+    return best
+
+
+def megabytes(run: Run) -> float:
+    """Of all arrays of a run."""
+    parts = (run.system.packed, run.workspace, run.slow, run.state, run.samples)
+    return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray)) / 1e6
+
+
+if __name__ == "__main__":
+    main()
