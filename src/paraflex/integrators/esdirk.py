@@ -32,7 +32,7 @@ from paraflex.kernel.run_state import (
     PHI_MAX,
     REJECTED,
     SAMPLE,
-    SINGULAR,
+    SINGULAR_STEPS,
     STEP,
     STEPS,
     TIME,
@@ -55,9 +55,11 @@ _NEWTON_MEMORY = 0.002
 _MEMORY = 0.25
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
+# Constraint rows with less than this of their squares left depend on the others for the moment and keep their
+# multipliers: small enough that this lasts a thousandth of a radian, large enough for good conditioning elsewhere.
+_DEPENDENT_PART = 1e-7
 _CAUSES = {
     NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
-    SINGULAR: "the constraints lose rank, a singular position",
     NOT_FINITE: "the solution is no longer finite",
     ERROR_TEST: "the error test asks for steps below the smallest one",
 }
@@ -138,6 +140,8 @@ class Solution:
         Largest |Phi| [m, rad] and |Phi'| at accepted steps.
     energy_balance_max : float
         Largest |kinetic + strain energy - start - work| at accepted steps [J].
+    singular_steps : int
+        Attempted steps so near a singular position that constraints depended on one another which elsewhere do not.
     """
 
     t: NDArray[np.float64]
@@ -158,6 +162,7 @@ class Solution:
     constraint_position_max: float
     constraint_velocity_max: float
     energy_balance_max: float
+    singular_steps: int = 0
 
 
 def integrate(
@@ -205,7 +210,8 @@ def integrate(
     options = options or IntegrationOptions()
     run = prepare(system, signals, initial, times, knots, options)
     status, message, bent, drift, state = "complete", "", "", "", run.state
-    code, limits = run.start(), (run.controls.dependent_rows, options.tolerance)
+    run.start()
+    code, limits = PAUSED, (run.controls.dependent_rows, options.tolerance)
     try:
         while code == PAUSED:
             attempts = int(state.counts[STEPS] + state.counts[REJECTED])
@@ -250,10 +256,10 @@ class Run:
     slow: Workspace
     samples: Samples
 
-    def start(self) -> int:
-        """First stage and first sample; a code of `kernel.run_state`."""
+    def start(self) -> None:
+        """First stage and first sample."""
         arguments = (self.system.packed, self.signals, self.tableau, self.controls)
-        return start(*arguments, self.state, self.workspace, self.samples)
+        start(*arguments, self.state, self.workspace, self.samples)
 
     def march(self, attempts: int) -> int:
         """So many attempted steps; a code of `kernel.run_state`."""
@@ -269,9 +275,9 @@ class Run:
         """A first stage with what is given after a jump; energies go on counting from the run's start."""
         kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
         arguments = (self.system.packed, self.signals, self.tableau, self.controls)
-        code = start(*arguments, self.state, self.workspace, _samples(np.zeros(0), self.system))
+        start(*arguments, self.state, self.workspace, _samples(np.zeros(0), self.system))
         self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
-        return code
+        return PAUSED
 
 
 def prepare(
@@ -300,6 +306,7 @@ def prepare(
         alpha=options.alpha,
         beta=options.beta,
         max_step=options.max_step,
+        dependent_part=_DEPENDENT_PART,
         dependent_rows=int(factor_system(system.packed, 0.0, initial.q, workspace)),
     )
     inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
@@ -351,4 +358,5 @@ def _solution(run: Run, wall_time: float, status: str, message: str) -> Solution
         constraint_position_max=float(state.clock[PHI_MAX]),
         constraint_velocity_max=float(state.clock[DPHI_MAX]),
         energy_balance_max=float(state.clock[BALANCE]),
+        singular_steps=int(state.counts[SINGULAR_STEPS]),
     )

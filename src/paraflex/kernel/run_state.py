@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Why `march` returned.
-PAUSED, FINISHED, NO_CONVERGENCE, SINGULAR, NOT_FINITE, ERROR_TEST = range(6)
+PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # March.clock
 TIME, STEP, WORK, FACTOR_G, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX = range(10)
 # March.counts
-STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES = range(8)
+STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES, SINGULAR_STEPS = range(9)
 
 
 class Tableau(NamedTuple):
@@ -40,6 +40,7 @@ class Controls(NamedTuple):
     beta: float
     max_step: float
     dependent_rows: int
+    dependent_part: float  # a row with less than this of its diagonal left when others are eliminated depends on them
 
 
 class March(NamedTuple):
@@ -79,7 +80,7 @@ def make_march(n: int, m: int, stages: int, motors: int) -> March:
     """Allocate the state of a run with n coordinates and m constraint rows."""
     return March(
         clock=np.zeros(10),
-        counts=np.zeros(8, dtype=np.int64),
+        counts=np.zeros(9, dtype=np.int64),
         q=np.zeros(n),
         v=np.zeros(n),
         stage_t=np.zeros((2, stages)),

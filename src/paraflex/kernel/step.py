@@ -37,7 +37,7 @@ from paraflex.kernel.run_state import (
     NOT_FINITE,
     PAUSED,
     RATE,
-    SINGULAR,
+    SINGULAR_STEPS,
     STEPS,
 )
 from paraflex.kernel.signals import evaluate_signal
@@ -174,8 +174,9 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     if fresh:
         renew_factor(p, g, m, ws)
     note_friction(p, m.q, m.v, ws.mu, ws.compliance)
-    if orient(p, m.q, ws) > controls.dependent_rows:
-        return SINGULAR, 0.0
+    # Rows that depend on others here keep their multipliers: so a singular position is passed.
+    if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
+        m.counts[SINGULAR_STEPS] += 1
     tolerance = controls.newton_fraction * controls.rate * h
     slowest = 0
     i = 1
@@ -204,8 +205,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
                 return NO_CONVERGENCE, 0.0
             # An old factor may be to blame: once more with a new one before the step is cut.
             renew_factor(p, g, m, ws)
-            if orient(p, m.q, ws) > controls.dependent_rows:
-                return SINGULAR, 0.0
+            orient(p, m.q, ws, controls.dependent_part)
             fresh = True
             continue
         slowest = max(slowest, iterations)
