@@ -3,7 +3,7 @@
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, node_marker
 from paraflex.dynamics.equilibrium import static_equilibrium
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
-from paraflex.dynamics.start import BodyValues, Deflection, Start, check_start, start_state
+from paraflex.dynamics.start import start_state
 from paraflex.dynamics.state import (
     State,
     consistent_state,
@@ -17,15 +17,11 @@ from paraflex.dynamics.system import System, build_system
 
 __all__ = [
     "BodyCoordinates",
-    "BodyValues",
-    "Deflection",
     "InputSignals",
     "Marker",
-    "Start",
     "State",
     "System",
     "build_system",
-    "check_start",
     "consistent_state",
     "constant_signals",
     "moment_signals",

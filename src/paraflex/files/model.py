@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
-from paraflex.dynamics import Start
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.files.expressions import evaluate_parameters
@@ -53,6 +52,7 @@ from paraflex.mechanism import (
     RevoluteJoint,
     RigidBody,
     Section,
+    Start,
     TorsionalDamper,
     TorsionalSpring,
     parse_mode,

@@ -27,6 +27,7 @@ from paraflex.mechanism.mechanism import (
 from paraflex.mechanism.poses import Pose, approximate_poses
 from paraflex.mechanism.raparm import raparm_i
 from paraflex.mechanism.segments import FIRST_END, LAST_END, Segmented, finite_segments, proportional_segments
+from paraflex.mechanism.start import BodyValues, Deflection, Start, check_start
 
 __all__ = [
     "FIRST_END",
@@ -37,8 +38,10 @@ __all__ = [
     "AppliedTorque",
     "Assembly",
     "Body",
+    "BodyValues",
     "ConstantSpeed",
     "Curvature",
+    "Deflection",
     "EndEffector",
     "FlexibleBeam",
     "Geometry",
@@ -58,11 +61,13 @@ __all__ = [
     "SampledAngle",
     "Section",
     "Segmented",
+    "Start",
     "TabulatedLaw",
     "TorsionalDamper",
     "TorsionalSpring",
     "approximate_poses",
     "check_mechanism",
+    "check_start",
     "finite_segments",
     "mode_of_motors",
     "mode_of_signs",
