@@ -6,7 +6,7 @@ from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joi
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
-from paraflex.dynamics.start import BodyValues, Deflection, Start, check_start, start_state
+from paraflex.dynamics.start import start_state
 from paraflex.dynamics.state import (
     State,
     consistent_state,
@@ -19,19 +19,15 @@ from paraflex.dynamics.system import System, build_system
 
 __all__ = [
     "BodyCoordinates",
-    "BodyValues",
-    "Deflection",
     "Dependence",
     "InputSignals",
     "JointCoordinate",
     "Marker",
-    "Start",
     "State",
     "System",
     "Vibration",
     "axis_angle",
     "build_system",
-    "check_start",
     "consistent_state",
     "constant_signals",
     "dependence",

@@ -61,6 +61,7 @@ from paraflex.mechanism.segments import (
     finite_segments,
     proportional_segments,
 )
+from paraflex.mechanism.start import BodyValues, Deflection, Start, check_start
 
 __all__ = [
     "FIRST_END",
@@ -72,9 +73,11 @@ __all__ = [
     "Assembly",
     "AssumedModesBeam",
     "Body",
+    "BodyValues",
     "ConstantSpeed",
     "Curvature",
     "Damping",
+    "Deflection",
     "EndEffector",
     "FlexibleBeam",
     "Geometry",
@@ -106,6 +109,7 @@ __all__ = [
     "Sine",
     "SlidingJoint",
     "SlotJoint",
+    "Start",
     "TabulatedLaw",
     "TorsionalDamper",
     "TorsionalSpring",
@@ -113,6 +117,7 @@ __all__ = [
     "approximate_poses",
     "check_mechanism",
     "check_segmentable",
+    "check_start",
     "finite_segments",
     "given_shapes",
     "loops",
