@@ -13,7 +13,7 @@ from paraflex.actuation.allocation import check_mode
 from paraflex.cli.tables import plain_console
 from paraflex.dynamics import build_system, consistent_state, redundant_rows
 from paraflex.errors import ActuationError, NumericalError
-from paraflex.files import library_names, load
+from paraflex.files import generator_names, library_names, load
 from paraflex.simulate import plan_tracking
 
 _FREQUENCIES_SHOWN = 3
@@ -60,7 +60,7 @@ def info_command(source: str, as_json: bool) -> None:
             link["name"], link["kind"], length, f"{link['mass']:.4f}", elements, str(link["coordinates"]), lowest
         )
     console.print(links)
-    console.print(f"library: {', '.join(library_names())}; paraflex new NAME --from one of them")
+    console.print(f"library: {', '.join([*library_names(), *generator_names()])}; paraflex new NAME --from one of them")
 
 
 def describe(source: str) -> dict[str, Any]:
