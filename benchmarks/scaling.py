@@ -2,8 +2,8 @@
 
     python benchmarks/scaling.py [--chain] [n ...]
 
-For each n: time to build mechanism and system, and to close and start it; of a step and of one Newton iteration over the
-same number of attempted steps, kernels warm, the fastest of a few repeats; memory of all arrays of a run. The last
+For each n: time to build mechanism and system, and to close and start it; of a step and of one Newton iteration over
+the same number of attempted steps, kernels warm, the fastest of a few repeats; memory of all arrays of a run. The last
 column is the growth of a step's time with twice the n. The goal: at most 2.2.
 """
 

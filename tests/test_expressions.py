@@ -161,5 +161,5 @@ def test_expressions_that_fail_name_file_field_and_remedy(tmp_path, new, says):
 def test_parameters_are_a_table(tmp_path):
     file = tmp_path / "odd.toml"
     file.write_text('parameters = 3\nname = "odd"\n')
-    with pytest.raises(InputError, match="parameters: should be a valid dictionary"):
+    with pytest.raises(InputError, match="parameters: should be a table"):
         load(file)

@@ -7,6 +7,7 @@ import pytest
 
 from paraflex.dynamics import build_system, consistent_state, pack_signals
 from paraflex.errors import IntegrationError
+from paraflex.files import library_file, load
 from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.mechanism import (
     Assembly,
@@ -20,6 +21,7 @@ from paraflex.mechanism import (
     SampledAngle,
     Section,
 )
+from paraflex.motion import simulate_motion
 from paraflex.results.motion import tip_deflection
 
 RAMP, LENGTH = 15.0, 10.0
@@ -121,6 +123,36 @@ def test_second_order_geometry_stiffens_at_six_times_the_speed():
     stretch = u @ system.bodies[0].integrals.D[-4]
     assert stretch.mean() == pytest.approx(MASS_PER_LENGTH * 36.0 * LENGTH**3 / (3 * AXIAL_STIFFNESS), rel=0.005)
     assert tip[lowest, 0] < -0.01
+
+
+def from_file(folder, speed, geometry, end):
+    """The library's file at another speed and geometry, and its motion to a time."""
+    text = library_file("spin_up").read_text(encoding="utf-8")
+    assert "w_s = 6.0 " in text
+    file = folder / "spin_up.toml"
+    file.write_text(text.replace("w_s = 6.0 ", f"w_s = {speed} "), encoding="utf-8")
+    model = load(file)
+    options = IntegrationOptions(tolerance=1e-6 if speed == 1.0 else 1e-4)
+    run = simulate_motion(model.mechanism.with_geometry(geometry), end, samples=round(100 * end) + 1, options=options)
+    return run, tip_deflection(run.system, "beam", run.solution.q)
+
+
+def test_the_library_file_at_unit_speed(tmp_path):
+    run, tip = from_file(tmp_path, 1.0, "linear", 10.0)
+    np.testing.assert_allclose(tip[[500, 1000], 1], [-0.0797297245, -0.0833281499], rtol=0, atol=2e-6)
+    lowest = np.argmin(tip[:, 1])
+    assert tip[lowest, 1] == pytest.approx(-0.107011569, abs=2e-6)
+    # Sampled every 10 ms.
+    assert run.times[lowest] == pytest.approx(7.879, abs=0.01)
+
+
+def test_the_library_file_at_six_times_the_speed(tmp_path):
+    run, tip = from_file(tmp_path, 6.0, "second-order", 20.0)
+    assert load("spin_up").mechanism == load(tmp_path / "spin_up.toml").mechanism
+    assert tip[:, 1].min() == pytest.approx(-0.573835, rel=0.01)
+    beam = run.system.bodies[0]
+    stretch = run.solution.q[run.times > RAMP + 1.0][:, beam.flexible] @ beam.integrals.D[-4]
+    assert stretch.mean() == pytest.approx(MASS_PER_LENGTH * 36.0 * LENGTH**3 / (3 * AXIAL_STIFFNESS), rel=0.005)
 
 
 def test_linear_geometry_diverges_above_its_first_frequency_and_says_so():

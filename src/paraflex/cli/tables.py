@@ -20,15 +20,17 @@ def plain_console(*, stderr: bool = False) -> Console:
 def study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Table:
     """Tracking error and peak torques of every mode in a model, and what the solver did."""
     motors = [motor.name for motor in task.mechanism.motors]
+    heads = [f"{name}\n[{unit}]" for name, unit in zip(motors, task.mechanism.motor_units(), strict=True)]
+    efforts = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
     table = Table(
-        title=f"{figures['mechanism']}, {model}: tracking error and peak torques",
+        title=f"{figures['mechanism']}, {model}: tracking error and peak {efforts}",
         title_justify="left",
         box=box.SIMPLE,
         collapse_padding=True,
         pad_edge=False,
     )
     table.add_column("mode", no_wrap=True)
-    for heading in ("error\n[m]", *(f"{motor}\n[N m]" for motor in motors), "vibration\n[m]", "steps\n", "wall\n[s]"):
+    for heading in ("error\n[m]", *heads, "vibration\n[m]", "steps\n", "wall\n[s]"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name, mode in figures["modes"].items():
         if "steps" not in mode:

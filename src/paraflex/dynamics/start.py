@@ -305,7 +305,9 @@ def _given_velocities(system: System, start: Start, q: NDArray[np.float64]) -> l
         given += [_Given(rows[k], velocity[k], f"start.velocity.point.{ref}") for k in range(2)]
     for name, values in start.rates.items():
         body, field = system.body(name), f"start.rates.{name}"
-        given += [_Given(unit[body.offset + k], rate, field) for k, rate in enumerate(_all_values(body, values, field))]
+        given += [
+            _Given(unit[body.offset + k], float(rate), field) for k, rate in enumerate(_all_values(body, values, field))
+        ]
     return given
 
 

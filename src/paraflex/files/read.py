@@ -16,6 +16,8 @@ from paraflex.files.expressions import evaluate_parameters
 # A mechanism written by hand is some kilobytes; far more is a wrong file, and parsing it would only take long.
 _LARGEST_FILE = 5_000_000
 
+_NO_TABLE = ("dict_type", "model_type", "model_attributes_type")
+
 T = typing.TypeVar("T", bound=BaseModel)
 
 
@@ -75,7 +77,7 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
 
 def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
     problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
-    location = _fields(problem)
+    location = _fields(schema, problem)
     field = ".".join(str(part) for part in location)
     model, description = _look_up(schema, data, location)
     kind, value = problem["type"], problem.get("input")
@@ -94,20 +96,35 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
         said = problem.get("ctx", {})
         remedy = f"give {description}; {said.get('remedy')}"
         return InputError(said.get("problem", ""), field=field, value=value, remedy=remedy, source=source)
+    if kind in _NO_TABLE:
+        return InputError("should be a table", field=field, value=value, remedy=f"give {description}", source=source)
     message = problem["msg"].removeprefix("Input ").replace(" after validation", "")
     text = message[0].lower() + message[1:]
     return InputError(text, field=field, value=value, remedy=f"give {description}", source=source)
 
 
-def _fields(problem: Any) -> list:
+def _fields(schema: type[BaseModel], problem: Any) -> list:
     """An error's location without the variants of unions in it."""
     location = problem["loc"]
-    return [part for position, part in enumerate(location) if not _is_variant(position, location)]
+    tag = _tag_position(schema, location[0]) if location else None
+    return [part for position, part in enumerate(location) if position != tag and not _is_variant(part)]
+
+
+def _tag_position(schema: type[BaseModel], table: Any) -> int | None:
+    """Where an error's location has the `type` of a body, path or load, behind the table's name; None for others."""
+    info = schema.model_fields.get(str(table))
+    if info is None:
+        return None
+    if info.discriminator:
+        return 1
+    inner = (typing.get_args(info.annotation) or (None,))[-1]
+    tagged = any(getattr(part, "discriminator", None) for part in typing.get_args(inner))
+    return 2 if tagged and typing.get_origin(inner) is typing.Annotated else None
 
 
 def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
     """How well a problem explains itself: a misspelt name best, for it explains the missing one beside it."""
-    location = _fields(problem)
+    location = _fields(schema, problem)
     model, _ = _look_up(schema, data, location)
     known = set(model.model_fields) if model is not None else set()
     name = str(location[-1])
@@ -115,19 +132,17 @@ def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
         if name in known:  # said by another variant of a union than the one that is meant
             return 2
         return 0 if get_close_matches(name, list(known), n=1) else 1
+    # A list for a table, and the like, is said by all variants of a union but the one that is meant.
+    if problem["type"] in (*_NO_TABLE, "list_type") and len(location) < len(problem["loc"]):
+        return 2
     return 2 if problem["type"] == "missing" and name not in known else 1
 
 
-def _is_variant(position: int, location: tuple) -> bool:
+def _is_variant(part: Any) -> bool:
     """Whether a part of an error's location names a variant of a union and not a field of the file."""
-    part = location[position]
-    if not isinstance(part, str):
-        return False
-    variants = {"beam", "rigid", "assumed-modes", "modal", "polygon", "line", "circle", "points"}
-    if part.endswith("Table") or "[" in part or part in ("int", "constrained-int", "str", "constrained-str"):
-        return True
-    # A discriminator's value stands right behind the name of the body or path it describes.
-    return part in variants and position == 2 and location[0] in ("body", "path")
+    return isinstance(part, str) and (
+        part.endswith("Table") or "[" in part or part in ("int", "constrained-int", "str", "constrained-str")
+    )
 
 
 def _look_up(schema: type[BaseModel], data: Any, location: list) -> tuple[type[BaseModel] | None, str]:

@@ -11,7 +11,16 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle
+from paraflex.mechanism.joints import (
+    GROUND,
+    Joint,
+    Motor,
+    PointRef,
+    PrescribedAngle,
+    PrismaticJoint,
+    SlidingJoint,
+    SlotJoint,
+)
 from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
 
 TASK_COORDINATES = ("x", "y", "angle")
@@ -147,6 +156,11 @@ class Mechanism:
     def points(self) -> Mapping[str, Mapping[str, object]]:
         """Named points of every body, and of the ground by its name."""
         return {GROUND: self.ground} | {body.name: body.points for body in self.bodies}
+
+    def motor_units(self) -> tuple[str, ...]:
+        """What each motor's torque is counted in: N m, or N where its joint slides."""
+        slides = (PrismaticJoint, SlotJoint, SlidingJoint)
+        return tuple("N" if isinstance(self.joint(motor.joint), slides) else "N m" for motor in self.motors)
 
     def assembly(self, name: str | None = None) -> Assembly:
         """The assembly of that name, or the first.

@@ -62,9 +62,14 @@ def motor_torques(data: xr.Dataset) -> Figure:
                 short = len(name) + len(", ".join(passive)) <= _TITLE_LETTERS
                 listed = ", ".join(map(symbol, passive)) if short else f"{len(passive)} motors"
                 panel.set_title(f"passive: {listed}", loc="right")
-        axes[row, 0].set_ylabel(r"torque $\tau$ [N m]")
+        axes[row, 0].set_ylabel(_effort_label(data["torque"].attrs["units"]))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=38.0)
+
+
+def _effort_label(units: str) -> str:
+    """Motors that turn give torques, motors that slide forces."""
+    return {"N m": r"torque $\tau$ [N m]", "N": "force [N]"}.get(units, f"torque, force [{units}]")
 
 
 @journal_style()

@@ -120,6 +120,11 @@ def tracking_dataset(
         if label is not None:
             twin = "desired " if str(name).endswith("_desired") else ""
             out[name].attrs = {"long_name": twin + label, "units": unit}
+    units = ", ".join(sorted(set(mechanism.motor_units()), reverse=True)) or "N m"
+    for name in ("torque", "peak_torque", "rms_torque"):
+        out[name].attrs["units"] = units
+        if units == "N":
+            out[name].attrs["long_name"] = out[name].attrs["long_name"].replace("torque", "force")
     out.attrs = _provenance(records[0], options or IntegrationOptions(), parameters or {})
     return out
 
