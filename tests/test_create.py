@@ -64,11 +64,14 @@ def test_every_library_mechanism_is_sound_and_makes_a_template(name, tmp_path):
     assert facts["assembly_closes"] is True
     assert facts["redundant_constraints"] == []
     assert facts["degrees_of_freedom"] == {
+        "3prr": 3,
         "3rrr": 3,
         "4rrr": 3,
         "andrews": 1,
         "four_bar": 0,
         "pendulum": 1,
+        "slider_crank": 1,
+        "slider_crank_flexible": 0,
         "spin_up": 0,
     }.get(name, 2)
 
