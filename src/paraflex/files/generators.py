@@ -29,8 +29,8 @@ _GENERATORS: Mapping[str, _Generator] = {
         "# Four-bars in a row, neighbours sharing a crank: benchmark A02 of the IFToMM library of multibody problems.\n"
         "# All links are uniform rods of 1 kg and 1 m. The cranks start upright, their pins at +1 m/s in x.",
         "[start.velocity.angular]\ncrank0 = -1.0 # rad/s; the joints give the rest\n\n"
-        "# At 0.71 s all links lie in line, a singular position.\n"
-        "[study]\nduration = 0.7 # s\nsamples = 701\n",
+        "# From 0.71 s on all links lie in line twice a swing, in a singular position.\n"
+        "[study]\nduration = 10.0 # s\nsamples = 1001\n",
     ),
     "chain": _Generator(
         chain_of_segments,

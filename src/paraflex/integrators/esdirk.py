@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import ConstraintDriftError, InputError, IntegrationError, Moment
+from paraflex.integrators.crossing import Crossings
 from paraflex.integrators.stretches import hidden_from, jump_times
 from paraflex.integrators.tableaux import TR_BDF2
 from paraflex.integrators.watch import bent_too_far, come_apart, least_norm
@@ -138,6 +139,9 @@ class Solution:
         Largest |Phi| [m, rad] and |Phi'| at accepted steps.
     energy_balance_max : float
         Largest |kinetic + strain energy - start - work| at accepted steps [J].
+    singular_positions : tuple of float
+        Times of positions it had to leap over, where constraints depend on one another for an instant [s]: constraint
+        forces have a pole there, and multipliers are NaN at samples within the leap. See `integrators.crossing`.
     """
 
     t: NDArray[np.float64]
@@ -158,6 +162,7 @@ class Solution:
     constraint_position_max: float
     constraint_velocity_max: float
     energy_balance_max: float
+    singular_positions: tuple[float, ...] = ()
 
 
 def integrate(
@@ -206,12 +211,13 @@ def integrate(
     run = prepare(system, signals, initial, times, knots, options)
     status, message, bent, drift, state = "complete", "", "", "", run.state
     code, limits = run.start(), (run.controls.dependent_rows, options.tolerance)
+    crossings = Crossings(run, options.tolerance)
     try:
         while code == PAUSED:
             attempts = int(state.counts[STEPS] + state.counts[REJECTED])
             if attempts >= options.max_steps:
                 break
-            code = run.march(min(_SLICE, options.max_steps - attempts))
+            code = crossings.look(run.march(min(_SLICE, options.max_steps - attempts)))
             bent, drift = (
                 bent_too_far(system, state.q),
                 come_apart(system, signals, state.clock[TIME], state.q, *limits),
@@ -223,6 +229,7 @@ def integrate(
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {state.clock[TIME]:.6g} s"
     solution = _solution(run, time.perf_counter() - began, status, message)
+    solution = replace(solution, singular_positions=tuple(crossings.passed))
     if (code == FINISHED and not (bent or drift)) or status == "interrupted":
         return solution
     cause = bent or drift or (f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code])
@@ -263,9 +270,9 @@ class Run:
             signals, stops = hidden_from(signals, ahead[0]), stops[stops <= ahead[0]]
         arguments = (self.system.packed, signals, self.tableau, self.controls, stops, attempts)
         code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
-        return self._resume() if code == FINISHED and ahead.size else code
+        return self.resume() if code == FINISHED and ahead.size else code
 
-    def _resume(self) -> int:
+    def resume(self) -> int:
         """A first stage with what is given after a jump; energies go on counting from the run's start."""
         kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
         arguments = (self.system.packed, self.signals, self.tableau, self.controls)
