@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from paraflex.files import Model, library_names, load, load_path
     from paraflex.integrators import IntegrationOptions
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
-    from paraflex.mechanism import Mechanism, raparm_i
+    from paraflex.mechanism import Mechanism, chain_of_segments, four_bars_in_a_row, raparm_i
     from paraflex.results import load_results, save_results, summary, tracking_dataset
     from paraflex.simulate import plan_tracking
     from paraflex.studies import run_study
@@ -30,6 +30,8 @@ _HOME = {
     "ParaflexError": "errors",
     "PointPath": "kinematics",
     "Polygon": "kinematics",
+    "chain_of_segments": "mechanism",
+    "four_bars_in_a_row": "mechanism",
     "library_names": "files",
     "load": "files",
     "load_path": "files",
@@ -53,6 +55,8 @@ __all__ = [
     "ParaflexError",
     "PointPath",
     "Polygon",
+    "chain_of_segments",
+    "four_bars_in_a_row",
     "library_names",
     "load",
     "load_path",

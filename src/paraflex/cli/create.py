@@ -7,20 +7,19 @@ import re
 from pathlib import Path
 
 from paraflex.cli.tables import plain_console
-from paraflex.errors import InputError, OutputError, suggestion
-from paraflex.files import library_file, library_names, model_schema
+from paraflex.errors import InputError, OutputError
+from paraflex.files import library_text, model_schema
 
 
 def new_command(name: str, template: str) -> None:
     """Write a commented model file of this name, to edit."""
-    if template not in library_names():
-        raise InputError(
-            "no library mechanism", field="--from", value=template, remedy=suggestion(template, library_names())
-        )
+    try:
+        text = library_text(template)
+    except InputError as error:
+        raise InputError(error.problem, field="--from", value=error.value, remedy=error.remedy) from None
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if path.exists():
         raise OutputError("there is one already", field=str(path), remedy="choose another name, or remove it")
-    text = library_file(template).read_text(encoding="utf-8")
     text = re.sub(r'^name = ".*"$', lambda _: f"name = {json.dumps(path.stem)}", text, count=1, flags=re.MULTILINE)
     try:
         path.write_text(text, encoding="utf-8")

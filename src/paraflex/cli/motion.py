@@ -21,6 +21,9 @@ from paraflex.mechanism import Geometry, Mechanism
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary, save_results
 
+# Singular positions told one by one.
+_NAMED = 4
+
 
 def run_motion(
     request: StudyRequest, model: Model, mechanism: Mechanism, options: IntegrationOptions, console: Console
@@ -130,6 +133,12 @@ def _report(figures: dict, data: xr.Dataset) -> None:
         # Points that segments made by the program hang together at are left out.
         if None not in position and "._" not in point:
             out.print(f"  {point}: ({position[0]:.6g}, {position[1]:.6g}) m")
+    passed = [f"{t:.6g}" for t in figures["singular_positions"]]
+    if passed:
+        more = f" and {len(passed) - _NAMED} more" if len(passed) > _NAMED else ""
+        out.print(
+            f"passed singular positions at t = {', '.join(passed[:_NAMED])} s{more}: joint forces have poles there"
+        )
     out.print(
         f"largest violation of constraints {figures['constraint_position_max']:.1e} m, "
         f"imbalance of energy {figures['energy_balance_max']:.1e} J"

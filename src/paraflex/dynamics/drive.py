@@ -47,9 +47,9 @@ class Reach:
 def reach(system: System, state: State, freedoms: int) -> Reach:
     """Freedoms that motors reach at a pose with so many freedoms, and the smallest sets of motors that reach all.
 
-    With S the columns of the motors' joint coordinates and Z a basis of the motions that constraints allow, motors reach
-    as many as the rank of B = Z^T S; it is that of S^T Z (Z^T M Z)^-1 Z^T S, accelerations per torque, which asks for
-    no basis.
+    With S the columns of the motors' joint coordinates and Z a basis of the motions that constraints allow, motors
+    reach as many as the rank of B = Z^T S; it is that of S^T Z (Z^T M Z)^-1 Z^T S, accelerations per torque, which asks
+    for no basis.
     """
     mechanism = system.mechanism
     motors = [motor.name for motor in mechanism.motors]

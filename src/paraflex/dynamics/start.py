@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
 
 from paraflex.dynamics.coordinates import BodyCoordinates
+from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.state import State, mass_matrix, reference_pose
+from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.dynamics.state import State, reference_pose
 from paraflex.dynamics.system import System
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
@@ -150,8 +153,8 @@ def _closed(
     for _ in range(_MAX_ITERATIONS):
         if not np.any(free) or np.max(np.abs(phi), initial=0.0) < _CLOSED:
             break
-        metric = _metric(system, q, _POSITION_STIFFNESS)[np.ix_(free, free)]
-        q[free] -= _least(metric, system.jacobian(q)[:, free], phi)
+        metric = _metric(system, q, _POSITION_STIFFNESS)[free][:, free]
+        q[free] -= _least(metric, sparse_jacobian(system, q)[:, free], phi)
         phi, _ = system.constraints(signals, time, q, still)
     gap = np.max(np.abs(phi), initial=0.0)
     if gap > _GAP:
@@ -169,7 +172,7 @@ def _velocities(
 ) -> NDArray[np.float64]:
     _, rate = system.constraints(signals, time, q, np.zeros(system.n))
     given = _given_velocities(system, start, q)
-    C = np.vstack([system.jacobian(q), *(entry.row for entry in given)])
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([sparse_jacobian(system, q), *(entry.row for entry in given)]))
     wanted = np.concatenate([-rate, [entry.value for entry in given]])
     if set(start.rates) == set(system.index):
         v = np.zeros(system.n)
@@ -183,7 +186,7 @@ def _velocities(
         v += _least(metric, C, wanted - C @ v)
     slip = np.abs(C @ v - wanted)
     # Metres and radians a second beside those of the terms a row adds up.
-    size = np.maximum(np.abs(C) @ np.abs(v), np.abs(wanted))
+    size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted))
     bad = slip > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SLIP)
     if np.any(bad):
         _refuse_velocities(system, given, slip, bad)
@@ -191,21 +194,21 @@ def _velocities(
 
 
 class _Given(NamedTuple):
-    """One number of a start's velocities: its row of the coordinates' velocities, its value, where it stands."""
+    """One number of a start's velocities: its row (1, n) of the coordinates' velocities, its value, where it stands."""
 
-    row: NDArray[np.float64]
+    row: scipy.sparse.csr_matrix
     value: float
     field: str
 
 
 def _given_velocities(system: System, start: Start, q: NDArray[np.float64]) -> list[_Given]:
-    unit = np.eye(system.n) if start.angular or start.rates else np.zeros((0, 0))
+    unit = scipy.sparse.csr_matrix(scipy.sparse.identity(system.n))
     given = [
         _Given(unit[system.body(name).angle], rate, f"start.velocity.angular.{name}")
         for name, rate in start.angular.items()
     ]
     for ref, velocity in start.point.items():
-        rows = point_rows(system, q, ref)
+        rows = scipy.sparse.csr_matrix(point_rows(system, q, ref))
         given += [_Given(rows[k], velocity[k], f"start.velocity.point.{ref}") for k in range(2)]
     for name, values in start.rates.items():
         body, field = system.body(name), f"start.rates.{name}"
@@ -252,15 +255,15 @@ def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> NDArra
     return np.concatenate([frame, eta])
 
 
-def _metric(system: System, q: NDArray[np.float64], stiffness: float) -> NDArray[np.float64]:
-    metric = mass_matrix(system, q)
-    for body in system.bodies:
-        k = np.arange(body.flexible.start, body.flexible.stop)
-        metric[k, k] += stiffness * body.modes.omega**2
-    return metric
+def _metric(system: System, q: NDArray[np.float64], stiffness: float) -> scipy.sparse.csr_matrix:
+    weights = scipy.sparse.diags(stiffness * stiffness_diagonal(system))
+    return scipy.sparse.csr_matrix(sparse_mass(system, q) + weights)
 
 
-def _least(metric: NDArray, C: NDArray, wanted: NDArray) -> NDArray[np.float64]:
+def _least(metric: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, wanted: NDArray) -> NDArray[np.float64]:
     """The smallest d in a metric with C d = wanted; least squares for dependent rows."""
-    weighted = np.linalg.solve(metric, C.T)
-    return weighted @ np.linalg.lstsq(C @ weighted, wanted, rcond=1e-12)[0]
+    if wanted.size > DENSE_ROWS:
+        return Saddle(metric, C).solve(r=wanted)[0]
+    dense = C.toarray()
+    weighted = np.linalg.solve(metric.toarray(), dense.T)
+    return weighted @ np.linalg.lstsq(dense @ weighted, wanted, rcond=1e-12)[0]

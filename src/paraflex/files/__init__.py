@@ -1,7 +1,18 @@
 """Models as TOML files: read, validated, turned into mechanism, paths and study."""
 
-from paraflex.files.library import library_file, library_names
+from paraflex.files.generators import generator_names
+from paraflex.files.library import library_file, library_names, library_text
 from paraflex.files.model import Model, StudyDefaults, load, load_path
 from paraflex.files.schema import model_schema
 
-__all__ = ["Model", "StudyDefaults", "library_file", "library_names", "load", "load_path", "model_schema"]
+__all__ = [
+    "Model",
+    "StudyDefaults",
+    "generator_names",
+    "library_file",
+    "library_names",
+    "library_text",
+    "load",
+    "load_path",
+    "model_schema",
+]

@@ -5,6 +5,9 @@ from __future__ import annotations
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
+from paraflex.errors import InputError, suggestion
+from paraflex.files.generators import generated_text, generator_names, is_generated
+
 
 def _folder() -> Traversable:
     return files("paraflex.mechanism") / "library"
@@ -18,3 +21,19 @@ def library_names() -> list[str]:
 def library_file(name: str) -> Traversable:
     """The file of a library mechanism, to read or copy."""
     return _folder() / f"{name}.toml"
+
+
+def library_text(name: str) -> str:
+    """What a library mechanism's file says, of those made by a number too ("four_bars:3").
+
+    Raises
+    ------
+    InputError
+        Unknown name, or a number that makes no sense.
+    """
+    if is_generated(name):
+        return generated_text(name)
+    if name not in library_names():
+        known = [*library_names(), *generator_names()]
+        raise InputError("no library mechanism", field="mechanism", value=name, remedy=suggestion(name, known))
+    return library_file(name).read_text(encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path as FilePath
@@ -11,6 +12,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.files.bodies import assumed_modes_beam, damping, modal_body
 from paraflex.files.expressions import evaluate_parameters
+from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.laws import quantities, read_law
 from paraflex.files.library import library_file, library_names
 from paraflex.files.read import read_toml, validate
@@ -153,7 +155,7 @@ def load(name_or_file: str | FilePath) -> Model:
     Parameters
     ----------
     name_or_file : str or Path
-        A name of `library_names()`, or a file.
+        A name of `library_names()`, one with a number ("four_bars:3"), or a file.
 
     Returns
     -------
@@ -164,7 +166,19 @@ def load(name_or_file: str | FilePath) -> Model:
     InputError
         Unknown name, unreadable file, or anything in it that does not fit: it names file, field, value and remedy.
     """
+    data, source, folder = _read(name_or_file)
+    try:
+        data = with_rows(data, folder)
+        return _model(validate(ModelTable, data, source), data, source)
+    except InputError as error:
+        raise (error if error.source else error.in_file(source)) from None
+
+
+def _read(name_or_file: str | FilePath) -> tuple[dict[str, Any], str, FilePath]:
+    """A model's data, the name of their source, and the folder that names of other files in them count from."""
     text = str(name_or_file)
+    if is_generated(text):
+        return tomllib.loads(generated_text(text)), text, FilePath()
     if text in library_names():
         path, source = FilePath(str(library_file(text))), f"{text}.toml"
     else:
@@ -174,14 +188,9 @@ def load(name_or_file: str | FilePath) -> Model:
                 "neither a library mechanism nor a file",
                 field="mechanism",
                 value=text,
-                remedy=suggestion(text, library_names()),
+                remedy=suggestion(text, [*library_names(), *generator_names()]),
             )
-    data = read_toml(path, source)
-    try:
-        data = with_rows(data, path.parent)
-        return _model(validate(ModelTable, data, source), data, source)
-    except InputError as error:
-        raise (error if error.source else error.in_file(source)) from None
+    return read_toml(path, source), source, path.parent
 
 
 def load_path(file: str | FilePath) -> Path:

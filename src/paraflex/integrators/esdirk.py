@@ -28,11 +28,11 @@ from paraflex.kernel.run_state import (
     ITERATIONS,
     NO_CONVERGENCE,
     NOT_FINITE,
+    PASSAGES,
     PAUSED,
     PHI_MAX,
     REJECTED,
     SAMPLE,
-    SINGULAR_STEPS,
     STEP,
     STEPS,
     TIME,
@@ -140,8 +140,9 @@ class Solution:
         Largest |Phi| [m, rad] and |Phi'| at accepted steps.
     energy_balance_max : float
         Largest |kinetic + strain energy - start - work| at accepted steps [J].
-    singular_steps : int
-        Attempted steps so near a singular position that constraints depended on one another which elsewhere do not.
+    singular_positions : tuple of float
+        Times at which constraints depended on one another for an instant that elsewhere do not [s]. Constraint forces
+        have a pole there: multipliers of samples so near are NaN.
     """
 
     t: NDArray[np.float64]
@@ -162,7 +163,7 @@ class Solution:
     constraint_position_max: float
     constraint_velocity_max: float
     energy_balance_max: float
-    singular_steps: int = 0
+    singular_positions: tuple[float, ...] = ()
 
 
 def integrate(
@@ -269,9 +270,9 @@ class Run:
             signals, stops = hidden_from(signals, ahead[0]), stops[stops <= ahead[0]]
         arguments = (self.system.packed, signals, self.tableau, self.controls, stops, attempts)
         code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
-        return self._resume() if code == FINISHED and ahead.size else code
+        return self.resume() if code == FINISHED and ahead.size else code
 
-    def _resume(self) -> int:
+    def resume(self) -> int:
         """A first stage with what is given after a jump; energies go on counting from the run's start."""
         kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
         arguments = (self.system.packed, self.signals, self.tableau, self.controls)
@@ -339,12 +340,16 @@ def _samples(times: NDArray[np.float64], system: System) -> Samples:
 def _solution(run: Run, wall_time: float, status: str, message: str) -> Solution:
     samples, state = run.samples, run.state
     reached = slice(0, int(state.counts[SAMPLE]))
+    passages = state.passages[:, : state.counts[PASSAGES]]
+    multipliers = least_norm(run.system, samples.q[reached], samples.lam[reached], run.controls.dependent_rows)
+    for first, last in passages.T:
+        multipliers[(samples.times[reached] >= first) & (samples.times[reached] <= last)] = np.nan
     return Solution(
         t=samples.times[reached],
         q=samples.q[reached],
         v=samples.v[reached],
         a=samples.a[reached],
-        multipliers=least_norm(run.system, samples.q[reached], samples.lam[reached], run.controls.dependent_rows),
+        multipliers=multipliers,
         kinetic_energy=samples.energy[reached, 0],
         strain_energy=samples.energy[reached, 1],
         work=samples.energy[reached, 2],
@@ -358,5 +363,5 @@ def _solution(run: Run, wall_time: float, status: str, message: str) -> Solution
         constraint_position_max=float(state.clock[PHI_MAX]),
         constraint_velocity_max=float(state.clock[DPHI_MAX]),
         energy_balance_max=float(state.clock[BALANCE]),
-        singular_steps=int(state.counts[SINGULAR_STEPS]),
+        singular_positions=tuple(passages.mean(axis=0).tolist()),
     )

@@ -53,6 +53,7 @@ from paraflex.mechanism.mechanism import (
 from paraflex.mechanism.modal import ModalBody, ModalPoint
 from paraflex.mechanism.poses import Pose, approximate_poses
 from paraflex.mechanism.raparm import raparm_i
+from paraflex.mechanism.rows import chain_of_segments, four_bars_in_a_row
 from paraflex.mechanism.segments import (
     FIRST_END,
     LAST_END,
@@ -115,10 +116,12 @@ __all__ = [
     "TorsionalSpring",
     "WeldJoint",
     "approximate_poses",
+    "chain_of_segments",
     "check_mechanism",
     "check_segmentable",
     "check_start",
     "finite_segments",
+    "four_bars_in_a_row",
     "given_shapes",
     "loops",
     "mode_of_motors",

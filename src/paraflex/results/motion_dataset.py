@@ -96,6 +96,7 @@ def motion_dataset(
         "kind": "motion",
         "tolerance": options.tolerance,
         "method": "TR-BDF2",
+        "singular_positions": json.dumps(solution.singular_positions),
         "parameters": json.dumps(parameters or {}, sort_keys=True),
         "paraflex_version": version("paraflex"),
         "schema": SCHEMA,
@@ -111,6 +112,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     return {
         "mechanism": data.attrs["mechanism"],
         **figures,
+        "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]),
             "angle": _numbers(last["angle"], "body"),
