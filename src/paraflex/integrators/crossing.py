@@ -14,6 +14,7 @@ meant, smoothness does.
 from __future__ import annotations
 
 from collections import deque
+from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -234,7 +235,7 @@ def _attempts(state: March) -> int:
 
 
 def _copied(state: March) -> March:
-    return March(*(array.copy() for array in state))
+    return deepcopy(state)
 
 
 def _restore(state: March, kept: March) -> None:
