@@ -14,11 +14,11 @@ import time
 
 import numpy as np
 
-from paraflex.dynamics import Start, State, System, build_system, constant_signals, pack_signals, start_state
+from paraflex.dynamics import State, System, build_system, constant_signals, pack_signals, start_state
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.esdirk import Run, prepare
 from paraflex.kernel.run_state import ITERATIONS, REJECTED, STEPS
-from paraflex.mechanism import chain_of_segments, four_bars_in_a_row
+from paraflex.mechanism import Start, chain_of_segments, four_bars_in_a_row
 
 NUMBERS = (10, 20, 50, 100, 200, 500, 1000)
 STEPS_TIMED, REPEATS = 200, 5

@@ -222,7 +222,7 @@ def test_bodies_factored_at_one_place_serve_at_another(system):
     x, mu = right[: system.n].copy(), right[system.n :].copy()
     ws = system.workspace()
     factor_bodies(system.packed, 1e-6, q, ws)
-    assert orient(system.packed, turned, ws) == 0
+    assert orient(system.packed, turned, ws, 1e-12) == 0
     solve_system(system.packed, ws, x, mu)
     expected = np.linalg.solve(iteration_matrix(system, 1e-6, turned), right)
     np.testing.assert_allclose(x, expected[: system.n], rtol=0, atol=1e-10 * np.max(np.abs(expected[: system.n])))

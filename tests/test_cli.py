@@ -192,7 +192,7 @@ def test_interrupt_keeps_what_there_is(tmp_path):
 
 
 def test_info_counts():
-    done = paraflex("info", "--json")
+    done = paraflex("info", "raparm_i", "--json")
     facts = json.loads(done.stdout)
     assert (facts["bodies"], facts["coordinates"], facts["constraints"]) == (8, 104, 22)
     assert facts["degrees_of_freedom"] == 2
@@ -200,7 +200,7 @@ def test_info_counts():
     # Eight links of 0.03 x 0.005 m aluminium, 16 joint lumps and two end lumps.
     length = 2 * (0.25 + 0.1 + 0.25 + 0.25)
     assert facts["total_mass"] == pytest.approx(length * 0.00015 * 2700 + 16 * 0.130 + 2 * 0.225, rel=1e-12)
-    table = paraflex("info").stdout
+    table = paraflex("info", "raparm_i").stdout
     assert "total mass [kg]" in table
     assert "link8" in table
 

@@ -11,10 +11,10 @@ STUDY = """
 import paraflex as pf
 from paraflex.compilation import _PARTS
 from paraflex.mechanism import Geometry
-from paraflex.kernel import bodies, closure, joints, linear, march, signals
+from paraflex.kernel import bodies, closure, joints, linear, march, signals, stage
 
 def compiled():
-    modules = (bodies, closure, joints, linear, march, signals)
+    modules = (bodies, closure, joints, linear, march, signals, stage)
     kernels = {f for module in modules for f in vars(module).values() if hasattr(f, "signatures")}
     return {(f.__name__, signature) for f in kernels for signature in f.signatures}
 

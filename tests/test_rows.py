@@ -10,11 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import paraflex as pf
-from paraflex.dynamics import Start, build_system, start_state
+from paraflex.dynamics import build_system, start_state
 from paraflex.errors import InputError
 from paraflex.files import generator_names, library_text, load
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import Motor, chain_of_segments, four_bars_in_a_row
+from paraflex.mechanism import Motor, Start, chain_of_segments, four_bars_in_a_row
 from paraflex.motion import simulate_motion
 from test_cli import paraflex
 
@@ -79,7 +79,7 @@ def test_two_four_bars_meet_the_benchmark_through_all_singular_positions(capsys)
     in_line = np.array(run.singular_positions)
     # Ten are met; a step that happens to straddle one passes it without more ado.
     assert 5 <= in_line.size <= 10
-    np.testing.assert_allclose(np.cos(2 * crank_angle(2, in_line)), 1.0, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(np.cos(2 * crank_angle(2, in_line)), 1.0, rtol=0, atol=1e-5)
     # Nobody strays to another branch: cranks stay parallel, couplers level.
     cranks = run.q[:, [body.angle for body in system.bodies if body.name.startswith("crank")]]
     couplers = run.q[:, [body.angle for body in system.bodies if body.name.startswith("coupler")]]
@@ -87,42 +87,34 @@ def test_two_four_bars_meet_the_benchmark_through_all_singular_positions(capsys)
     assert np.abs(couplers).max() < 1e-6
 
 
-def test_singular_positions_are_passed_at_any_tolerance():
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5])
+def test_singular_positions_are_passed_at_any_tolerance(tolerance):
     system, start = started(four_bars_in_a_row(7))
-    leaps = 0
-    for tolerance in (1e-3, 3e-4, 1e-4, 3e-5, 1e-5):
-        options = IntegrationOptions(tolerance=tolerance)
-        run = simulate_motion(system.mechanism, 3.0, samples=31, start=start, options=options).solution
-        # An error of the upright start grows thirtyfold in a swing.
-        exact = crank_angle(7, run.t)
-        np.testing.assert_allclose(run.q[:, system.body("crank3").angle], exact, rtol=0, atol=30 * tolerance)
-        leaps += len(run.singular_positions)
-    # Three are met each time; some a step happens to straddle.
-    assert 3 <= leaps <= 15
-
-
-def driven_through(tolerance):
-    """A torque of 9 N m on the first of three cranks, no weight; samples every quarter of a millisecond."""
-    row = four_bars_in_a_row(2)
-    system, start = started(dataclasses.replace(row, motors=(Motor("drive", "A0"),), gravity=(0.0, 0.0)))
-    options = IntegrationOptions(tolerance=tolerance)
-    torques = {"drive": -9.0}
-    return simulate_motion(system.mechanism, 1.2, samples=4801, start=start, torques=torques, options=options)
+    run = simulate_motion(
+        system.mechanism, 3.0, samples=31, start=start, options=IntegrationOptions(tolerance=tolerance)
+    ).solution
+    assert 1 <= len(run.singular_positions) <= 3
+    exact = crank_angle(7, run.t)
+    # An error of the upright start grows thirtyfold in a swing.
+    np.testing.assert_allclose(run.q[:, system.body("crank3").angle], exact, rtol=0, atol=30 * tolerance)
 
 
 def test_a_motor_works_through_a_singular_position_and_samples_show_it():
-    # Which tolerance makes a step straddle the position, and needs no leap, is a matter of chance.
-    runs = (driven_through(tolerance) for tolerance in (1e-6, 1.3e-6, 1.7e-6, 2e-6, 2.3e-6, 2.7e-6, 3e-6))
-    motion = next(run for run in runs if run.solution.singular_positions)
-    run, system = motion.solution, motion.system
+    """A torque on the first crank; samples so dense that some fall where the multipliers have their pole."""
+    row = four_bars_in_a_row(2)
+    system, start = started(dataclasses.replace(row, motors=(Motor("drive", "A0"),), gravity=(0.0, 0.0)))
+    run = simulate_motion(
+        system.mechanism, 1.2, samples=4801, start=start, torques={"drive": -9.0},
+        options=IntegrationOptions(tolerance=1e-6),
+    ).solution  # fmt: skip
     # J phi'' = -9 N m with J = 3 kg m^2: from pi/2 at -1 rad/s.
     exact = 0.5 * np.pi - run.t - 1.5 * run.t**2
-    np.testing.assert_allclose(run.q[:, system.body("crank0").angle], exact, rtol=0, atol=2e-5)
+    np.testing.assert_allclose(run.q[:, system.body("crank0").angle], exact, rtol=0, atol=5e-6)
     np.testing.assert_allclose(run.v[:, system.body("crank2").angle], -1.0 - 3.0 * run.t, rtol=0, atol=2e-4)
-    np.testing.assert_allclose(run.work, 9.0 * (0.5 * np.pi - exact), rtol=0, atol=2e-4)
-    np.testing.assert_allclose(run.kinetic_energy, 1.5 * (1.0 + 3.0 * run.t) ** 2, rtol=3e-5)
+    np.testing.assert_allclose(run.work, 9.0 * (0.5 * np.pi - exact), rtol=0, atol=5e-5)
+    np.testing.assert_allclose(run.kinetic_energy, 1.5 * (1.0 + 3.0 * run.t) ** 2, rtol=1e-5)
     [in_line] = run.singular_positions
-    assert in_line == pytest.approx((np.sqrt(1.0 + 3.0 * np.pi) - 1.0) / 3.0, abs=2e-6)
+    assert in_line == pytest.approx((np.sqrt(1.0 + 3.0 * np.pi) - 1.0) / 3.0, abs=1e-3)
     missing = np.isnan(run.multipliers).any(axis=1)
     assert 0 < missing.sum() < 40
     assert np.abs(run.t[missing] - in_line).max() < 5e-3

@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 
 from paraflex.dynamics import (
-    BodyValues,
-    Deflection,
-    Start,
     build_system,
     consistent_state,
     moment_signals,
@@ -23,7 +20,9 @@ from paraflex.files import library_file, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import (
     Assembly,
+    BodyValues,
     ConstantSpeed,
+    Deflection,
     FlexibleBeam,
     Geometry,
     Material,
@@ -33,6 +32,7 @@ from paraflex.mechanism import (
     RevoluteJoint,
     RigidBody,
     Section,
+    Start,
 )
 from paraflex.motion import simulate_motion
 from test_cli import paraflex

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
+from paraflex.dynamics.state import check_accelerations
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.esdirk import Run, prepare
 from paraflex.kernel.march import march
@@ -85,7 +86,10 @@ def _call_time_loop(geometry: Geometry) -> None:
 
 
 def _call_the_rest(geometry: Geometry) -> None:
-    _free_beam(geometry).start()
+    beam = _free_beam(geometry)
+    beam.start()
+    # What a start with prescribed motion is checked with.
+    check_accelerations(beam.system, beam.signals, 0.0, beam.state.q, beam.state.v)
     path = Line((0.05, 0.31), (0.05, 0.30), max_acceleration=10.0)
     plan_tracking(raparm_i(), path, samples=2).torques("++++")
 

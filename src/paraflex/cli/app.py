@@ -164,17 +164,33 @@ def verify(
 @app.command()
 def modes(source: Source = "raparm_i", path: PathOption = None, json: Json = False) -> None:
     """List the actuation modes and how well each can drive the path."""
-    from paraflex.cli.inspect import modes_command
+    from paraflex.cli.modes import modes_command
 
     modes_command(source, path, json)
 
 
 @app.command()
-def info(source: Source = "raparm_i", json: Json = False) -> None:
-    """Describe a mechanism: bodies, coordinates, constraints, degrees of freedom, frequencies, mass."""
-    from paraflex.cli.inspect import info_command
+def info(
+    source: Annotated[
+        str | None, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file; all of the library.")
+    ] = None,
+    assembly: AssemblyOption = None,
+    path: PathOption = None,
+    at: Annotated[
+        float | None, typer.Option(metavar="S", help="Frequencies where the path, or prescribed angles, lead by then.")
+    ] = None,
+    balanced: Annotated[
+        bool, typer.Option("--balanced", help="Frequencies about static equilibrium, motors held; else undeformed.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Describe a mechanism and say whether it is sound: loops, freedoms, motors, starts, frequencies.
 
-    info_command(source, json)
+    Without a name: what the library has.
+    """
+    from paraflex.cli.inspect import InfoRequest, info_command
+
+    info_command(InfoRequest(source, assembly, path, at, balanced, json))
 
 
 @app.command()

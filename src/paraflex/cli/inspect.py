@@ -1,94 +1,103 @@
-"""`paraflex info` and `paraflex modes`: what a mechanism is, and what its motors can do."""
+"""`paraflex info`: what a mechanism is and whether it is sound; without a name, what the library has."""
 
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-from rich.table import Table
+from paraflex.cli.frequencies import InfoRequest, frequencies, hertz
+from paraflex.cli.inspect_tables import print_facts, print_library
+from paraflex.dynamics import (
+    Closure,
+    Mobility,
+    Reach,
+    System,
+    build_system,
+    closure_of,
+    mobility,
+    reach,
+)
+from paraflex.files import Model, library_names, load
+from paraflex.mechanism import Mechanism, loops
 
-from paraflex.actuation import actuation_condition
-from paraflex.actuation.allocation import check_mode
-from paraflex.cli.tables import plain_console
-from paraflex.dynamics import build_system, consistent_state, redundant_rows
-from paraflex.errors import ActuationError, NumericalError
-from paraflex.files import generator_names, library_names, load
-from paraflex.simulate import plan_tracking
-
-_FREQUENCIES_SHOWN = 3
+# Loops and sets of motors listed at most.
+_LISTED = 1000
 
 
-def info_command(source: str, as_json: bool) -> None:
-    """Describe a mechanism."""
-    facts = describe(source)
-    if as_json:
+def info_command(request: InfoRequest) -> None:
+    """Describe a mechanism, or the library."""
+    facts = library() if request.source is None else describe(load(request.source), request)
+    if request.json:
         print(json.dumps(facts, indent=2))
-        return
-    console = plain_console()
-    console.print(f"{facts['name']} ({facts['source']})")
-    if facts["description"]:
-        console.print(facts["description"])
-    table = Table(show_header=False, box=None)
-    for label, key in (
-        ("bodies", "bodies"),
-        ("joints", "joints"),
-        ("motors", "motors"),
-        ("coordinates", "coordinates"),
-        ("  rigid", "rigid_coordinates"),
-        ("  flexible", "flexible_coordinates"),
-        ("constraints", "constraints"),
-        ("redundant constraints", "redundant_constraints"),
-        ("degrees of freedom (rigid)", "degrees_of_freedom"),
-        ("total mass [kg]", "total_mass"),
-        ("assemblies", "assemblies"),
-        ("modes", "modes"),
-        ("paths", "paths"),
-    ):
-        value = facts[key]
-        text = ", ".join(map(str, value)) if isinstance(value, list) else f"{value:g}"
-        table.add_row(label, text or "none")
-    console.print(table)
-    links = Table(title="bodies, each held in its own frame", title_justify="left")
-    for heading in ("body", "kind", "length [m]", "mass [kg]", "elements", "coord.", "f1, f2, f3 [Hz]"):
-        links.add_column(heading, justify="left" if heading in ("body", "kind") else "right")
-    for link in facts["links"]:
-        lowest = ", ".join(f"{f:.1f}" for f in link["frequencies_hz"][:_FREQUENCIES_SHOWN])
-        length = "" if link["length"] is None else f"{link['length']:g}"
-        elements = "" if link["elements"] is None else str(link["elements"])
-        links.add_row(
-            link["name"], link["kind"], length, f"{link['mass']:.4f}", elements, str(link["coordinates"]), lowest
-        )
-    console.print(links)
-    console.print(f"library: {', '.join([*library_names(), *generator_names()])}; paraflex new NAME --from one of them")
+    elif isinstance(facts, list):
+        print_library(facts)
+    else:
+        print_facts(facts)
 
 
-def describe(source: str) -> dict[str, Any]:
-    """The facts `paraflex info` prints."""
-    model = load(source)
-    mechanism = model.mechanism
-    system = build_system(mechanism)
-    links = []
-    for body, coordinates in zip(mechanism.bodies, system.bodies, strict=True):
-        links.append(
+def library() -> list[dict[str, Any]]:
+    """The mechanisms that come with the package, in a line each."""
+    facts = []
+    for name in library_names():
+        model = load(name)
+        mechanism, rigid = model.mechanism, build_system(model.mechanism.rigid())
+        start = closure_of(rigid, mechanism.assembly(model.study.assembly))
+        facts.append(
             {
-                "name": body.name,
-                "kind": "flexible" if getattr(body, "flexible", False) else "rigid",
-                "length": getattr(body, "length", None),
-                "mass": float(coordinates.integrals.m),
-                "elements": coordinates.mesh.n_elements if coordinates.mesh else None,
-                "coordinates": 3 + coordinates.nf,
-                "frequencies_hz": [float(w) / (2.0 * np.pi) for w in coordinates.modes.omega],
+                "name": name,
+                "description": mechanism.description,
+                "degrees_of_freedom": None if start.state is None else mobility(rigid, start.state).freedoms,
+                "bodies": len(mechanism.bodies),
+                "motors": [motor.name for motor in mechanism.motors],
+                "paths": list(model.paths),
+                "duration": model.study.duration,
             }
         )
-    rigid = build_system(mechanism.rigid())
-    redundant, closed = [], None
+    return facts
+
+
+def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]:
+    """The facts `paraflex info` prints.
+
+    Raises
+    ------
+    InputError
+        An unknown assembly or path, or a time that the pose cannot be told of.
+    """
+    request = request or InfoRequest()
+    mechanism = model.mechanism
+    system, rigid = build_system(mechanism), build_system(mechanism.rigid())
+    starts = [closure_of(rigid, assembly) for assembly in mechanism.assemblies]
+    chosen = None
     if mechanism.assemblies:
-        try:
-            redundant = redundant_rows(rigid, consistent_state(rigid, mechanism.assembly()).q)
-            closed = True
-        except NumericalError as error:
-            closed = str(error)
+        wanted = mechanism.assembly(request.assembly or model.study.assembly)
+        chosen = next(start for start in starts if start.assembly == wanted.name)
+    found = loops(mechanism)
+    facts = {
+        **_counts(model, system, rigid),
+        "links": _links(mechanism, system),
+        "loop_count": len(found),
+        "loops": [list(loop) for loop in found[:_LISTED]],
+        "starts": [_start_facts(start) for start in starts],
+        "assembly": None if chosen is None else chosen.assembly,
+        "assembly_closes": None if chosen is None else (chosen.closes or chosen.problem),
+        "gruebler_count": rigid.n - rigid.n_constraints,
+    }
+    if chosen is None or chosen.state is None:
+        facts |= {"degrees_of_freedom": facts["gruebler_count"], "redundant_constraints": []}
+        return facts | {"complaints": _complaints(starts, None, None)}
+    state = chosen.state
+    free = mobility(rigid, state)
+    drives = reach(rigid, state, free.freedoms)
+    facts |= _mobility_facts(free) | {"drives": _reach_facts(drives)}
+    facts["frequencies"] = frequencies(model, system, rigid, state, chosen.assembly, request)
+    return facts | {"complaints": _complaints(starts, free, drives)}
+
+
+def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
+    mechanism = model.mechanism
     return {
         "name": mechanism.name,
         "source": model.source,
@@ -100,45 +109,77 @@ def describe(source: str) -> dict[str, Any]:
         "rigid_coordinates": rigid.n,
         "flexible_coordinates": system.n_flexible,
         "constraints": system.n_constraints,
-        "redundant_constraints": redundant,
-        "degrees_of_freedom": rigid.n - rigid.n_constraints + len(redundant),
-        "assembly_closes": closed,
         "total_mass": system.total_mass,
         "assemblies": [assembly.name for assembly in mechanism.assemblies],
         "modes": [mode.name for mode in mechanism.modes],
         "paths": list(model.paths),
-        "links": links,
     }
 
 
-def modes_command(source: str, path: str | None, as_json: bool) -> None:
-    """List the actuation modes with the condition of their actuation matrix along a path."""
-    model = load(source)
-    rows = []
-    effort = None
-    if model.mechanism.end_effector is not None and (path is not None or model.paths):
-        effort = plan_tracking(
-            model.mechanism.rigid(), model.path(path), samples=201, orientation=model.study.orientation
-        ).effort
-    for mode in model.mechanism.modes:
-        row: dict[str, Any] = {"mode": mode.name, "motors": list(mode.motors)}
-        if effort is not None:
-            row["redundancy"] = len(mode.motors) - effort.required.shape[1]
-            row["condition_max"] = float(np.max(actuation_condition(effort, mode)))
-            try:
-                check_mode(effort, mode)
-                row["drives_path"] = True
-            except ActuationError as error:
-                row["drives_path"], row["reason"] = False, str(error)
-        rows.append(row)
-    if as_json:
-        print(json.dumps(rows, indent=2))
-        return
-    table = Table(title=f"{model.mechanism.name}: actuation modes", title_justify="left")
-    for heading in ("mode", "active motors", "redundancy", "worst condition number", "drives the path"):
-        table.add_column(heading)
-    for row in rows:
-        drives = {True: "yes", False: row.get("reason", "no"), None: ""}[row.get("drives_path")]
-        condition = f"{row['condition_max']:.3g}" if "condition_max" in row else ""
-        table.add_row(row["mode"], ", ".join(row["motors"]), str(row.get("redundancy", "")), condition, drives)
-    plain_console().print(table)
+def _links(mechanism: Mechanism, system: System) -> list[dict[str, Any]]:
+    links = []
+    for body, coordinates in zip(mechanism.bodies, system.bodies, strict=True):
+        links.append(
+            {
+                "name": body.name,
+                "kind": "flexible" if getattr(body, "flexible", False) else "rigid",
+                "length": getattr(body, "length", None),
+                "mass": coordinates.integrals.m,
+                "elements": coordinates.mesh.n_elements if coordinates.mesh else None,
+                "coordinates": 3 + coordinates.nf,
+                "frequencies_hz": hertz(coordinates.modes.omega),
+            }
+        )
+    return links
+
+
+def _start_facts(start: Closure) -> dict[str, Any]:
+    numbers = {name: _number(getattr(start, name)) for name in ("gap_before", "position", "velocity", "gap")}
+    return {
+        "assembly": start.assembly, "closes": start.closes, **numbers, "where": list(start.where),
+        "problem": start.problem,
+    }  # fmt: skip
+
+
+def _mobility_facts(free: Mobility) -> dict[str, Any]:
+    return {
+        "rank": free.rank,
+        "degrees_of_freedom": free.freedoms,
+        "lasting_degrees_of_freedom": free.lasting,
+        "special_pose": free.special,
+        "redundant_constraints": [one.row for one in free.redundant],
+        "redundancies": [
+            {"row": one.row, "joint": one.joint, "among": list(one.among)} for one in free.redundant[:_LISTED]
+        ],
+    }
+
+
+def _reach_facts(drives: Reach) -> dict[str, Any]:
+    return {
+        "all_motors": drives.all_motors,
+        "modes": dict(drives.modes),
+        "minimal_sets": [list(motors) for motors in drives.sets],
+        "more_sets": drives.more,
+    }
+
+
+def _complaints(starts: Sequence[Closure], free: Mobility | None, drives: Reach | None) -> list[str]:
+    """What is not sound, a sentence each."""
+    said = [f'assembly "{start.assembly}": {start.problem}' for start in starts if not start.closes]
+    if not starts:
+        said.append("no assembly: it cannot be seen whether the loops close")
+    if free is not None and free.special:
+        said.append(
+            f"a special pose: {free.freedoms} degrees of freedom at this instant, "
+            + (f"{free.lasting} a little further along" if free.lasting else "but no way on from it was found")
+        )
+    if drives is not None:
+        short = [name for name, reached in drives.modes.items() if reached < drives.freedoms]
+        said += [
+            f'mode "{name}" reaches {drives.modes[name]} of {drives.freedoms} degrees of freedom' for name in short
+        ]
+    return said
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,12 +1,14 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, end_markers, node_marker
+from paraflex.dynamics.drive import Reach, reach
 from paraflex.dynamics.equilibrium import static_equilibrium
 from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
-from paraflex.dynamics.start import BodyValues, Deflection, Start, check_start, start_state
+from paraflex.dynamics.soundness import Closure, Mobility, Redundancy, closure_of, mobility, undeformed
+from paraflex.dynamics.start import start_state
 from paraflex.dynamics.state import (
     State,
     consistent_state,
@@ -19,24 +21,26 @@ from paraflex.dynamics.system import System, build_system
 
 __all__ = [
     "BodyCoordinates",
-    "BodyValues",
-    "Deflection",
+    "Closure",
     "Dependence",
     "InputSignals",
     "JointCoordinate",
     "Marker",
-    "Start",
+    "Mobility",
+    "Reach",
+    "Redundancy",
     "State",
     "System",
     "Vibration",
     "axis_angle",
     "build_system",
-    "check_start",
+    "closure_of",
     "consistent_state",
     "constant_signals",
     "dependence",
     "end_markers",
     "joint_coordinate",
+    "mobility",
     "moment_signals",
     "momentum",
     "natural_frequencies",
@@ -45,8 +49,10 @@ __all__ = [
     "piecewise_quintic",
     "project_position",
     "project_velocity",
+    "reach",
     "redundant_rows",
     "reference_pose",
     "start_state",
     "static_equilibrium",
+    "undeformed",
 ]

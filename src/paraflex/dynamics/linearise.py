@@ -17,6 +17,7 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
@@ -31,6 +32,9 @@ DENSE_COORDINATES, LOWEST = 600, 10
 _FREE = 1e-9
 # Constraint rows, scaled, with a smaller singular value than this part of the largest follow from the others.
 _DEPENDENT = 1e-10
+# So few freedoms have a basis of random displacements, Lanczos' method needs more; those that held motors take show by
+# their size, squared.
+_FEW, _INDEPENDENT = 30, 1e-12
 # How often a shift may grow tenfold until it outweighs whatever pushes the mechanism away from the pose.
 _SHIFTS = 15
 
@@ -94,7 +98,8 @@ def natural_frequencies(
     if system.n <= DENSE_COORDINATES:
         squares, shapes = _all(K, M, C, elastic, typical)
     else:
-        squares, shapes = _lowest(K, M, C, typical, LOWEST if count is None else count)
+        freedoms = system.n - dependence(system, state.q).rank
+        squares, shapes = _lowest(K, M, C, typical, LOWEST if count is None else count, freedoms)
     squares = np.where(np.abs(squares) < _FREE * typical, 0.0, squares)
     kept = slice(squares.size if count is None else count)
     complete = system.n <= DENSE_COORDINATES and (count is None or count >= squares.size)
@@ -166,11 +171,24 @@ class _Inverse(scipy.sparse.linalg.LinearOperator):
         return self._solver.solve(x.ravel())[0]
 
 
-def _lowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int) -> tuple[Array, Array]:
-    """The squares nearest to one below zero, ascending, and shapes, by Lanczos' method on the inverse."""
-    n = int(np.asarray(M.diagonal()).size)
+def _lowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> tuple[Array, Array]:
+    """The squares nearest to one below zero, ascending, and shapes, of at most so many freedoms.
+
+    By Lanczos' method on the inverse; of few freedoms in a basis of them all.
+    """
+    n, random = int(np.asarray(M.diagonal()).size), np.random.default_rng(0)
     inverse = _Inverse(Saddle(Sparse(K + typical * M), C), n)
-    start = inverse.matvec(M @ np.random.default_rng(0).standard_normal(n))
-    squares, shapes = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-typical, OPinv=inverse, v0=start)
-    order = np.argsort(squares)
-    return squares[order], shapes[:, order]
+    if not freedoms:
+        return np.zeros(0), np.zeros((n, 0))
+    if freedoms > _FEW and K.count_nonzero():
+        start = inverse.matvec(M @ random.standard_normal(n))
+        squares, shapes = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-typical, OPinv=inverse, v0=start)
+        order = np.argsort(squares)
+        return squares[order], shapes[:, order]
+    wishes = random.standard_normal((min(freedoms, _FEW), n))
+    basis = np.column_stack([inverse.matvec(M @ wish) for wish in wishes])
+    size, directions = np.linalg.eigh(basis.T @ (M @ basis))
+    kept = size > _INDEPENDENT * np.mean([wish @ (M @ wish) for wish in wishes]) / typical**2
+    basis = basis @ (directions[:, kept] / np.sqrt(size[kept]))
+    squares, vectors = np.linalg.eigh(basis.T @ (K @ basis))
+    return squares[:count], basis @ vectors[:, :count]

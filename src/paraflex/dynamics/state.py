@@ -23,6 +23,8 @@ from paraflex.mechanism.poses import approximate_poses
 _MAX_ITERATIONS = 50
 # Where Newton's iteration fails, a damped one goes downhill to the smallest gap: how it begins and ends.
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
+# How far links are turned aside before that [rad].
+_ASIDE = 1e-2
 # Closure error that counts as closed [m, rad]: a few rounding errors of a metre-sized mechanism.
 CLOSED = 1e-12
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
@@ -136,19 +138,35 @@ def _closest(system: System, signals: Signals, t: float, q: NDArray[np.float64])
 
     All joints share the gap there; put together along the tree of joints, undeformed, those that close loops have it.
     """
+    # Links in line may be as far from closing as they get, with no way downhill.
+    aside = q.copy()
+    aside[[body.angle for body in system.bodies]] += _ASIDE * np.random.default_rng(0).standard_normal(
+        len(system.bodies)
+    )
+    q = close_downhill(system, signals, t, aside)
+    return reference_pose(system, Assembly("closest", {body.name: float(q[body.angle]) for body in system.bodies}))
+
+
+def close_downhill(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coordinates near q at which the gaps of all joints are smallest, by the method of Levenberg and Marquardt.
+
+    Slower than `project_position` and not as exact, but at home near singular positions and where loops cannot close.
+    """
     still = np.zeros(system.n)
     phi = system.constraints(signals, t, q, still)[0]
     damping = _FIRST_DAMPING
     for _ in range(_MAX_DESCENT):
+        if np.max(np.abs(phi), initial=0.0) < CLOSED or damping > _LARGEST_DAMPING:
+            break
         trial = q - least_change(system, q, phi, _POSITION_STIFFNESS, damping)
         gap = system.constraints(signals, t, trial, still)[0]
         gain = 1.0 - np.linalg.norm(gap) / np.linalg.norm(phi)
         if gain > 0.0:
             q, phi = trial, gap
-        if 0.0 <= gain < _NO_GAIN or damping > _LARGEST_DAMPING:
+        if 0.0 <= gain < _NO_GAIN:
             break
         damping *= 0.2 if gain > 0.0 else 5.0
-    return reference_pose(system, Assembly("closest", {body.name: float(q[body.angle]) for body in system.bodies}))
+    return q
 
 
 def project_velocity(

@@ -37,7 +37,7 @@ class System:
     @property
     def n(self) -> int:
         """Number of generalised coordinates."""
-        return sum(3 + body.nf for body in self.bodies)
+        return self.bodies[-1].all.stop
 
     @property
     def m(self) -> int:

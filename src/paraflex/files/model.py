@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path as FilePath
 from typing import Any
 
-from paraflex.dynamics import Start
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.files.bodies import assumed_modes_beam, damping, modal_body
@@ -65,6 +64,7 @@ from paraflex.mechanism import (
     Section,
     SlidingJoint,
     SlotJoint,
+    Start,
     TorsionalDamper,
     TorsionalSpring,
     WeldJoint,

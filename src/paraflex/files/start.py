@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from paraflex.dynamics import BodyValues, Deflection, Start, check_start
 from paraflex.files.schema import CoordinatesTable, DeflectionTable, StartTable
-from paraflex.mechanism import Mechanism, PointRef
+from paraflex.mechanism import BodyValues, Deflection, Mechanism, PointRef, Start, check_start
 
 
 def read_start(table: StartTable, mechanism: Mechanism) -> Start:
@@ -15,7 +14,7 @@ def read_start(table: StartTable, mechanism: Mechanism) -> Start:
     Raises
     ------
     InputError
-        See `dynamics.check_start`.
+        See `mechanism.check_start`.
     """
     start = Start(
         deflection={

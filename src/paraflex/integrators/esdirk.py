@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import ConstraintDriftError, InputError, IntegrationError, Moment
-from paraflex.integrators.crossing import Crossings
 from paraflex.integrators.stretches import hidden_from, jump_times
 from paraflex.integrators.tableaux import TR_BDF2
 from paraflex.integrators.watch import bent_too_far, come_apart, least_norm
@@ -29,11 +28,11 @@ from paraflex.kernel.run_state import (
     ITERATIONS,
     NO_CONVERGENCE,
     NOT_FINITE,
+    PASSAGES,
     PAUSED,
     PHI_MAX,
     REJECTED,
     SAMPLE,
-    SINGULAR,
     STEP,
     STEPS,
     TIME,
@@ -56,9 +55,11 @@ _NEWTON_MEMORY = 0.002
 _MEMORY = 0.25
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
+# Constraint rows with less than this of their squares left depend on the others for the moment and keep their
+# multipliers: small enough that this lasts a thousandth of a radian, large enough for good conditioning elsewhere.
+_DEPENDENT_PART = 1e-7
 _CAUSES = {
     NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
-    SINGULAR: "the constraints lose rank, a singular position",
     NOT_FINITE: "the solution is no longer finite",
     ERROR_TEST: "the error test asks for steps below the smallest one",
 }
@@ -140,8 +141,8 @@ class Solution:
     energy_balance_max : float
         Largest |kinetic + strain energy - start - work| at accepted steps [J].
     singular_positions : tuple of float
-        Times of positions it had to leap over, where constraints depend on one another for an instant [s]: constraint
-        forces have a pole there, and multipliers are NaN at samples within the leap. See `integrators.crossing`.
+        Times at which constraints depended on one another for an instant that elsewhere do not [s]. Constraint forces
+        have a pole there: multipliers of samples so near are NaN.
     """
 
     t: NDArray[np.float64]
@@ -210,14 +211,14 @@ def integrate(
     options = options or IntegrationOptions()
     run = prepare(system, signals, initial, times, knots, options)
     status, message, bent, drift, state = "complete", "", "", "", run.state
-    code, limits = run.start(), (run.controls.dependent_rows, options.tolerance)
-    crossings = Crossings(run, options.tolerance)
+    run.start()
+    code, limits = PAUSED, (run.controls.dependent_rows, options.tolerance)
     try:
         while code == PAUSED:
             attempts = int(state.counts[STEPS] + state.counts[REJECTED])
             if attempts >= options.max_steps:
                 break
-            code = crossings.look(run.march(min(_SLICE, options.max_steps - attempts)))
+            code = run.march(min(_SLICE, options.max_steps - attempts))
             bent, drift = (
                 bent_too_far(system, state.q),
                 come_apart(system, signals, state.clock[TIME], state.q, *limits),
@@ -229,7 +230,6 @@ def integrate(
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {state.clock[TIME]:.6g} s"
     solution = _solution(run, time.perf_counter() - began, status, message)
-    solution = replace(solution, singular_positions=tuple(crossings.passed))
     if (code == FINISHED and not (bent or drift)) or status == "interrupted":
         return solution
     cause = bent or drift or (f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code])
@@ -257,10 +257,10 @@ class Run:
     slow: Workspace
     samples: Samples
 
-    def start(self) -> int:
-        """First stage and first sample; a code of `kernel.run_state`."""
+    def start(self) -> None:
+        """First stage and first sample."""
         arguments = (self.system.packed, self.signals, self.tableau, self.controls)
-        return start(*arguments, self.state, self.workspace, self.samples)
+        start(*arguments, self.state, self.workspace, self.samples)
 
     def march(self, attempts: int) -> int:
         """So many attempted steps; a code of `kernel.run_state`."""
@@ -276,9 +276,9 @@ class Run:
         """A first stage with what is given after a jump; energies go on counting from the run's start."""
         kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
         arguments = (self.system.packed, self.signals, self.tableau, self.controls)
-        code = start(*arguments, self.state, self.workspace, _samples(np.zeros(0), self.system))
+        start(*arguments, self.state, self.workspace, _samples(np.zeros(0), self.system))
         self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
-        return code
+        return PAUSED
 
 
 def prepare(
@@ -307,6 +307,7 @@ def prepare(
         alpha=options.alpha,
         beta=options.beta,
         max_step=options.max_step,
+        dependent_part=_DEPENDENT_PART,
         dependent_rows=int(factor_system(system.packed, 0.0, initial.q, workspace)),
     )
     inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
@@ -339,12 +340,16 @@ def _samples(times: NDArray[np.float64], system: System) -> Samples:
 def _solution(run: Run, wall_time: float, status: str, message: str) -> Solution:
     samples, state = run.samples, run.state
     reached = slice(0, int(state.counts[SAMPLE]))
+    passages = state.passages[:, : state.counts[PASSAGES]]
+    multipliers = least_norm(run.system, samples.q[reached], samples.lam[reached], run.controls.dependent_rows)
+    for first, last in passages.T:
+        multipliers[(samples.times[reached] >= first) & (samples.times[reached] <= last)] = np.nan
     return Solution(
         t=samples.times[reached],
         q=samples.q[reached],
         v=samples.v[reached],
         a=samples.a[reached],
-        multipliers=least_norm(run.system, samples.q[reached], samples.lam[reached], run.controls.dependent_rows),
+        multipliers=multipliers,
         kinetic_energy=samples.energy[reached, 0],
         strain_energy=samples.energy[reached, 1],
         work=samples.energy[reached, 2],
@@ -358,4 +363,5 @@ def _solution(run: Run, wall_time: float, status: str, message: str) -> Solution
         constraint_position_max=float(state.clock[PHI_MAX]),
         constraint_velocity_max=float(state.clock[DPHI_MAX]),
         energy_balance_max=float(state.clock[BALANCE]),
+        singular_positions=tuple(passages.mean(axis=0).tolist()),
     )

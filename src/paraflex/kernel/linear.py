@@ -244,7 +244,7 @@ def add_schur(p, i, ws):
 
 
 @routine
-def factor_schur(p, ws):
+def factor_schur(p, ws, dependent_part):
     """Cholesky factor of the Schur complement in place, row by row within the envelope.
 
     Returns the number of dependent rows found; each gets multiplier zero, which leaves the accelerations those of
@@ -264,7 +264,7 @@ def factor_schur(p, ws):
         pivot = diagonal
         for k in range(first, i):
             pivot -= ws.schur[start + k] * ws.schur[start + k]
-        if pivot > DEPENDENT_ROW * diagonal:
+        if pivot > dependent_part * diagonal:
             ws.schur[start + i] = 1.0 / sqrt(pivot)
         else:
             ws.schur[start + i] = 0.0
@@ -309,7 +309,7 @@ def row_scale(p, r, ws, scale):
 
 
 @kernel
-def orient(p, q, ws):
+def orient(p, q, ws, dependent_part):
     """Turn the factored bodies to their angles in q and factor the Schur complement; number of dependent rows."""
     fill(ws.schur, 0.0)
     turn_axes(p, q, ws.axes)
@@ -320,14 +320,14 @@ def orient(p, q, ws):
     for r in range(p.rows.size):
         if p.rows[r].kind != CONSTRAINT:
             ws.schur[p.rows[r].start + r - p.rows[r].first] += ws.compliance[r] * row_scale(p, r, ws, 1.0)
-    return factor_schur(p, ws)
+    return factor_schur(p, ws, dependent_part)
 
 
 @kernel
 def factor_system(p, b, q, ws):
     """Factor the iteration matrix [M + b K, Phi_q^T; Phi_q, 0] at q; returns the number of dependent rows."""
     factor_bodies(p, b, q, ws)
-    return orient(p, q, ws)
+    return orient(p, q, ws, DEPENDENT_ROW)
 
 
 @inlined

@@ -7,7 +7,7 @@ from paraflex.kernel.bodies import system_energy, weight_work
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.joints import line_energy, spring_energy
-from paraflex.kernel.linear import factor_system, right_hand_side, solve_system
+from paraflex.kernel.linear import factor_bodies, orient, right_hand_side, solve_system
 from paraflex.kernel.run_state import (
     AGE,
     BALANCE,
@@ -21,7 +21,6 @@ from paraflex.kernel.run_state import (
     PHI_MAX,
     REJECTED,
     SAMPLE,
-    SINGULAR,
     STEP,
     STEPS,
     STOP,
@@ -84,10 +83,11 @@ def write_samples(p, tableau, t, h, m, ws, out):
 
 @routine
 def first_stage(p, signals, t, controls, m, ws):
-    """Accelerations and multipliers at (t, q, v), solved exactly, as the first stage; number of dependent rows."""
+    """Accelerations and multipliers at (t, q, v), solved exactly, as the first stage."""
     a, lam = m.stage_a[1, 0], m.stage_lam[0]
     note_friction(p, m.q, m.v, ws.mu, ws.compliance)
-    dependent = factor_system(p, 0.0, m.q, ws)
+    factor_bodies(p, 0.0, m.q, ws)
+    orient(p, m.q, ws, controls.dependent_part)
     m.clock[FACTOR_G] = -1.0
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
     for _ in range(2):
@@ -98,15 +98,13 @@ def first_stage(p, signals, t, controls, m, ws):
             a[j] += ws.x[j]
         for r in range(lam.size):
             lam[r] += ws.mu[r]
-    return dependent
 
 
 @kernel
 def start(p, signals, tableau, controls, m, ws, out):
     """First stage and first sample of a run."""
     t = m.clock[TIME]
-    if first_stage(p, signals, t, controls, m, ws) > controls.dependent_rows:
-        return SINGULAR
+    first_stage(p, signals, t, controls, m, ws)
     a, lam = m.stage_a[1, 0], m.stage_lam[0]
     m.stage_t[1, 0] = t
     copy(m.q, m.stage_q[0])
@@ -124,7 +122,6 @@ def start(p, signals, tableau, controls, m, ws, out):
         copy(lam, out.lam[0])
         out.energy[0, 0], out.energy[0, 1], out.energy[0, 2] = kinetic, strain, 0.0
         m.counts[SAMPLE] = 1
-    return PAUSED
 
 
 @routine

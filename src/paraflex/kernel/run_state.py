@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+# Singular positions kept of a run.
+MOST_PASSAGES = 1000
 # Why `march` returned.
-PAUSED, FINISHED, NO_CONVERGENCE, SINGULAR, NOT_FINITE, ERROR_TEST = range(6)
+PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # March.clock
 TIME, STEP, WORK, FACTOR_G, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX = range(10)
 # March.counts
-STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES = range(8)
+STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES, PASSAGES = range(9)
 
 
 class Tableau(NamedTuple):
@@ -40,6 +42,7 @@ class Controls(NamedTuple):
     beta: float
     max_step: float
     dependent_rows: int
+    dependent_part: float  # a row with less than this of its diagonal left when others are eliminated depends on them
 
 
 class March(NamedTuple):
@@ -60,6 +63,7 @@ class March(NamedTuple):
     eq: NDArray[np.float64]
     ev: NDArray[np.float64]
     torques: NDArray[np.float64]
+    passages: NDArray[np.float64]  # (2, MOST_PASSAGES) from when to when more rows were dependent than at the start
     guess_t: NDArray[np.float64]  # (3,) times of the stages a guess is extrapolated from
     guess_s: NDArray[np.int64]  # (3, 2) and where they stand in stage_a
 
@@ -79,7 +83,7 @@ def make_march(n: int, m: int, stages: int, motors: int) -> March:
     """Allocate the state of a run with n coordinates and m constraint rows."""
     return March(
         clock=np.zeros(10),
-        counts=np.zeros(8, dtype=np.int64),
+        counts=np.zeros(9, dtype=np.int64),
         q=np.zeros(n),
         v=np.zeros(n),
         stage_t=np.zeros((2, stages)),
@@ -93,6 +97,7 @@ def make_march(n: int, m: int, stages: int, motors: int) -> March:
         eq=np.zeros(n),
         ev=np.zeros(n),
         torques=np.zeros(motors),
+        passages=np.zeros((2, MOST_PASSAGES)),
         guess_t=np.zeros(3),
         guess_s=np.zeros((3, 2), dtype=np.int64),
     )

@@ -35,9 +35,9 @@ from paraflex.kernel.run_state import (
     ITERATIONS,
     NO_CONVERGENCE,
     NOT_FINITE,
+    PASSAGES,
     PAUSED,
     RATE,
-    SINGULAR,
     STEPS,
 )
 from paraflex.kernel.signals import evaluate_signal
@@ -159,6 +159,19 @@ def renew_factor(p, g, m, ws):
 
 
 @routine
+def note_passage(t, h, m):
+    """Keep from when to when a run is at a singular position; steps that touch are of one."""
+    last = m.counts[PASSAGES] - 1
+    if last >= 0:
+        if t <= m.passages[1, last]:
+            m.passages[1, last] = max(t + h, m.passages[1, last])
+            return
+    if last + 1 < m.passages.shape[1]:
+        m.passages[0, last + 1], m.passages[1, last + 1] = t, t + h
+        m.counts[PASSAGES] += 1
+
+
+@routine
 def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     """One step from t: all stages and the error estimate, relative to what is allowed.
 
@@ -174,8 +187,9 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     if fresh:
         renew_factor(p, g, m, ws)
     note_friction(p, m.q, m.v, ws.mu, ws.compliance)
-    if orient(p, m.q, ws) > controls.dependent_rows:
-        return SINGULAR, 0.0
+    # Rows that depend on others here keep their multipliers: so a singular position is passed.
+    if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
+        note_passage(t, h, m)
     tolerance = controls.newton_fraction * controls.rate * h
     slowest = 0
     i = 1
@@ -204,8 +218,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
                 return NO_CONVERGENCE, 0.0
             # An old factor may be to blame: once more with a new one before the step is cut.
             renew_factor(p, g, m, ws)
-            if orient(p, m.q, ws) > controls.dependent_rows:
-                return SINGULAR, 0.0
+            orient(p, m.q, ws, controls.dependent_part)
             fresh = True
             continue
         slowest = max(slowest, iterations)

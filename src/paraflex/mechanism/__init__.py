@@ -62,6 +62,7 @@ from paraflex.mechanism.segments import (
     finite_segments,
     proportional_segments,
 )
+from paraflex.mechanism.start import BodyValues, Deflection, Start, check_start
 
 __all__ = [
     "FIRST_END",
@@ -73,9 +74,11 @@ __all__ = [
     "Assembly",
     "AssumedModesBeam",
     "Body",
+    "BodyValues",
     "ConstantSpeed",
     "Curvature",
     "Damping",
+    "Deflection",
     "EndEffector",
     "FlexibleBeam",
     "Geometry",
@@ -107,6 +110,7 @@ __all__ = [
     "Sine",
     "SlidingJoint",
     "SlotJoint",
+    "Start",
     "TabulatedLaw",
     "TorsionalDamper",
     "TorsionalSpring",
@@ -115,6 +119,7 @@ __all__ = [
     "chain_of_segments",
     "check_mechanism",
     "check_segmentable",
+    "check_start",
     "finite_segments",
     "four_bars_in_a_row",
     "given_shapes",

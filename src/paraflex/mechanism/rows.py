@@ -18,7 +18,7 @@ def four_bars_in_a_row(n: int) -> Mechanism:
 
     Cranks A_i B_i, i = 0 to n, on pins 1 m apart; couplers from B_i-1 to B_i. All links are uniform rods of 1 kg and
     1 m under weight of 9.81 m/s^2. One degree of freedom. In the benchmark the cranks start upright, with B0 moving at
-    +1 m/s in x: `dynamics.Start(angular={"crank0": -1.0})`, the joints give the rest.
+    +1 m/s in x: `mechanism.Start(angular={"crank0": -1.0})`, the joints give the rest.
 
     The mechanism passes positions with all links in line, where n constraints depend on the others.
 

@@ -1,0 +1,107 @@
+"""Natural frequencies that `paraflex info` tells, and the pose they are for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import (
+    State,
+    System,
+    Vibration,
+    natural_frequencies,
+    project_position,
+    static_equilibrium,
+    undeformed,
+)
+from paraflex.dynamics.linearise import LOWEST
+from paraflex.dynamics.signals import moment_signals
+from paraflex.errors import AssemblyError, InputError
+from paraflex.files import Model
+from paraflex.kinematics import follow_path
+
+# Poses between the start and the time asked for, where prescribed angles lead there.
+_POSES_BETWEEN = 200
+# What a mechanism let go may start with and still be called balanced [m/s^2].
+_BALANCED = 1e-5
+
+
+@dataclass(frozen=True)
+class InfoRequest:
+    """What `paraflex info` was asked for.
+
+    Attributes
+    ----------
+    source : str or None
+        A library mechanism or a file; None for what the library has.
+    assembly : str or None
+    path : str or None
+        Along which `at` counts.
+    at : float or None
+        When [s]: the pose that frequencies are for.
+    balanced : bool
+        Frequencies about static equilibrium.
+    json : bool
+    """
+
+    source: str | None = None
+    assembly: str | None = None
+    path: str | None = None
+    at: float | None = None
+    balanced: bool = False
+    json: bool = False
+
+
+def frequencies(
+    model: Model, system: System, rigid: System, start: State, assembly: str, request: InfoRequest
+) -> dict[str, Any]:
+    """Natural frequencies with the motors held and free, and what the pose they are for is."""
+    motors = list(dict.fromkeys(motor.joint for motor in model.mechanism.motors))
+    state = start if request.at is None else _pose_at(model, rigid, start, assembly, request.at, request.path)
+    state = undeformed(system, rigid, state)
+    if request.balanced:
+        try:
+            state = static_equilibrium(system, state, motors)
+        except AssemblyError as error:
+            raise InputError(error.cause, field="--balanced", remedy="leave it out") from error
+    held = natural_frequencies(system, state, motors, count=LOWEST) if motors else None
+    free = natural_frequencies(system, state, torque_at=motors, count=LOWEST)
+    return {
+        "time": state.time,
+        "balanced": request.balanced,
+        "acceleration": free.acceleration,
+        "is_equilibrium": free.acceleration < _BALANCED,
+        "motors_held_hz": None if held is None else hertz(held.frequencies),
+        "motors_free_hz": hertz(free.frequencies),
+        "growing": max(_growing(free), 0 if held is None else _growing(held)),
+    }
+
+
+def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float, path: str | None) -> State:
+    """Where the rigid mechanism is at a time: on its path, or by its prescribed angles."""
+    if not (math.isfinite(at) and at >= 0.0):
+        raise InputError("not a time of the motion", field="--at", value=at, remedy="give it in s, from 0 on")
+    if path is not None or model.paths:
+        motion = follow_path(model.mechanism, model.path(path), [0.0, at] if at else [0.0], assembly=assembly)
+        return State(at, motion.q[-1], np.zeros(rigid.n))
+    if rigid.n != rigid.n_constraints:
+        raise InputError(
+            "the model has no path, and prescribed angles leave it free", field="--at", value=at, remedy="leave it out"
+        )
+    q = start.q
+    for time in np.linspace(0.0, at, _POSES_BETWEEN + 1)[1:]:
+        q = project_position(rigid, moment_signals(model.mechanism, float(time)), float(time), q)
+    return State(at, q, np.zeros(rigid.n))
+
+
+def _growing(vibration: Vibration) -> int:
+    return int(np.sum(vibration.squares < 0.0))
+
+
+def hertz(omega: NDArray[np.float64]) -> list[float]:
+    """Frequencies [Hz] of angular ones [rad/s]."""
+    return [float(w) / (2.0 * np.pi) for w in omega]

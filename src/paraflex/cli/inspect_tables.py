@@ -1,0 +1,159 @@
+"""What `paraflex info` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from paraflex.cli.tables import plain_console
+
+_FREQUENCIES_SHOWN = 3
+_LISTED = 12
+
+
+def print_library(facts: Sequence[dict[str, Any]]) -> None:
+    """The library's mechanisms, a line each."""
+    console = plain_console()
+    table = _table("library", ("name", "", "freedoms", "bodies", "motors", "runs"), right=(2, 3, 4))
+    for one in facts:
+        freedoms = "" if one["degrees_of_freedom"] is None else str(one["degrees_of_freedom"])
+        runs = f"along {', '.join(one['paths'])}" if one["paths"] else "on its own"
+        if not one["paths"] and one["duration"] is not None:
+            runs += f" for {one['duration']:g} s"
+        table.add_row(one["name"], one["description"], freedoms, str(one["bodies"]), str(len(one["motors"])), runs)
+    console.print(table)
+    console.print("paraflex info NAME tells more; paraflex new FILE --from NAME copies one to edit")
+
+
+def print_facts(facts: dict[str, Any]) -> None:
+    """A mechanism: counts, soundness, loops, starts, motors, frequencies, links."""
+    console = plain_console()
+    console.print(f"{facts['name']} ({facts['source']})")
+    if facts["description"]:
+        console.print(facts["description"])
+    console.print(_counts(facts))
+    _print_loops(console, facts)
+    _print_redundancies(console, facts)
+    _print_starts(console, facts)
+    if "drives" in facts:
+        _print_drives(console, facts)
+    console.print(_links(facts))
+    if "frequencies" in facts:
+        _print_frequencies(console, facts["frequencies"])
+    for complaint in facts["complaints"]:
+        console.print(f"not sound: {complaint}", soft_wrap=True)
+    if not facts["complaints"]:
+        drives = ", every mode drives all that is free" if facts["modes"] else ""
+        console.print(f"sound: every assembly closes, the pose is not a special one{drives}")
+
+
+def _table(title: str, headings: Sequence[str], right: Sequence[int] = ()) -> Table:
+    table = Table(title=title, title_justify="left")
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if k in right else "left")
+    return table
+
+
+def _counts(facts: dict[str, Any]) -> Table:
+    table = Table(show_header=False, box=None)
+    for label, key in (
+        ("bodies", "bodies"),
+        ("joints", "joints"),
+        ("independent loops", "loop_count"),
+        ("motors", "motors"),
+        ("coordinates", "coordinates"),
+        ("  rigid", "rigid_coordinates"),
+        ("  flexible", "flexible_coordinates"),
+        ("constraints", "constraints"),
+        ("  rank", "rank"),
+        ("redundant constraints", "redundant_constraints"),
+        ("Gruebler's count (3 bodies - constraints)", "gruebler_count"),
+        ("degrees of freedom (3 bodies - rank)", "degrees_of_freedom"),
+        ("total mass [kg]", "total_mass"),
+        ("assemblies", "assemblies"),
+        ("modes", "modes"),
+        ("paths", "paths"),
+    ):
+        if key in facts:
+            value = facts[key]
+            text = _some(value) if isinstance(value, list) else f"{value:g}"
+            table.add_row(label, text or "none")
+    return table
+
+
+def _some(names: Sequence[Any]) -> str:
+    """As many names as fit in a few lines."""
+    text = ", ".join(map(str, names[:_LISTED]))
+    return f"{text} and {len(names) - _LISTED} more" if len(names) > _LISTED else text
+
+
+def _print_loops(console: Console, facts: dict[str, Any]) -> None:
+    for k, loop in enumerate(facts["loops"][:_LISTED]):
+        console.print(f"loop {k + 1}: {_some(loop)}", soft_wrap=True)
+    if facts["loop_count"] > _LISTED:
+        console.print(f"and {facts['loop_count'] - _LISTED} more loops")
+
+
+def _print_redundancies(console: Console, facts: dict[str, Any]) -> None:
+    redundancies = facts.get("redundancies", [])
+    for one in redundancies[:_LISTED]:
+        console.print(f"redundant: {one['row']}, among {_some(one['among'])}", soft_wrap=True)
+    if len(redundancies) > _LISTED:
+        console.print(f"and {len(redundancies) - _LISTED} more")
+
+
+def _print_starts(console: Console, facts: dict[str, Any]) -> None:
+    headings = ("assembly", "gap of the angles given", "closed to [m, rad]", "rates to [1/s]", "remaining gap", "where")
+    table = _table("assemblies, rigid", headings, right=(1, 2, 3, 4))
+    for start in facts["starts"]:
+        numbers = ["" if start[key] is None else f"{start[key]:.2g}" for key in ("gap_before", "position", "velocity")]
+        gap = "none" if start["closes"] else (f"{start['gap']:.3g}" if start["gap"] else "")
+        table.add_row(start["assembly"], *numbers, gap, _some(start["where"]))
+    if facts["starts"]:
+        console.print(table)
+
+
+def _print_drives(console: Console, facts: dict[str, Any]) -> None:
+    drives, freedoms = facts["drives"], facts["degrees_of_freedom"]
+    if not facts["motors"] or not freedoms:
+        return
+    console.print(f"all motors reach {drives['all_motors']} of {freedoms} degrees of freedom")
+    sets = [" ".join(motors) for motors in drives["minimal_sets"]]
+    if sets:
+        more = " at least" if drives["more_sets"] else ""
+        console.print(f"sets of motors that suffice,{more} {len(sets)}: {_some(sets)}", soft_wrap=True)
+
+
+def _links(facts: dict[str, Any]) -> Table:
+    headings = ("body", "kind", "length [m]", "mass [kg]", "elements", "coord.", "f1, f2, f3 [Hz]")
+    table = _table("bodies, each held in its own frame", headings, right=range(2, 7))
+    for link in facts["links"][:_LISTED]:
+        lowest = ", ".join(f"{f:.1f}" for f in link["frequencies_hz"][:_FREQUENCIES_SHOWN])
+        length = "" if link["length"] is None else f"{link['length']:g}"
+        elements = "" if link["elements"] is None else str(link["elements"])
+        table.add_row(
+            link["name"], link["kind"], length, f"{link['mass']:.4f}", elements, str(link["coordinates"]), lowest
+        )
+    if len(facts["links"]) > _LISTED:
+        table.add_row(f"and {len(facts['links']) - _LISTED} more", "", "", "", "", "", "")
+    return table
+
+
+def _print_frequencies(console: Console, found: dict[str, Any]) -> None:
+    pose = "static equilibrium" if found["balanced"] else "undeformed"
+    console.print(f"natural frequencies of the assembled mechanism at rest, t = {found['time']:g} s, {pose} [Hz]")
+    for label, key in (("motors held", "motors_held_hz"), ("motors free", "motors_free_hz")):
+        if found[key] is not None:
+            lowest = ", ".join(f"{f:.4g}" for f in found[key][:6])
+            console.print(f"  {label}: {lowest or 'none: nothing can move'}", soft_wrap=True)
+    if found["growing"]:
+        console.print(f"  {found['growing']} motion(s) grow instead of vibrating: unstable there")
+    if not found["is_equilibrium"]:
+        console.print(
+            f"  not an equilibrium: let go it would start with {found['acceleration']:.3g} m/s^2, root mean square "
+            "over the mass; --balanced takes the equilibrium nearby",
+            soft_wrap=True,
+        )

@@ -1,0 +1,108 @@
+"""What is known of the start of a motion, by names: deflections, velocities, or all coordinates of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from paraflex.errors import InputError, suggestion
+from paraflex.mechanism.bodies import RigidBody
+from paraflex.mechanism.joints import PointRef
+from paraflex.mechanism.mechanism import Mechanism
+
+
+@dataclass(frozen=True)
+class Deflection:
+    """How far a point of a beam is off its place in the body frame; None leaves it to the others.
+
+    Attributes
+    ----------
+    axial, transverse : float, optional
+        Stretch and displacement across [m]; what bending takes from the length comes on top in second-order geometry.
+    slope : float, optional
+        [rad]
+    """
+
+    axial: float | None = None
+    transverse: float | None = None
+    slope: float | None = None
+
+
+@dataclass(frozen=True)
+class BodyValues:
+    """All coordinates of a body, or their rates.
+
+    Attributes
+    ----------
+    x, y, phi : float
+        Of the body frame [m, rad], or [m/s, rad/s].
+    flexible : tuple of float, optional
+        Its own flexible coordinates: those its reference condition leaves of the nodes', `modes.vectors @ eta` of the
+        modal ones. Zeros where None.
+    """
+
+    x: float
+    y: float
+    phi: float
+    flexible: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Start:
+    """What is known of the start of a motion.
+
+    Attributes
+    ----------
+    deflection : mapping of str to mapping of str to Deflection
+        Of points, by body and point: the shape is that of least elastic energy.
+    angular : mapping of str to float
+        Rates of bodies' angles [rad/s].
+    point : mapping of PointRef to (x, y)
+        Velocities of points in the ground frame [m/s]. What these and the joints leave open has least kinetic energy,
+        with links that do not begin to bend.
+    coordinates, rates : mapping of str to BodyValues
+        Taken as they are.
+    """
+
+    deflection: Mapping[str, Mapping[str, Deflection]] = field(default_factory=dict)
+    angular: Mapping[str, float] = field(default_factory=dict)
+    point: Mapping[PointRef, tuple[float, float]] = field(default_factory=dict)
+    coordinates: Mapping[str, BodyValues] = field(default_factory=dict)
+    rates: Mapping[str, BodyValues] = field(default_factory=dict)
+
+    @property
+    def places(self) -> bool:
+        """Whether it says anything of coordinates, and not of velocities alone."""
+        return bool(self.deflection or self.coordinates)
+
+
+def check_start(mechanism: Mechanism, start: Start) -> None:
+    """Nothing, if a start speaks of bodies and points that exist, and says each thing once.
+
+    Raises
+    ------
+    InputError
+        It names the field under "start".
+    """
+    bodies = {body.name: body for body in mechanism.bodies}
+    for table in ("deflection", "velocity.angular", "coordinates", "rates"):
+        for name in getattr(start, table.rpartition(".")[2]):
+            _known(name, bodies, f"start.{table}", "body")
+    for name, points in start.deflection.items():
+        where = f"start.deflection.{name}"
+        if isinstance(bodies[name], RigidBody) or not getattr(bodies[name], "flexible", True):
+            raise InputError("a rigid body has no deflection", field=where, remedy="name a flexible beam")
+        if name in start.coordinates:
+            raise InputError("its coordinates are given", field=where, remedy="give one of deflection and coordinates")
+        for point in points:
+            _known(point, bodies[name].points, where, "point")
+    for ref in start.point:
+        _known(ref.body, bodies, "start.velocity.point", "body")
+        _known(ref.point, bodies[ref.body].points, "start.velocity.point", "point")
+    if start.rates and (start.angular or start.point):
+        raise InputError("given beside velocities", field="start.rates", remedy="give one of rates and velocity")
+
+
+def _known(name: str, known: Iterable[str], field: str, kind: str) -> None:
+    if name not in known:
+        raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))
