@@ -6,25 +6,28 @@ from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table
 
 from paraflex.cli.tables import plain_console
+from paraflex.files import generator_names
 
 _FREQUENCIES_SHOWN = 3
 _LISTED = 12
 
 
 def print_library(facts: Sequence[dict[str, Any]]) -> None:
-    """The library's mechanisms, a line each."""
+    """The library's mechanisms: a line of facts and what each is."""
     console = plain_console()
-    table = _table("library", ("name", "", "freedoms", "bodies", "motors", "runs"), right=(2, 3, 4))
     for one in facts:
-        freedoms = "" if one["degrees_of_freedom"] is None else str(one["degrees_of_freedom"])
+        freedoms = "" if one["degrees_of_freedom"] is None else f"freedoms {one['degrees_of_freedom']}, "
+        motors = f"motors {len(one['motors'])}"
         runs = f"along {', '.join(one['paths'])}" if one["paths"] else "on its own"
         if not one["paths"] and one["duration"] is not None:
             runs += f" for {one['duration']:g} s"
-        table.add_row(one["name"], one["description"], freedoms, str(one["bodies"]), str(len(one["motors"])), runs)
-    console.print(table)
+        console.print(f"{one['name']}: {freedoms}bodies {one['bodies']}, {motors}; runs {runs}", soft_wrap=True)
+        console.print(Padding(one["description"], (0, 0, 0, 4)))
+    console.print(f"and of any size, a number behind the name: {', '.join(generator_names())}")
     console.print("paraflex info NAME tells more; paraflex new FILE --from NAME copies one to edit")
 
 

@@ -23,6 +23,8 @@ from paraflex.results import motion_dataset, motion_summary, save_results
 
 # Singular positions told one by one.
 _NAMED = 4
+# Points told where a run ends.
+_POINTS = 20
 
 
 def run_motion(
@@ -129,10 +131,12 @@ def _report(figures: dict, data: xr.Dataset) -> None:
     out = plain_console()
     final = figures["final"]
     out.print(f"{figures['mechanism']}: {figures['status']} at t = {final['time']:g} s, {figures['steps']} steps")
-    for point, position in final["point_position"].items():
-        # Points that segments made by the program hang together at are left out.
-        if None not in position and "._" not in point:
-            out.print(f"  {point}: ({position[0]:.6g}, {position[1]:.6g}) m")
+    # Points that segments made by the program hang together at are left out.
+    places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
+    for point, position in list(places.items())[:_POINTS]:
+        out.print(f"  {point}: ({position[0]:.6g}, {position[1]:.6g}) m")
+    if len(places) > _POINTS:
+        out.print(f"  and {len(places) - _POINTS} more points in results.nc")
     passed = [f"{t:.6g}" for t in figures["singular_positions"]]
     if passed:
         more = f" and {len(passed) - _NAMED} more" if len(passed) > _NAMED else ""
