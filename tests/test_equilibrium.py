@@ -7,6 +7,7 @@ import pytest
 import scipy.optimize
 
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
+from paraflex.dynamics.state import point_position
 from paraflex.errors import AssemblyError, InputError
 from paraflex.fem.element import TRANSVERSE
 from paraflex.files import load
@@ -27,6 +28,8 @@ from paraflex.mechanism import (
     RevoluteJoint,
     Section,
     TorsionalSpring,
+    WeldJoint,
+    chain_of_segments,
     raparm_i,
 )
 from paraflex.motion import simulate_motion
@@ -127,3 +130,21 @@ def test_a_path_that_starts_moving_cannot_start_balanced(square):
     moving = dataclasses.replace(task, motion=dataclasses.replace(task.motion, v=task.motion.v + 1.0))
     with pytest.raises(InputError, match="path: the path does not start at rest"):
         moving.balanced("++++")
+
+
+@pytest.mark.parametrize("n", [20, 300])
+def test_a_long_chain_hangs_as_an_elastic_line(n):
+    """Segments with springs, hung nearly straight: few with dense matrices, many with sparse ones.
+
+    A stiff chain welded at its first joint sags as a cantilever under its own weight, q l^4 / 8 E I, less a fraction
+    2 / n: half a segment at the clamp does not bend.
+    """
+    mechanism = chain_of_segments(n, bending_stiffness=200.0)
+    clamp = WeldJoint("J1", *(getattr(mechanism.joint("J1"), side) for side in "ab"))
+    mechanism = dataclasses.replace(mechanism, joints=(clamp, *mechanism.joints[1:]))
+    system = build_system(mechanism)
+    rest = static_equilibrium(system, consistent_state(system, mechanism.assembly()))
+    tip = point_position(system, rest.q, PointRef(f"segment{n}", "Q"))
+    exact = 9.81 / (8.0 * 200.0) * (1.0 - 2.0 / n)
+    assert -tip[1] == pytest.approx(exact, rel=3.0 / n**2 + 1e-4)
+    assert not rest.v.any()

@@ -643,7 +643,7 @@ def test_a_file_gives_the_bodies_that_python_gives(tmp_path):
 @pytest.mark.parametrize("source", [FILE, modal_source()], ids=["assumed", "modal"])
 def test_info_and_run_take_them(tmp_path, source):
     file = written(tmp_path, source)
-    link = describe(str(file))["links"][0]
+    link = describe(load(file))["links"][0]
     assert (link["kind"], link["elements"], link["coordinates"]) == ("flexible", None, 8)
     omega = modal_basis(build_system(pendulum(quintic())).bodies[0].integrals).omega
     np.testing.assert_allclose(2 * np.pi * np.array(link["frequencies_hz"]), omega, rtol=1e-8)

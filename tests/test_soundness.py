@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+import twins
 from conftest import make_five_bar
 from paraflex.cli.frequencies import InfoRequest
 from paraflex.cli.inspect import describe, library
@@ -168,7 +169,7 @@ def test_sets_of_motors_are_those_whose_matrix_has_full_rank(raparm):
     system, start, free = seen(mechanism)
     found = reach(system, start.state, free.freedoms)
     basis = np.linalg.svd(system.jacobian(start.state.q))[2][-2:].T
-    S = np.array([system.angle_row(motor.joint) for motor in mechanism.motors]).T
+    S = np.array([twins.joint_angle_row(system, motor.joint) for motor in mechanism.motors]).T
     names = [motor.name for motor in mechanism.motors]
     expected = tuple(
         tuple(names[k] for k in pair) for pair in combinations(range(4), 2)

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.sparse import sparse_jacobian, stiffness_diagonal
 from paraflex.dynamics.state import State
+from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import CONSTRAINT
@@ -24,6 +28,9 @@ _BALANCED = 1e-6
 _DIFFERENCE = 1e-6
 # A pose that moves by more than this in one iteration has left the neighbourhood of the start [m, rad].
 _LONGEST_STEP = 0.3
+# Up to so many unknowns a dense Jacobian, whose dependent columns least squares can tell, is fast enough.
+_DENSE = 400
+_NO_EQUILIBRIUM = "no static equilibrium near the start: hold more joints"
 
 
 def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -> State:
@@ -46,6 +53,8 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
     AssemblyError
         No equilibrium is found near the start.
     """
+    if system.n + system.m > _DENSE:
+        return _sparse_equilibrium(system, start, held)
     n, m, size = system.n, system.m, system.n + system.m + len(held)
     residual = _Residual(system, start, held)
     z = np.concatenate([start.q, np.zeros(m + len(held))])
@@ -64,7 +73,53 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
         z += change * min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
         if reach <= _SMALLEST_MOVE and np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_force:
             return State(start.time, z[:n], np.zeros(n))
-    raise AssemblyError("no static equilibrium near the start: hold more joints", Moment(start.time, 0), partial=z[:n])
+    raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), partial=z[:n])
+
+
+def _sparse_equilibrium(system: System, start: State, held: Sequence[str]) -> State:
+    """The same with sparse matrices; springs at joints are stiffness here, not multipliers."""
+    forces, elastic = RestingForces(system, start.time), stiffness_diagonal(system)
+    signals, still = moment_signals(system.mechanism, start.time), np.zeros(system.n)
+    compliance = system.packed.rows["compliance"][forces.springs]
+    kept = [float(joint_coordinate(system, name, start.q[None]).value[0]) for name in held]
+    rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
+    q, mu = start.q.copy(), np.zeros(rigid.size + len(held))
+    for _ in range(_MAX_ITERATIONS):
+        found = [joint_coordinate(system, name, q[None]) for name in held]
+        off = np.array([joint.value[0] for joint in found]) - kept
+        holding = scipy.sparse.csr_matrix(np.array([joint.rows[0] for joint in found]).reshape(-1, system.n))
+        lam = np.zeros(system.m)
+        lam[rigid] = mu[: rigid.size]
+        lam[forces.springs] = forces(q, lam)[1] / compliance
+        f = forces(q, lam)[0] + elastic * q + holding.T @ mu[rigid.size :]
+        phi, _ = system.constraints(signals, start.time, q, still)
+        K = scipy.sparse.csr_matrix(pose_stiffness(system, start.time, q, lam) + scipy.sparse.diags(elastic))
+        C = scipy.sparse.csr_matrix(scipy.sparse.vstack([sparse_jacobian(system, q)[rigid], holding]))
+        try:
+            change, more = _solve(K, C, -f, -np.concatenate([phi[rigid], off]))
+        except RuntimeError:  # an exactly singular matrix: nothing holds it in some direction, or rows are dependent
+            break
+        if not np.all(np.isfinite(change)):
+            break
+        reach = max(np.max(np.abs(change[body.offset : body.offset + 3])) for body in system.bodies)
+        part = min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
+        q, mu = q + part * change, mu + part * more
+        largest = max(np.max(np.abs(lam), initial=0.0), np.max(np.abs(mu), initial=0.0))
+        if reach <= _SMALLEST_MOVE and np.max(np.abs(f)) <= _BALANCED * largest:
+            return State(start.time, q, still)
+    raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), partial=q)
+
+
+def _solve(
+    K: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, f: NDArray[np.float64], r: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """[K, C^T; C, 0] [x; mu] = [f; r]. K is indefinite: unlike `sparse.Saddle` this regularises nothing."""
+    size = max(1.0, float(abs(K).max()))
+    matrix = scipy.sparse.csc_matrix(scipy.sparse.bmat([[K / size, C.T], [C, None]]))
+    right, factor = np.concatenate([f / size, r]), scipy.sparse.linalg.splu(matrix)
+    z = factor.solve(right)
+    z += factor.solve(right - matrix @ z)
+    return z[: f.size], z[f.size :] * size
 
 
 class _Residual:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import CONSTRAINT, Signals
 from paraflex.kernel.stage import equations
-from paraflex.mechanism import GROUND, Assembly, Joint, RevoluteJoint, WeldJoint
+from paraflex.mechanism import GROUND, Assembly, RevoluteJoint, WeldJoint
 from paraflex.mechanism.poses import approximate_poses
 
 _MAX_ITERATIONS = 50
@@ -72,30 +72,26 @@ def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
         if pose.position is not None:
             q[body.position] = pose.position
             placed.add(name)
-    joints: dict[str, list[Joint]] = {body.name: [] for body in system.bodies} | {GROUND: []}
-    for joint in system.mechanism.joints:
-        joints[joint.a.body].append(joint)
-        joints[joint.b.body].append(joint)
+    # Joints that hold points together say where the next body is; others only where nothing better does. Among them the
+    # first of the mechanism comes first: a gap is left where the last joints close the loops.
+    joints: dict[str, list[tuple[bool, int]]] = {body.name: [] for body in system.bodies} | {GROUND: []}
+    for number, joint in enumerate(system.mechanism.joints):
+        entry = (not isinstance(joint, RevoluteJoint | WeldJoint), number)
+        joints[joint.a.body].append(entry)
+        joints[joint.b.body].append(entry)
     if not joints[GROUND] and not placed:
         placed.add(system.bodies[0].name)
-    # Joints that hold points together say where the next body is; others only where nothing better does.
-    firm: deque[tuple[Joint, str]] = deque()
-    loose: deque[tuple[Joint, str]] = deque()
-
-    def reach(name: str) -> None:
-        for joint in joints[name]:
-            (firm if isinstance(joint, RevoluteJoint | WeldJoint) else loose).append((joint, name))
-
-    for name in (GROUND, *placed):
-        reach(name)
-    while firm or loose:
-        joint, name = firm.popleft() if firm else loose.popleft()
-        known, new = (joint.a, joint.b) if joint.a.body == name else (joint.b, joint.a)
+    waiting = [entry for name in (GROUND, *sorted(placed)) for entry in joints[name]]
+    heapq.heapify(waiting)
+    while waiting:
+        joint = system.mechanism.joints[heapq.heappop(waiting)[1]]
+        known, new = (joint.a, joint.b) if joint.a.on_ground or joint.a.body in placed else (joint.b, joint.a)
         if not new.on_ground and new.body not in placed:
             target = point_position(system, q, known)
             q[system.body(new.body).position] += target - point_position(system, q, new)
             placed.add(new.body)
-            reach(new.body)
+            for entry in joints[new.body]:
+                heapq.heappush(waiting, entry)
     return q
 
 

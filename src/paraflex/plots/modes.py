@@ -62,7 +62,7 @@ def motor_torques(data: xr.Dataset) -> Figure:
                 short = len(name) + len(", ".join(passive)) <= _TITLE_LETTERS
                 listed = ", ".join(map(symbol, passive)) if short else f"{len(passive)} motors"
                 panel.set_title(f"passive: {listed}", loc="right")
-        axes[row, 0].set_ylabel(_effort_label(data["torque"].attrs["units"]))
+        axes[row, 0].set_ylabel(_effort_label(data["torque"].attrs.get("units", "N m")))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=38.0)
 
