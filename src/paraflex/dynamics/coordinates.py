@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -110,6 +110,11 @@ class Marker:
     N: NDArray[np.float64]
     slope: NDArray[np.float64]
     bending: NDArray[np.float64] | None = None
+
+    @property
+    def on_frame(self) -> Marker:
+        """The same place, fixed in the body frame: it does not follow the deformation."""
+        return replace(self, N=np.zeros_like(self.N), slope=np.zeros_like(self.slope), bending=None)
 
     def place(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Place in the body frame (2,) for flexible coordinates u (nf,)."""

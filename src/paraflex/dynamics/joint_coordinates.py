@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
 from paraflex.dynamics.system import System
-from paraflex.mechanism import PointRef, PrismaticJoint, SlidingJoint, SlotJoint
+from paraflex.mechanism import AxisJoint, PointRef, SlidingJoint
 
 
 class JointCoordinate(NamedTuple):
@@ -30,41 +29,31 @@ def joint_coordinate(
     """
     joint = system.mechanism.joint(name)
     v = np.zeros_like(q) if v is None else v
-    if not isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+    if not isinstance(joint, AxisJoint):
         value_a, rows_a = _angle(system, joint.a, q)
         value_b, rows_b = _angle(system, joint.b, q)
         rows = rows_b - rows_a
         return JointCoordinate(value_b - value_a, np.sum(rows * v, axis=1), rows)
     carrier = axis_marker(system, joint)
     theta, turn = _marker_angle(system, carrier, q)
-    theta = theta + axis_direction(joint)
+    theta = theta + joint.direction
     e = np.column_stack([np.cos(theta), np.sin(theta)])
-    (pa, rows_a), (pb, rows_b) = _place(system, carrier, q), _place(system, system.marker(joint.b), q)
+    (pa, rows_a), (pb, rows_b) = marker_place(system, carrier, q), marker_place(system, system.marker(joint.b), q)
     d = pb - pa
     lever = e[:, 0] * d[:, 1] - e[:, 1] * d[:, 0]
     rows = np.einsum("ki,kij->kj", e, rows_b - rows_a) + lever[:, None] * turn
     return JointCoordinate(np.sum(e * d, axis=1), np.sum(rows * v, axis=1), rows)
 
 
-def axis_marker(system: System, joint: PrismaticJoint | SlotJoint | SlidingJoint) -> Marker:
+def axis_marker(system: System, joint: AxisJoint) -> Marker:
     """What carries a joint's axis: the material at point a, of a sliding joint the body's frame there."""
     marker = system.marker(joint.a)
-    if isinstance(joint, SlidingJoint):
-        still = np.zeros_like(marker.N)
-        return replace(marker, N=still, slope=still[0], bending=None)
-    return marker
+    return marker.on_frame if isinstance(joint, SlidingJoint) else marker
 
 
-def axis_direction(joint: PrismaticJoint | SlotJoint | SlidingJoint) -> float:
-    """Of a joint's axis against what carries it [rad]."""
-    return 0.0 if isinstance(joint, SlidingJoint) else joint.direction
-
-
-def axis_angle(
-    system: System, joint: PrismaticJoint | SlotJoint | SlidingJoint, q: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def axis_angle(system: System, joint: AxisJoint, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Angle (k,) of a joint's axis in the ground frame [rad]."""
-    return _marker_angle(system, axis_marker(system, joint), q)[0] + axis_direction(joint)
+    return _marker_angle(system, axis_marker(system, joint), q)[0] + joint.direction
 
 
 def _angle(system: System, ref: PointRef, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -84,7 +73,9 @@ def _marker_angle(
     return np.sum(rows * q, axis=1), rows
 
 
-def _place(system: System, marker: Marker, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def marker_place(
+    system: System, marker: Marker, q: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Position (k, 2) of a material point in the ground frame, and its derivative (k, 2, n): [1, R E s, R ds/du]."""
     rows = np.zeros((q.shape[0], 2, q.shape[1]))
     if marker.body == GROUND_INDEX:

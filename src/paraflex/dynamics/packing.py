@@ -31,15 +31,15 @@ from paraflex.kernel.packed import (
     PackedSystem,
 )
 from paraflex.mechanism import (
+    AxisJoint,
     Joint,
     Load,
     Mechanism,
     PointForce,
+    PointJoint,
     PointRef,
     PrismaticJoint,
-    RevoluteJoint,
     SlidingJoint,
-    SlotJoint,
     WeldJoint,
 )
 
@@ -90,28 +90,24 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
     """What a joint holds."""
     name, a, b = joint.name, joint.a, joint.b
     parts = []
-    if isinstance(joint, RevoluteJoint | WeldJoint):
+    if isinstance(joint, PointJoint):
         parts.append(Constraint(name, POINT, a, b, (f"{name} x", f"{name} y")))
-    if isinstance(joint, PrismaticJoint | SlotJoint):
-        normal = joint.direction + 0.5 * np.pi
-        parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=normal))
-    if isinstance(joint, SlidingJoint):
-        parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=0.5 * np.pi, carrier="track"))
+    if isinstance(joint, AxisJoint):
+        normal, carrier = joint.direction + 0.5 * np.pi, "track" if isinstance(joint, SlidingJoint) else "material"
+        parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier))
     if isinstance(joint, PrismaticJoint | WeldJoint):
         parts.append(Constraint(name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
     return parts
 
 
-def _axis_of(joint: PrismaticJoint | SlotJoint | SlidingJoint) -> dict[str, Any]:
+def _axis_of(joint: AxisJoint) -> dict[str, Any]:
     """Direction and carrier of the axis that a joint's travel is measured on."""
-    if isinstance(joint, SlidingJoint):
-        return {"direction": 0.0, "carrier": "frame"}
-    return {"direction": joint.direction, "carrier": "material"}
+    return {"direction": joint.direction, "carrier": "frame" if isinstance(joint, SlidingJoint) else "material"}
 
 
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+    if isinstance(joint, AxisJoint):
         keywords |= _axis_of(joint)
         return Constraint(name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
     return Constraint(name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
@@ -274,10 +270,8 @@ class _Packer:
         track = -1
         if carrier != "material":
             # The frame has no slope of its own, and a track counts from its origin.
-            marker = self.markers[int(ends["a"])]
-            x0 = marker.x0 if carrier == "frame" else np.zeros(2)
-            still = replace(marker, x0=x0, N=np.zeros_like(marker.N), slope=np.zeros_like(marker.slope), bending=None)
-            self.markers[int(ends["a"])] = still
+            fixed = self.markers[int(ends["a"])].on_frame
+            self.markers[int(ends["a"])] = fixed if carrier == "frame" else replace(fixed, x0=np.zeros(2))
         if carrier == "track":
             self.tracks.append(self.index[a.body])
             track = len(self.tracks) - 1
@@ -285,7 +279,7 @@ class _Packer:
         return len(self.axes) - 1
 
     def add_motor(self, joint: Joint, signal: int) -> None:
-        if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+        if isinstance(joint, AxisJoint):
             self.add_axis(joint.a, joint.b, signal=signal, **_axis_of(joint))
             return
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):

@@ -10,6 +10,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from paraflex.dynamics.coordinates import BodyCoordinates
+from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
@@ -103,20 +104,7 @@ def static_shape(system: System, name: str, points: Mapping[str, Deflection]) ->
 
 def point_rows(system: System, q: NDArray[np.float64], ref: PointRef) -> NDArray[np.float64]:
     """Rows (2, n) that take velocities of the coordinates to the velocity of a point of a body at q."""
-    marker = system.marker(ref)
-    body = system.bodies[marker.body]
-    u = q[body.flexible]
-    c, s = np.cos(q[body.angle]), np.sin(q[body.angle])
-    R = np.array([[c, -s], [s, c]])
-    x, y = marker.place(u)
-    shape = marker.N.copy()
-    if marker.bending is not None:
-        shape[0] -= marker.bending @ u
-    rows = np.zeros((2, system.n))
-    rows[:, body.position] = np.eye(2)
-    rows[:, body.angle] = R @ [-y, x]
-    rows[:, body.flexible] = R @ shape
-    return rows
+    return marker_place(system, system.marker(ref), q[None])[1][0]
 
 
 def _coordinates(

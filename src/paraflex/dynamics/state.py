@@ -17,7 +17,7 @@ from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import CONSTRAINT, Signals
 from paraflex.kernel.stage import equations
-from paraflex.mechanism import GROUND, Assembly, RevoluteJoint, WeldJoint
+from paraflex.mechanism import GROUND, Assembly, PointJoint
 from paraflex.mechanism.poses import approximate_poses
 
 _MAX_ITERATIONS = 50
@@ -76,7 +76,7 @@ def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
     # first of the mechanism comes first: a gap is left where the last joints close the loops.
     joints: dict[str, list[tuple[bool, int]]] = {body.name: [] for body in system.bodies} | {GROUND: []}
     for number, joint in enumerate(system.mechanism.joints):
-        entry = (not isinstance(joint, RevoluteJoint | WeldJoint), number)
+        entry = (not isinstance(joint, PointJoint), number)
         joints[joint.a.body].append(entry)
         joints[joint.b.body].append(entry)
     if not joints[GROUND] and not placed:

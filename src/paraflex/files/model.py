@@ -42,6 +42,7 @@ from paraflex.mechanism import (
     ActuationMode,
     AppliedTorque,
     Assembly,
+    AxisJoint,
     Body,
     Curvature,
     EndEffector,
@@ -337,7 +338,7 @@ def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
 
 def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointTable | None) -> None:
     """A joint that turns has an angle, one that slides a displacement."""
-    slides = isinstance(joint, JointTable) and joint.type in ("prismatic", "slot", "sliding")
+    slides = isinstance(joint, JointTable) and issubclass(_JOINTS[joint.type], AxisJoint)
     wrong, right = ("angle", "displacement") if slides else ("displacement", "angle")
     if joint is not None and wrong in quantities(entry):
         kind = joint.type if isinstance(joint, JointTable) else "revolute"

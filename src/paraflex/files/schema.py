@@ -255,7 +255,7 @@ class DamperTable(_Table):
 class LinearSpringTable(_Table):
     """A spring and damper between two points."""
 
-    points: Annotated[list[Text], Field(min_length=2, max_length=2)] = Field(description='["body.point", "body.point"]')
+    points: TwoPoints = Field(description='["body.point", "body.point"]')
     stiffness: Number = Field(description="the stiffness in N/m")
     length: Number = Field(default=0.0, description="the free length in m")
     damping: Number = Field(default=0.0, description="the damping in N s/m")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError, suggestion
@@ -12,7 +11,7 @@ from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.joints import GROUND, PointRef, SlidingJoint, WeldJoint
 from paraflex.mechanism.loads import PointForce
 from paraflex.mechanism.poses import approximate_poses
-from paraflex.mechanism.quantities import finite, not_negative, positive
+from paraflex.mechanism.quantities import finite, known, not_negative, positive
 
 if TYPE_CHECKING:
     from paraflex.mechanism.mechanism import Mechanism
@@ -106,7 +105,7 @@ def check_references(mechanism: Mechanism) -> None:
     for kind, members in groups.items():
         for member in members:
             field = f"{kind}.{member.name}.joint"
-            _known(member.joint, joints, field, "joint")
+            known(member.joint, joints, field, "joint")
             if isinstance(mechanism.joint(member.joint), WeldJoint):
                 raise InputError("a weld does not move", field=field, value=member.joint, remedy="name another joint")
     for spring in mechanism.springs:
@@ -120,10 +119,10 @@ def check_references(mechanism: Mechanism) -> None:
         positive(friction.speed, f"friction.{friction.name}.speed", "rad/s, or m/s")
     for mode in mechanism.modes:
         for name in mode.motors:
-            _known(name, motors, f"mode.{mode.name}", "motor")
+            known(name, motors, f"mode.{mode.name}", "motor")
     for assembly in mechanism.assemblies:
         for name, angle in assembly.angles.items():
-            _known(name, bodies, f"assembly.{assembly.name}", "body")
+            known(name, bodies, f"assembly.{assembly.name}", "body")
             finite([angle], f"assembly.{assembly.name}.{name}")
         for ref, place in assembly.points.items():
             field = f"assembly.{assembly.name}.points"
@@ -208,11 +207,6 @@ def check_loads(mechanism: Mechanism) -> None:
 
 def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
     points = mechanism.points
-    _known(ref.body, points, field, "body")
+    known(ref.body, points, field, "body")
     if ref.point not in points[ref.body]:
         raise InputError("unknown point", field=field, value=str(ref), remedy=suggestion(ref.point, points[ref.body]))
-
-
-def _known(name: str, known: Collection[str], field: str, kind: str) -> None:
-    if name not in known:
-        raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,9 +115,13 @@ class SlidingJoint:
     name: str
     a: PointRef
     b: PointRef
+    direction: ClassVar[float] = 0.0  # along the beam
 
 
-Joint = RevoluteJoint | PrismaticJoint | SlotJoint | SlidingJoint | WeldJoint
+# Joints that hold two points together, and those with an axis that their travel is measured along.
+PointJoint = RevoluteJoint | WeldJoint
+AxisJoint = PrismaticJoint | SlotJoint | SlidingJoint
+Joint = PointJoint | AxisJoint
 
 
 @runtime_checkable

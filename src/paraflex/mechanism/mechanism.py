@@ -13,13 +13,11 @@ from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, 
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.joints import (
     GROUND,
+    AxisJoint,
     Joint,
     Motor,
     PointRef,
     PrescribedAngle,
-    PrismaticJoint,
-    SlidingJoint,
-    SlotJoint,
 )
 from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
 
@@ -159,8 +157,7 @@ class Mechanism:
 
     def motor_units(self) -> tuple[str, ...]:
         """What each motor's torque is counted in: N m, or N where its joint slides."""
-        slides = (PrismaticJoint, SlotJoint, SlidingJoint)
-        return tuple("N" if isinstance(self.joint(motor.joint), slides) else "N m" for motor in self.motors)
+        return tuple("N" if isinstance(self.joint(motor.joint), AxisJoint) else "N m" for motor in self.motors)
 
     def assembly(self, name: str | None = None) -> Assembly:
         """The assembly of that name, or the first.

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body, RigidBody
-from paraflex.mechanism.joints import GROUND, PointRef, RevoluteJoint, WeldJoint
+from paraflex.mechanism.joints import GROUND, PointJoint, PointRef
 from paraflex.mechanism.modal import ModalBody
 
 if TYPE_CHECKING:
     from paraflex.mechanism.mechanism import Assembly, Mechanism
 
 Place = tuple[float, float]
-# Joints that hold two points together; others do not tell where a point is.
-_POINT_JOINTS = (RevoluteJoint, WeldJoint)
 # Points of a body nearer one another than this do not tell its angle [m].
 _APART = 1e-9
 
@@ -60,7 +58,8 @@ def _from_points(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:
     while before < len(known) + len(poses):
         before = len(known) + len(poses)
         for joint in mechanism.joints:
-            if isinstance(joint, _POINT_JOINTS):
+            # Others do not tell where a point is.
+            if isinstance(joint, PointJoint):
                 for one, other in ((joint.a, joint.b), (joint.b, joint.a)):
                     if one in known:
                         known.setdefault(other, known[one])

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, suggestion
+
+
+def known(name: str, names: Collection[str], field: str, kind: str) -> None:
+    """Raise an `InputError`, with the nearest, unless a name is one of those there are."""
+    if name not in names:
+        raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 
 def finite(values: Iterable[float], field: str) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.mechanism.bodies import RigidBody
 from paraflex.mechanism.joints import PointRef
 from paraflex.mechanism.mechanism import Mechanism
+from paraflex.mechanism.quantities import known
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def check_start(mechanism: Mechanism, start: Start) -> None:
     bodies = {body.name: body for body in mechanism.bodies}
     for table in ("deflection", "velocity.angular", "coordinates", "rates"):
         for name in getattr(start, table.rpartition(".")[2]):
-            _known(name, bodies, f"start.{table}", "body")
+            known(name, bodies, f"start.{table}", "body")
     for name, points in start.deflection.items():
         where = f"start.deflection.{name}"
         if isinstance(bodies[name], RigidBody) or not getattr(bodies[name], "flexible", True):
@@ -95,14 +96,9 @@ def check_start(mechanism: Mechanism, start: Start) -> None:
         if name in start.coordinates:
             raise InputError("its coordinates are given", field=where, remedy="give one of deflection and coordinates")
         for point in points:
-            _known(point, bodies[name].points, where, "point")
+            known(point, bodies[name].points, where, "point")
     for ref in start.point:
-        _known(ref.body, bodies, "start.velocity.point", "body")
-        _known(ref.point, bodies[ref.body].points, "start.velocity.point", "point")
+        known(ref.body, bodies, "start.velocity.point", "body")
+        known(ref.point, bodies[ref.body].points, "start.velocity.point", "point")
     if start.rates and (start.angular or start.point):
         raise InputError("given beside velocities", field="start.rates", remedy="give one of rates and velocity")
-
-
-def _known(name: str, known: Iterable[str], field: str, kind: str) -> None:
-    if name not in known:
-        raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, known))

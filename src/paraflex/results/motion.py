@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import Marker, System, axis_angle, end_markers
-from paraflex.mechanism import PointRef, PrismaticJoint, SlidingJoint, SlotJoint
+from paraflex.mechanism import AxisJoint, PointRef
 
 
 class PointMotion(NamedTuple):
@@ -71,7 +71,7 @@ def joint_forces(
     for i, name in enumerate(names):
         joint = system.mechanism.joint(name)
         # Phi is of b less of a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
-        if isinstance(joint, PrismaticJoint | SlotJoint | SlidingJoint):
+        if isinstance(joint, AxisJoint):
             along = axis_angle(system, joint, q)
             normal = np.column_stack([-np.sin(along), np.cos(along)])
             forces[:, i] = -multipliers[:, row[f"{name} normal"], None] * normal
