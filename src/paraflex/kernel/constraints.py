@@ -6,7 +6,7 @@ from math import cosh
 
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import axis_motion, axis_values, fill_axis_rows
-from paraflex.kernel.compiling import kernel, routine
+from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import apply_force, apply_torque, marker_angle, marker_motion
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION
 from paraflex.kernel.signals import evaluate_signal
@@ -64,36 +64,41 @@ def fill_jacobian(p, q, jacobian):
     fill_axis_rows(p, q, jacobian)
 
 
-@routine
-def damped(p, r):
-    """Whether row r holds the rate of a joint."""
-    return p.rows[r].kind == DAMPER or p.rows[r].kind == FRICTION
+@inlined
+def damped(kind):
+    """Whether a row of that kind holds the rate of a joint."""
+    return kind == DAMPER or kind == FRICTION
 
 
 @routine
 def joint_rates(p, q, v, rates):
-    """Rates of the joints of dampers and friction into their entries of rates."""
+    """Rates of the joints of dampers and friction into their entries of rates; whether there are any."""
+    some = False
     for r in range(p.rows.size):
-        if damped(p, r):
-            rates[r] = 0.0
+        if damped(p.rows[r].kind):
+            rates[r], some = 0.0, True
+    if not some:
+        return False
     for k in range(p.ports.size):
         port = p.ports[k]
-        if port.kind == ANGLE and damped(p, port.row):
+        if port.kind == ANGLE and damped(p.rows[port.row].kind):
             rates[port.row] += port.sign * marker_angle(p, p.markers[port.marker], v)
     for k in range(p.axes.size):
         row = p.axes[k].row
         if row >= 0:
-            if damped(p, row):
+            if damped(p.rows[row].kind):
                 rates[row] = axis_motion(p, k, q, v, v)[1]
+    return True
 
 
 @routine
 def dissipated_power(p, q, v, lam, rates):
     """What dampers and friction take; `rates` is scratch (m,)."""
     power = 0.0
-    joint_rates(p, q, v, rates)
+    if not joint_rates(p, q, v, rates):
+        return power
     for r in range(p.rows.size):
-        if damped(p, r):
+        if damped(p.rows[r].kind):
             power += lam[r] * rates[r]
     return power
 
@@ -101,7 +106,8 @@ def dissipated_power(p, q, v, lam, rates):
 @kernel
 def note_friction(p, q, v, rates, compliance):
     """Inverse slopes of friction at the rates in v, for the iteration matrix; `rates` is scratch (m,)."""
-    joint_rates(p, q, v, rates)
+    if not joint_rates(p, q, v, rates):
+        return
     for r in range(p.rows.size):
         row = p.rows[r]
         if row.kind == FRICTION:
