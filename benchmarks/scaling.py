@@ -15,8 +15,8 @@ import time
 import numpy as np
 
 from paraflex.dynamics import State, System, build_system, constant_signals, pack_signals, start_state
-from paraflex.integrators import IntegrationOptions
-from paraflex.integrators.esdirk import Run, prepare
+from paraflex.integrators import IntegrationOptions, make_problem
+from paraflex.integrators.native import NativeRun, prepare
 from paraflex.kernel.run_state import ITERATIONS, REJECTED, STEPS
 from paraflex.mechanism import Start, chain_of_segments, four_bars_in_a_row
 
@@ -48,12 +48,12 @@ def main() -> None:
         print(f"{n:11d}{system.m:11d}{seconds}{step / iteration:11.2f}{megabytes(run):11.2f}{ratio}", flush=True)
 
 
-def fastest(system: System, start: State) -> tuple[float, float, Run]:
+def fastest(system: System, start: State) -> tuple[float, float, NativeRun]:
     """Seconds a step and an iteration, of the fastest repeat."""
     signals, _ = pack_signals(system.mechanism, constant_signals([], DURATION), DURATION)
     best = None
     for _ in range(REPEATS):
-        run = prepare(system, signals, start, np.array([DURATION]), None, IntegrationOptions(tolerance=1e-5))
+        run = prepare(make_problem(system, signals, start, np.array([DURATION])), IntegrationOptions(tolerance=1e-5))
         run.start()
         run.march(10)
         counts = run.state.counts
@@ -68,9 +68,9 @@ def fastest(system: System, start: State) -> tuple[float, float, Run]:
     return best
 
 
-def megabytes(run: Run) -> float:
+def megabytes(run: NativeRun) -> float:
     """Of all arrays of a run."""
-    parts = (run.system.packed, run.workspace, run.slow, run.state, run.samples)
+    parts = (run.problem.system.packed, run.workspace, run.slow, run.state, run.samples)
     return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray)) / 1e6
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from paraflex import plots
     from paraflex.errors import InputError, NumericalError, ParaflexError
     from paraflex.files import Model, library_names, load, load_path
-    from paraflex.integrators import IntegrationOptions
+    from paraflex.integrators import METHODS, IntegrationOptions
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
     from paraflex.mechanism import Mechanism, chain_of_segments, four_bars_in_a_row, raparm_i
     from paraflex.results import load_results, save_results, summary, tracking_dataset
@@ -24,6 +24,7 @@ _HOME = {
     "InputError": "errors",
     "IntegrationOptions": "integrators",
     "Line": "kinematics",
+    "METHODS": "integrators",
     "Mechanism": "mechanism",
     "Model": "files",
     "NumericalError": "errors",
@@ -45,6 +46,7 @@ _HOME = {
 }
 
 __all__ = [
+    "METHODS",
     "Circle",
     "InputError",
     "IntegrationOptions",

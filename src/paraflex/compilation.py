@@ -16,8 +16,8 @@ import numpy as np
 
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
 from paraflex.dynamics.state import check_accelerations
-from paraflex.integrators import IntegrationOptions
-from paraflex.integrators.esdirk import Run, prepare
+from paraflex.integrators import IntegrationOptions, make_problem
+from paraflex.integrators.native import NativeRun, prepare
 from paraflex.kernel.march import march
 from paraflex.kinematics import Line
 from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
@@ -73,12 +73,12 @@ def _newest_source() -> float:
     return max(source.stat().st_mtime for source in Path(march.py_func.__code__.co_filename).parent.glob("*.py"))
 
 
-def _free_beam(geometry: Geometry) -> Run:
+def _free_beam(geometry: Geometry) -> NativeRun:
     beam = FlexibleBeam("beam", 1.0, Section(1e-4, 1e-9), Material(70e9, 2700.0))
     system = build_system(Mechanism("free beam", ground={}, bodies=(beam,), joints=(), geometry=geometry))
     signals, _ = pack_signals(system.mechanism, constant_signals([], 1.0), 1.0)
     still = State(0.0, np.zeros(system.n), np.zeros(system.n))
-    return prepare(system, signals, still, np.array([0.0, 1.0]), None, IntegrationOptions())
+    return prepare(make_problem(system, signals, still, np.array([0.0, 1.0])), IntegrationOptions())
 
 
 def _call_time_loop(geometry: Geometry) -> None:
@@ -89,7 +89,7 @@ def _call_the_rest(geometry: Geometry) -> None:
     beam = _free_beam(geometry)
     beam.start()
     # What a start with prescribed motion is checked with.
-    check_accelerations(beam.system, beam.signals, 0.0, beam.state.q, beam.state.v)
+    check_accelerations(beam.problem.system, beam.problem.signals, 0.0, beam.state.q, beam.state.v)
     path = Line((0.05, 0.31), (0.05, 0.30), max_acceleration=10.0)
     plan_tracking(raparm_i(), path, samples=2).torques("++++")
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, build_system, consistent_state, constant_signals, pack_signals
 from paraflex.errors import InputError, IntegrationError, suggestion
-from paraflex.integrators import IntegrationOptions, Solution, integrate
+from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.mechanism import Mechanism
 
 
@@ -42,6 +42,7 @@ def simulate_motion(
     assembly: str | None = None,
     torques: Mapping[str, float] | None = None,
     start: State | None = None,
+    method: str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> MotionRun:
@@ -60,6 +61,8 @@ def simulate_motion(
         Constant torque of each motor by name [N m]; zero for the others.
     start : State, optional
         In place of the assembly: see `dynamics.consistent_state`.
+    method : str, optional
+        Of integration: that of the options by default; see `paraflex.METHODS`.
     options : IntegrationOptions, optional
     on_progress : callable, optional
         Told the time reached [s].
@@ -73,6 +76,7 @@ def simulate_motion(
     IntegrationError
         The run could not be finished; it carries a MotionRun with what was computed.
     """
+    options = choose(method, options)
     if not (np.isfinite(duration) and duration > 0.0):
         raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
     if samples < 2:

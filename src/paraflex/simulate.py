@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
 from paraflex.dynamics import State, System, build_system, pack_signals, static_equilibrium
 from paraflex.errors import InputError, IntegrationError
-from paraflex.integrators import IntegrationOptions, Solution, integrate
+from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.kinematics import Path, RigidMotion, follow_path
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 
@@ -120,9 +120,11 @@ class TrackingTask:
         joints = [motor.joint for motor in self.mechanism.motors if motor.name in self.mode(mode).motors]
         return replace(self, start=static_equilibrium(self.system, self.start, joints))
 
-    def simulate(self, mode: str | ActuationMode, *, options: IntegrationOptions | None = None) -> TrackingRun:
+    def simulate(
+        self, mode: str | ActuationMode, *, method: str | None = None, options: IntegrationOptions | None = None
+    ) -> TrackingRun:
         """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""
-        return simulate(self, mode, options=options)
+        return simulate(self, mode, method=method, options=options)
 
 
 @dataclass(frozen=True)
@@ -211,6 +213,7 @@ def simulate(
     task: TrackingTask,
     mode: str | ActuationMode,
     *,
+    method: str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> TrackingRun:
@@ -221,6 +224,8 @@ def simulate(
     task : TrackingTask
     mode : str or ActuationMode
         Its name, signs ("+-+-") or motor names ("tau1,tau5").
+    method : str, optional
+        Of integration: that of the options by default; see `paraflex.METHODS`.
     options : IntegrationOptions, optional
     on_progress : callable, optional
         Told the time reached [s].
@@ -236,6 +241,8 @@ def simulate(
     IntegrationError
         The run could not be finished; it carries a TrackingRun with what was computed.
     """
+    options = choose(method, options)
+    title = options.description.title
     torques = task.torques(mode)
     condition = actuation_condition(task.effort, torques.mode)
     times = task.motion.t
@@ -246,9 +253,9 @@ def simulate(
             task.system, signals, task.start, times, knots=stops, options=options, on_progress=on_progress
         )
     except IntegrationError as error:
-        error.partial = TrackingRun(task, torques, condition, error.partial)
+        error.partial = TrackingRun(task, torques, condition, error.partial, title)
         raise
-    return TrackingRun(task, torques, condition, solution)
+    return TrackingRun(task, torques, condition, solution, title)
 
 
 def _in_place(system: System) -> dict[str, tuple[str, float]]:

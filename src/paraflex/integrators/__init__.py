@@ -1,6 +1,20 @@
-"""Time integration: schemes as tableaux, and the loop that runs them."""
+"""Time integration: methods by name, our own schemes as tableaux and parameters, SciPy's and SUNDIALS' as guests."""
 
-from paraflex.integrators.esdirk import IntegrationOptions, Solution, integrate
+from paraflex.integrators.integrate import integrate
+from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method
+from paraflex.integrators.options import IntegrationOptions, choose
+from paraflex.integrators.run import make_problem
+from paraflex.integrators.solution import Solution
 from paraflex.integrators.tableaux import TR_BDF2
 
-__all__ = ["TR_BDF2", "IntegrationOptions", "Solution", "integrate"]
+__all__ = [
+    "DEFAULT_METHOD",
+    "METHODS",
+    "TR_BDF2",
+    "IntegrationOptions",
+    "Method",
+    "Solution",
+    "choose",
+    "integrate",
+    "make_problem",
+]

@@ -67,7 +67,7 @@ def fill_jacobian(p, q, jacobian):
 @inlined
 def damped(kind):
     """Whether a row of that kind holds the rate of a joint."""
-    return kind == DAMPER or kind == FRICTION
+    return kind in (DAMPER, FRICTION)
 
 
 @routine

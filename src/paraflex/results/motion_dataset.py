@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.integrators import IntegrationOptions
+from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.dataset import SCHEMA, UNITS
@@ -95,7 +95,7 @@ def motion_dataset(
         "mechanism": mechanism.name,
         "kind": "motion",
         "tolerance": options.tolerance,
-        "method": "TR-BDF2",
+        "method": METHODS[solution.method].title,
         "singular_positions": json.dumps(solution.singular_positions),
         "parameters": json.dumps(parameters or {}, sort_keys=True),
         "paraflex_version": version("paraflex"),

@@ -1,0 +1,144 @@
+"""Integrate a system by any method: slices of steps, between which Python looks, reports and stops."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import State, System, redundant_rows
+from paraflex.errors import ConstraintDriftError, IntegrationError, Moment
+from paraflex.integrators import native
+from paraflex.integrators.methods import Family
+from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.run import Problem, Run, make_problem
+from paraflex.integrators.solution import Solution
+from paraflex.integrators.watch import bent_too_far, come_apart, least_norm
+from paraflex.kernel.packed import Signals
+from paraflex.kernel.run_state import ERROR_TEST, FINISHED, NO_CONVERGENCE, NOT_FINITE, PAUSED
+
+# Attempted steps between two looks: some milliseconds for a dozen bodies.
+_SLICE = 200
+# Rows this close to depending on each other when a run breaks down are the cause.
+_NEARLY_DEPENDENT = 1e-4
+_CAUSES = {
+    NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
+    NOT_FINITE: "the solution is no longer finite",
+    ERROR_TEST: "the error test asks for steps below the smallest one",
+}
+
+
+def integrate(
+    system: System,
+    signals: Signals,
+    initial: State,
+    times: NDArray[np.float64],
+    *,
+    knots: NDArray[np.float64] | None = None,
+    options: IntegrationOptions | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> Solution:
+    """Integrate a system from an initial state.
+
+    Parameters
+    ----------
+    system : System
+    signals : Signals
+        Motor torques and prescribed angles.
+    initial : State
+        Consistent: see `dynamics.consistent_state`.
+    times : (k,) array
+        Where results are wanted [s], ascending, the first not before the start; the last ends the run.
+    knots : array, optional
+        Times at which the signals are not smooth; steps end there.
+    options : IntegrationOptions, optional
+    on_progress : callable, optional
+        Told the time reached [s] every few milliseconds. A KeyboardInterrupt, in it or elsewhere, ends the run with
+        what is there, marked "interrupted".
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    IntegrationError
+        The run cannot go on; it carries the partial solution.
+    ConstraintDriftError
+        Constraints are left further than errors of integration explain; it carries the partial solution as well.
+    InputError
+        Times that do not ascend from the start.
+    """
+    began = time.perf_counter()
+    options = options or IntegrationOptions()
+    run = prepare(make_problem(system, signals, initial, times, knots), options)
+    status, message, bent, drift, now = "complete", "", "", "", None
+    code, limits = PAUSED, (run.dependent_rows, options.tolerance)
+    try:
+        run.start()
+        while code == PAUSED:
+            if run.attempts >= options.max_steps:
+                break
+            code = run.march(min(_SLICE, options.max_steps - run.attempts))
+            now = run.now()
+            bent, drift = bent_too_far(system, now.q), come_apart(system, signals, now.t, now.q, *limits)
+            if bent or drift:
+                break
+            if on_progress is not None:
+                on_progress(now.t)
+    except KeyboardInterrupt:
+        status, message = "interrupted", f"interrupted at t = {run.now().t:.6g} s"
+    solution = _solution(run, options, time.perf_counter() - began, status, message)
+    if (code == FINISHED and not (bent or drift)) or status == "interrupted":
+        return solution
+    cause = bent or drift or (f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code])
+    now = run.now()
+    # Near a singular position it may be Newton or the error test that gives up first.
+    lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and not (bent or drift) else []
+    if len(lost) > run.dependent_rows:
+        cause = f"the constraints lose rank, a singular position ({', '.join(lost)})"
+    moment = Moment(now.t, solution.steps)
+    error = ConstraintDriftError if drift and not bent else IntegrationError
+    raise error(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
+
+
+def prepare(problem: Problem, options: IntegrationOptions) -> Run:
+    """A run of a problem by the method of the options, not yet started."""
+    family = options.description.family
+    if family in (Family.ESDIRK, Family.NEWMARK):
+        return native.prepare(problem, options)
+    raise NotImplementedError(family)
+
+
+def _solution(run: Run, options: IntegrationOptions, wall_time: float, status: str, message: str) -> Solution:
+    samples, figures, system = run.samples, run.figures(), run.problem.system
+    reached = slice(0, run.reached)
+    multipliers = least_norm(system, samples.q[reached], samples.lam[reached], run.dependent_rows)
+    for first, last in figures.passages.T:
+        multipliers[(samples.times[reached] >= first) & (samples.times[reached] <= last)] = np.nan
+    return Solution(
+        t=samples.times[reached],
+        q=samples.q[reached],
+        v=samples.v[reached],
+        a=samples.a[reached],
+        multipliers=multipliers,
+        kinetic_energy=samples.energy[reached, 0],
+        strain_energy=samples.energy[reached, 1],
+        work=samples.energy[reached, 2],
+        status=status,
+        message=message,
+        steps=figures.steps,
+        rejected=figures.rejected,
+        newton_iterations=figures.newton_iterations,
+        factorisations=figures.factorisations,
+        wall_time=wall_time,
+        constraint_position_max=figures.constraint_position_max,
+        constraint_velocity_max=figures.constraint_velocity_max,
+        energy_balance_max=figures.energy_balance_max,
+        singular_positions=tuple(figures.passages.mean(axis=0).tolist()),
+        method=options.method,
+        evaluations=figures.evaluations,
+    )

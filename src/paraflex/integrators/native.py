@@ -1,0 +1,157 @@
+"""Runs of our own schemes: the kernel's time loop in slices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.run import Figures, Instant, Problem, empty_samples
+from paraflex.integrators.stretches import hidden_from
+from paraflex.integrators.tableaux import TR_BDF2
+from paraflex.kernel.linear import factor_system
+from paraflex.kernel.march import march, start
+from paraflex.kernel.packed import Workspace
+from paraflex.kernel.run_state import (
+    BALANCE,
+    DPHI_MAX,
+    ENERGY_0,
+    FACTORS,
+    FINISHED,
+    ITERATIONS,
+    PASSAGES,
+    PAUSED,
+    PHI_MAX,
+    REJECTED,
+    SAMPLE,
+    STEP,
+    STEPS,
+    TIME,
+    WEIGHT_0,
+    WORK,
+    Controls,
+    March,
+    Samples,
+    Tableau,
+    make_march,
+)
+
+# Where the first step starts from, as a fraction of the run; error control takes over at once.
+_FIRST_STEP = 1e-6
+# How long a velocity error that Newton leaves is taken to last, as a fraction of the run: it must count for more
+# than its share of one step, since it is of one sign while a factor is in use.
+_NEWTON_MEMORY = 0.002
+# A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average.
+_MEMORY = 0.25
+# Constraint rows with less than this of their squares left depend on the others for the moment and keep their
+# multipliers: small enough that this lasts a thousandth of a radian, large enough for good conditioning elsewhere.
+_DEPENDENT_PART = 1e-7
+
+
+@dataclass(frozen=True)
+class NativeRun:
+    """Everything the kernel's time loop works on: a `Run`."""
+
+    problem: Problem
+    tableau: Tableau
+    controls: Controls
+    state: March
+    workspace: Workspace
+    slow: Workspace
+    samples: Samples
+
+    @property
+    def dependent_rows(self) -> int:
+        """See `Run`."""
+        return self.controls.dependent_rows
+
+    @property
+    def attempts(self) -> int:
+        """See `Run`."""
+        return int(self.state.counts[STEPS] + self.state.counts[REJECTED])
+
+    @property
+    def reached(self) -> int:
+        """See `Run`."""
+        return int(self.state.counts[SAMPLE])
+
+    def start(self) -> None:
+        """See `Run`."""
+        arguments = (self.problem.system.packed, self.problem.signals, self.tableau, self.controls)
+        start(*arguments, self.state, self.workspace, self.samples)
+
+    def march(self, attempts: int) -> int:
+        """See `Run`."""
+        ahead = self.problem.jumps[self.problem.jumps > self.state.clock[TIME]]
+        signals, stops = self.problem.signals, self.problem.stops
+        if ahead.size:
+            signals, stops = hidden_from(signals, ahead[0]), stops[stops <= ahead[0]]
+        arguments = (self.problem.system.packed, signals, self.tableau, self.controls, stops, attempts)
+        code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
+        return self._resume() if code == FINISHED and ahead.size else code
+
+    def now(self) -> Instant:
+        """See `Run`."""
+        state = self.state
+        return Instant(
+            t=float(state.clock[TIME]),
+            q=state.q.copy(),
+            v=state.v.copy(),
+            a=state.stage_a[1, 0].copy(),
+            multipliers=state.stage_lam[0].copy(),
+            work=float(state.clock[WORK]),
+        )
+
+    def figures(self) -> Figures:
+        """See `Run`."""
+        state = self.state
+        return Figures(
+            steps=int(state.counts[STEPS]),
+            rejected=int(state.counts[REJECTED]),
+            newton_iterations=int(state.counts[ITERATIONS]),
+            factorisations=int(state.counts[FACTORS]),
+            evaluations=int(state.counts[ITERATIONS]),
+            constraint_position_max=float(state.clock[PHI_MAX]),
+            constraint_velocity_max=float(state.clock[DPHI_MAX]),
+            energy_balance_max=float(state.clock[BALANCE]),
+            passages=state.passages[:, : state.counts[PASSAGES]],
+        )
+
+    def _resume(self) -> int:
+        """A first stage with what is given after a jump; energies go on counting from the run's start."""
+        kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
+        arguments = (self.problem.system.packed, self.problem.signals, self.tableau, self.controls)
+        start(*arguments, self.state, self.workspace, empty_samples(np.zeros(0), self.problem.system))
+        self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
+        return PAUSED
+
+
+def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
+    """Set up a run."""
+    system, initial, span = problem.system, problem.initial, problem.span
+    tableau = TR_BDF2
+    state = make_march(system.n, system.m, tableau.c.size, len(system.mechanism.motors))
+    state.q[:], state.v[:] = initial.q, initial.v
+    state.clock[TIME], state.clock[STEP] = initial.time, min(_FIRST_STEP * span, options.max_step)
+    workspace = system.workspace()
+    controls = Controls(
+        rate=options.tolerance / span,
+        newton_fraction=options.newton_fraction,
+        newton_memory=_NEWTON_MEMORY * span,
+        memory=_MEMORY * span,
+        alpha=options.alpha,
+        beta=options.beta,
+        max_step=options.max_step,
+        dependent_part=_DEPENDENT_PART,
+        dependent_rows=int(factor_system(system.packed, 0.0, initial.q, workspace)),
+    )
+    return NativeRun(
+        problem=problem,
+        tableau=tableau,
+        controls=controls,
+        state=state,
+        workspace=workspace,
+        slow=system.workspace(),
+        samples=empty_samples(problem.times, system),
+    )

@@ -1,0 +1,129 @@
+"""What a user chooses of an integration, checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from paraflex.errors import InputError, suggestion
+from paraflex.integrators.methods import DEFAULT_METHOD, Method, Treatment, check_parameters, find_method
+
+_REMEDIES = {
+    "tolerance": "give a length in metres, say 1e-5",
+    "step": "give a time in seconds",
+    "max_step": "give a time in seconds",
+    "max_steps": "give a number of steps",
+    "newton_fraction": "give a fraction, say 0.03",
+}
+
+
+@dataclass(frozen=True)
+class IntegrationOptions:
+    """How to integrate.
+
+    Attributes
+    ----------
+    tolerance : float
+        Local errors over the whole run may add up to this much, in metres (root mean square over the mass). With a
+        fixed step it only says how exactly Newton's iteration solves.
+    method : str
+        See `paraflex.METHODS`.
+    parameters : mapping of str to float
+        Those of the method that are not to be at their defaults.
+    step : float, optional
+        A fixed step [s]; by default steps are chosen by their errors. Where something given is not smooth steps end,
+        and each stretch between is divided evenly into steps no longer than this.
+    constraints : str, optional
+        What keeps them: "baumgarte", "projection" (of position and velocity after each step) or "ggl" (stabilised
+        index 2, Gear, Gupta and Leimkuhler); the method's own by default.
+    alpha, beta : float
+        Baumgarte coefficients [1/s] (Eq. 57); the paper's range is 0 to 50.
+    automatic_gains : bool
+        Whether coefficients follow the step size instead: violations then decay within some steps, whatever their size.
+    max_step : float
+        Largest step [s].
+    max_steps : int
+        Attempted steps before the run is given up.
+    newton_fraction : float
+        The part of the error allowed in a step that Newton's iteration may leave.
+    """
+
+    tolerance: float = 1e-4
+    alpha: float = 20.0
+    beta: float = 20.0
+    max_step: float = math.inf
+    max_steps: int = 10_000_000
+    newton_fraction: float = 0.03
+    method: str = DEFAULT_METHOD
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    step: float | None = None
+    constraints: str | None = None
+    automatic_gains: bool = False
+
+    def __post_init__(self) -> None:
+        for name, remedy in _REMEDIES.items():
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise InputError("must be positive", field=name, value=value, remedy=remedy)
+        if not math.isfinite(self.tolerance):
+            raise InputError("must be finite", field="tolerance", value=self.tolerance, remedy=_REMEDIES["tolerance"])
+        for name in ("alpha", "beta"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InputError("must not be negative", field=name, value=value, remedy="choose it from 0 to 50 1/s")
+        check_parameters(self.description, self.parameters)
+        self._check_step()
+        self._check_constraints()
+
+    @property
+    def description(self) -> Method:
+        """The method."""
+        return find_method(self.method)
+
+    @property
+    def all_parameters(self) -> dict[str, float]:
+        """Of the method, defaults among them."""
+        return check_parameters(self.description, self.parameters)
+
+    @property
+    def treatment(self) -> Treatment:
+        """What keeps the constraints."""
+        return self.description.treatments[0] if self.constraints is None else Treatment(self.constraints)
+
+    def _check_step(self) -> None:
+        if self.step is not None and not (math.isfinite(self.step) and self.description.fixed_step):
+            remedy = "leave it out, and choose a tolerance" if math.isfinite(self.step) else _REMEDIES["step"]
+            problem = f"{self.method} chooses its steps itself" if math.isfinite(self.step) else "must be finite"
+            raise InputError(problem, field="step", value=self.step, remedy=remedy)
+
+    def _check_constraints(self) -> None:
+        known = [treatment.value for treatment in self.description.treatments]
+        if self.constraints is not None and self.constraints not in known:
+            every = [treatment.value for treatment in Treatment]
+            if self.constraints not in every:
+                raise InputError(
+                    "unknown treatment of constraints", field="constraints", value=self.constraints,
+                    remedy=suggestion(self.constraints, every),
+                )  # fmt: skip
+            raise InputError(
+                f"not with {self.method}", field="constraints", value=self.constraints,
+                remedy=f"choose from {', '.join(known)}, or another method",
+            )  # fmt: skip
+        if self.automatic_gains and self.treatment != Treatment.BAUMGARTE:
+            raise InputError(
+                f"{self.treatment.value} has no coefficients", field="automatic_gains", value=True,
+                remedy="choose constraints = baumgarte",
+            )  # fmt: skip
+
+
+def choose(method: str | None, options: IntegrationOptions | None) -> IntegrationOptions:
+    """The options, by default the default ones, with the method where one is named.
+
+    Raises
+    ------
+    InputError
+        The options are not those of that method.
+    """
+    options = options or IntegrationOptions()
+    return options if method is None else replace(options, method=method)

@@ -1,0 +1,149 @@
+"""What every run is, whoever steps it: the problem, where it stands, what it took. `integrate` needs no more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import State, System
+from paraflex.errors import InputError
+from paraflex.integrators.stretches import jump_times
+from paraflex.kernel.packed import Signals
+from paraflex.kernel.run_state import Samples
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is to be integrated.
+
+    Attributes
+    ----------
+    system : System
+    signals : Signals
+    initial : State
+    times : (k,) array
+        Of the samples [s].
+    stops : (s,) array
+        At which steps end; the last is the end of the run [s].
+    jumps : (j,) array
+        Those of them at which something given jumps: no step may see what follows.
+    """
+
+    system: System
+    signals: Signals
+    initial: State
+    times: Array
+    stops: Array
+    jumps: Array
+
+    @property
+    def span(self) -> float:
+        """From the start to the end [s]."""
+        return float(self.stops[-1] - self.initial.time)
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Where a run stands, between two steps; arrays of its own."""
+
+    t: float
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    work: float
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a run took and left: see `Solution`. Passages (2, p) are from when to when rows were dependent."""
+
+    steps: int
+    rejected: int
+    newton_iterations: int
+    factorisations: int
+    evaluations: int
+    constraint_position_max: float
+    constraint_velocity_max: float
+    energy_balance_max: float
+    passages: Array
+
+
+class Run(Protocol):
+    """A run between calls."""
+
+    @property
+    def problem(self) -> Problem:
+        """What is integrated."""
+        ...
+
+    @property
+    def samples(self) -> Samples:
+        """Filled as far as it has come."""
+        ...
+
+    @property
+    def dependent_rows(self) -> int:
+        """Constraint rows that follow from others at the start."""
+        ...
+
+    def start(self) -> None:
+        """Find accelerations and multipliers, and take the first sample."""
+        ...
+
+    def march(self, attempts: int) -> int:
+        """Attempt so many steps; a code of `kernel.run_state`."""
+        ...
+
+    def now(self) -> Instant:
+        """Where it stands."""
+        ...
+
+    @property
+    def attempts(self) -> int:
+        """Steps attempted."""
+        ...
+
+    @property
+    def reached(self) -> int:
+        """Samples taken."""
+        ...
+
+    def figures(self) -> Figures:
+        """What it took until now."""
+        ...
+
+
+def make_problem(system: System, signals: Signals, initial: State, times: Array, knots: Array | None = None) -> Problem:
+    """A problem, its times checked: see `integrate` for the arguments.
+
+    Raises
+    ------
+    InputError
+        Times that do not ascend from the start.
+    """
+    times = np.ascontiguousarray(times, dtype=float)
+    if times.size == 0 or np.any(np.diff(times) <= 0.0) or times[0] < initial.time or times[-1] <= initial.time:
+        raise InputError("times must ascend from the start", field="times", remedy="give at least one later time")
+    inner = np.array([] if knots is None else knots, dtype=float)
+    inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
+    jumps = jump_times(signals, len(system.mechanism.motors), inner)
+    return Problem(system, signals, initial, times, np.append(inner, times[-1]), jumps)
+
+
+def empty_samples(times: Array, system: System) -> Samples:
+    """Samples to be filled."""
+    k = times.size
+    return Samples(
+        times=times,
+        q=np.full((k, system.n), np.nan),
+        v=np.full((k, system.n), np.nan),
+        a=np.full((k, system.n), np.nan),
+        lam=np.full((k, system.m), np.nan),
+        energy=np.full((k, 3), np.nan),
+    )

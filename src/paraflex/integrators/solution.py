@@ -1,0 +1,66 @@
+"""What a run computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a run computed, at the times asked for and reached.
+
+    Attributes
+    ----------
+    t : (k,) array
+        [s]
+    q, v, a : (k, n) arrays
+        Coordinates and their derivatives; flexible ones modal.
+    multipliers : (k, m) array
+        Constraint forces [N, N m], one a constraint row of the system; where rows depend on one another, of all that
+        give the same motion those with the least sum of squares.
+    kinetic_energy, strain_energy, work : (k,) arrays
+        [J]; work is that of motors, prescribed motion, weight and loads, less what dampers take.
+    status : str
+        "complete", "stopped" (by an event), "interrupted" or "failed".
+    message : str
+        Why it is not complete.
+    steps, rejected, newton_iterations, factorisations : int
+    wall_time : float
+        [s]
+    constraint_position_max, constraint_velocity_max : float
+        Largest |Phi| [m, rad] and |Phi'| at accepted steps.
+    energy_balance_max : float
+        Largest |kinetic + strain energy - start - work| at accepted steps [J].
+    singular_positions : tuple of float
+        Times at which constraints depended on one another for an instant that elsewhere do not [s]. Constraint forces
+        have a pole there: multipliers of samples so near are NaN.
+    method : str
+        The name of the method; empty for another model's.
+    evaluations : int
+        Of the equations of motion.
+    """
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    multipliers: NDArray[np.float64]
+    kinetic_energy: NDArray[np.float64]
+    strain_energy: NDArray[np.float64]
+    work: NDArray[np.float64]
+    status: str
+    message: str
+    steps: int
+    rejected: int
+    newton_iterations: int
+    factorisations: int
+    wall_time: float
+    constraint_position_max: float
+    constraint_velocity_max: float
+    energy_balance_max: float
+    singular_positions: tuple[float, ...] = ()
+    method: str = ""
+    evaluations: int = 0
