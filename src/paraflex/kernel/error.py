@@ -59,7 +59,7 @@ def history_error(h, m):
 
 
 @routine
-def filtered_error(p, g, alpha, beta, memory, m, ws, slow):
+def filtered_error(p, g, rates, memory, m, ws, slow):
     """The estimate in m.eq and m.ev in the mass norm, in position and by what its velocity error does later: metres.
 
     The velocity error is filtered once more, as if by a step as long as `memory`: what is left of it is the part that
@@ -67,9 +67,10 @@ def filtered_error(p, g, alpha, beta, memory, m, ws, slow):
 
     With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
     (M + g D + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
-    for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2.
+    for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2. Where Phi' = 0 is
+    imposed, and no outcome of integration, Phi_q eps_v = 0. `rates` says which: 1 or 0, and alpha and beta.
     """
-    filter_error(p, g, alpha, beta, m.eq, m.ev, ws)
+    filter_error(p, g, rates, m.eq, m.ev, ws)
     for j in range(m.q.size):
         m.eq[j] += g * ws.x[j]
     position = mass_norm(p, ws, m.eq)
@@ -79,13 +80,14 @@ def filtered_error(p, g, alpha, beta, memory, m, ws, slow):
     for j in range(m.q.size):
         m.eq[j] = 0.0
         m.ev[j] = ws.x[j]
-    filter_error(p, memory, alpha, beta, m.eq, m.ev, slow)
+    filter_error(p, memory, rates, m.eq, m.ev, slow)
     return position, memory * mass_norm(p, slow, slow.x)
 
 
 @routine
-def filter_error(p, g, alpha, beta, eq, ev, ws):
+def filter_error(p, g, rates, eq, ev, ws):
     """eps_v of (1 - g J) eps = (e_q, e_v) into ws.x, with the factor in ws made for b = g^2."""
+    of_v, alpha, beta = rates
     scale = 1.0 + 2.0 * alpha * g + beta * beta * g * g
     for j in range(eq.size):
         ws.x[j] = ev[j]
@@ -95,7 +97,7 @@ def filter_error(p, g, alpha, beta, eq, ev, ws):
         body = p.bodies[i]
         to_body_frame(p, i, ws, ws.x)
         to_body_frame(p, i, ws, ws.f)
-        jacobian_times(p, i, ws, ws.x, 1.0 / scale, 0.0, 0.0, ws.mu)
+        jacobian_times(p, i, ws, ws.x, of_v / scale, 0.0, 0.0, ws.mu)
         jacobian_times(p, i, ws, ws.f, -beta * beta * g / scale, -1.0 / g, 0.0, ws.mu)
         mass_times(p, i, ws, ws.mass, ws.x)
         e = body.offset + 3

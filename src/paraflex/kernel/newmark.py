@@ -48,30 +48,52 @@ def shifted(where, h, m):
 
 
 @routine
-def newmark_end(p, signals, numbers, t, h, m, ws):
-    """From the stage to the end of the step: q and v in ws.q and ws.v, the new algorithmic acceleration."""
-    a0, a1, true = m.algorithmic[0], m.algorithmic[1], m.stage_a[1, 1]
-    theta = numbers[THETA]
-    if theta <= 1.0:
-        alpha_m, alpha_f = numbers[ALPHA_M], numbers[ALPHA_F]
-        moved = shifted(alpha_m - alpha_f, h, m)
-        for j in range(m.q.size):
-            a = a0[j] + moved * (m.stage_a[1, 0, j] - m.stage_a[0, 0, j])
-            a1[j] = ((1.0 - alpha_f) * true[j] + alpha_f * m.stage_a[1, 0, j] - alpha_m * a) / (1.0 - alpha_m)
-        return
+def newmark_end(p, signals, numbers, varying, t, h, m, ws):
+    """From the stage to the end of the step: q and v in ws.q and ws.v, the new algorithmic acceleration.
+
+    Where steps vary, and with Wilson's method, velocities and algorithmic accelerations are brought back to their
+    constraints: what a step leaves of Phi' the next one takes back, and if that is shorter, by a larger force.
+    """
+    if numbers[THETA] > 1.0:
+        wilson_end(numbers[THETA], h, m, ws)
+    else:
+        carry(numbers, h, m)
+    if numbers[THETA] > 1.0 or varying:
+        project(p, signals, t + h, ws.q, ws.v, ws)
+        allow_acceleration(p, signals, t + h, m.algorithmic[1], m, ws)
+    if numbers[THETA] > 1.0:
+        copy(m.algorithmic[1], m.stage_a[1, 1])
+
+
+@routine
+def carry(numbers, h, m):
+    """The new algorithmic acceleration from the old one and those of both ends."""
+    a0, a1, start, end = m.algorithmic[0], m.algorithmic[1], m.stage_a[1, 0], m.stage_a[1, 1]
+    alpha_m, alpha_f = numbers[ALPHA_M], numbers[ALPHA_F]
+    moved = shifted(alpha_m - alpha_f, h, m)
     for j in range(m.q.size):
-        a1[j] = a0[j] + (true[j] - a0[j]) / theta
+        a = a0[j] + moved * (start[j] - m.stage_a[0, 0, j])
+        a1[j] = ((1.0 - alpha_f) * end[j] + alpha_f * start[j] - alpha_m * a) / (1.0 - alpha_m)
+
+
+@routine
+def wilson_end(theta, h, m, ws):
+    """From what was found at t + theta h to t + h, acceleration and multipliers being linear in time."""
+    a0, a1, found = m.algorithmic[0], m.algorithmic[1], m.stage_a[1, 1]
+    for j in range(m.q.size):
+        a1[j] = a0[j] + (found[j] - a0[j]) / theta
         ws.q[j] = m.q[j] + h * m.v[j] + h * h / 6.0 * (2.0 * a0[j] + a1[j])
         ws.v[j] = m.v[j] + 0.5 * h * (a0[j] + a1[j])
-    # Multipliers were found at t + theta h.
     for r in range(m.stage_lam.shape[1]):
         m.stage_lam[1, r] = m.stage_lam[0, r] + (m.stage_lam[1, r] - m.stage_lam[0, r]) / theta
-    project(p, signals, t + h, ws.q, ws.v, ws)
-    # Accelerations that the constraints allow: the nearest to a_1.
-    equations(p, signals, t + h, INDEX_1, ws.q, ws.v, a1, m.stage_lam[1], m.torques, ws)
+
+
+@routine
+def allow_acceleration(p, signals, t, a, m, ws):
+    """Change an acceleration to the nearest one that the constraints allow at ws.q and ws.v."""
+    equations(p, signals, t, INDEX_1, ws.q, ws.v, a, m.stage_lam[1], m.torques, ws)
     for r in range(ws.rows.size):
         if p.rows[r].kind != CONSTRAINT:
             ws.rows[r] = 0.0
     least_change(p, ws.rows, ws)
-    add(ws.x, a1)
-    copy(a1, true)
+    add(ws.x, a)

@@ -18,9 +18,9 @@ from paraflex.kernel.error import embedded_error, filtered_error, history_error
 from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
 from paraflex.kernel.linear import factor_bodies, orient
 from paraflex.kernel.newmark import newmark_end, newmark_start
+from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
     AGE,
-    BAUMGARTE,
     FACTOR_B,
     FACTORS,
     GGL,
@@ -30,6 +30,7 @@ from paraflex.kernel.run_state import (
     PASSAGES,
     PAUSED,
     POSITION,
+    PROJECTION,
     RATE,
 )
 from paraflex.kernel.signals import evaluate_signal
@@ -124,17 +125,17 @@ def stage_start(tableau, i, t, h, m):
 
 @routine
 def constraint_weights(controls, h):
-    """Weights of Phi'', Phi' and Phi in the stage equations, and Baumgarte's alpha and beta."""
+    """Weights of Phi'', Phi' and Phi in the stage equations, and the `rates` of `filtered_error`."""
     if controls.treatment == POSITION:
-        return (0.0, 0.0, 1.0), 0.0, 0.0
+        return (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     if controls.treatment == GGL:
-        return (0.0, 1.0, 0.0), 0.0, 0.0
+        return (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)
     alpha, beta = controls.alpha, controls.beta
     if controls.gain > 0.0:
         alpha = beta = controls.gain / h
-    if controls.treatment != BAUMGARTE:
-        alpha = beta = 0.0
-    return (1.0, 2.0 * alpha, beta * beta), alpha, beta
+    if controls.treatment == PROJECTION:
+        return INDEX_1, (0.0, 0.0, 0.0)
+    return (1.0, 2.0 * alpha, beta * beta), (1.0, alpha, beta)
 
 
 @routine
@@ -147,7 +148,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
         cause is PAUSED where the stages were solved.
     """
     stages, one_stage = tableau.c.size, tableau.newmark.size > 0
-    weights, alpha, beta = constraint_weights(controls, h)
+    weights, rates = constraint_weights(controls, h)
     x, g, b = t, tableau.A[1, 1] * h, (tableau.A[1, 1] * h) ** 2
     if one_stage:
         x, g, b = newmark_start(tableau.newmark, t, h, m)
@@ -184,7 +185,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
             continue
         slowest = max(slowest, iterations)
         if one_stage:
-            newmark_end(p, signals, tableau.newmark, t, h, m, ws)
+            newmark_end(p, signals, tableau.newmark, controls.fixed_step == 0.0, t, h, m, ws)
         copy(ws.q, m.stage_q[i])
         copy(ws.v, m.stage_v[i])
         if m.shift.size > 0:
@@ -200,7 +201,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
             embedded_error(tableau, h, m)
         else:
             history_error(h, m)
-        error_q, error_v = filtered_error(p, b**0.5, alpha, beta, controls.memory, m, ws, slow)
+        error_q, error_v = filtered_error(p, b**0.5, rates, controls.memory, m, ws, slow)
         error = max(error_q, error_v) / (controls.rate * h)
     if not isfinite(error):
         return NOT_FINITE, 0.0
