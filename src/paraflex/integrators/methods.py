@@ -63,6 +63,9 @@ class Method:
         Whether it takes a step from the user; whether it chooses steps by its errors.
     explicit : bool
         Whether stiffness limits its steps.
+    newton_fraction : float
+        The part of the error allowed in a step that Newton's iteration may leave by default. An estimate of high order
+        takes for error what Newton leaves in its stages: a smaller part means fewer steps.
     source : str
     """
 
@@ -76,6 +79,7 @@ class Method:
     fixed_step: bool = False
     error_control: bool = True
     explicit: bool = False
+    newton_fraction: float = 0.03
     source: str = ""
 
 
@@ -85,7 +89,10 @@ _INDEX_1, _ODE_FORM, _INDEX_3 = "index 1 (Eqs. 56-57)", "ODE (Eqs. 59-60)", "ind
 
 
 def _esdirk(name: str, title: str, order: int, source: str) -> Method:
-    return Method(name, title, Family.ESDIRK, _INDEX_1, order, _NATIVE, fixed_step=True, source=source)
+    newton = 0.03 if order == 2 else 0.01
+    return Method(
+        name, title, Family.ESDIRK, _INDEX_1, order, _NATIVE, fixed_step=True, newton_fraction=newton, source=source
+    )
 
 
 def _newmark(name: str, title: str, order: int, source: str, treatment: Treatment, **parameters: Parameter) -> Method:

@@ -159,7 +159,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     workspace = system.workspace()
     controls = Controls(
         rate=options.tolerance / span,
-        newton_fraction=options.newton_fraction,
+        newton_fraction=options.newton_fraction or options.description.newton_fraction,
         newton_memory=_NEWTON_MEMORY * span,
         memory=_MEMORY * span,
         alpha=options.alpha,

@@ -45,8 +45,8 @@ class IntegrationOptions:
         Largest step [s].
     max_steps : int
         Attempted steps before the run is given up.
-    newton_fraction : float
-        The part of the error allowed in a step that Newton's iteration may leave.
+    newton_fraction : float, optional
+        The part of the error allowed in a step that Newton's iteration may leave; the method's own by default.
     """
 
     tolerance: float = 1e-4
@@ -54,7 +54,7 @@ class IntegrationOptions:
     beta: float = 20.0
     max_step: float = math.inf
     max_steps: int = 10_000_000
-    newton_fraction: float = 0.03
+    newton_fraction: float | None = None
     method: str = DEFAULT_METHOD
     parameters: Mapping[str, float] = field(default_factory=dict)
     step: float | None = None

@@ -10,6 +10,7 @@ from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import factor_bodies, orient, right_hand_side, solve_system
+from paraflex.kernel.newmark import restart_algorithmic
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.projection import project
 from paraflex.kernel.run_state import (
@@ -244,6 +245,8 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
         if m.counts[FAILURES] == 1:
             # The first stage is the last step's last, with the error its longer step could bear: not so a shorter one.
             first_stage(p, signals, t, controls, m, ws)
+            if tableau.newmark.size > 0:
+                restart_algorithmic(tableau.newmark, m)
         m.counts[FAILURES] += 1
         if cause == PAUSED:
             cause = ERROR_TEST

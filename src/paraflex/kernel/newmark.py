@@ -48,6 +48,15 @@ def shifted(where, h, m):
 
 
 @routine
+def restart_algorithmic(numbers, m):
+    """The algorithmic acceleration anew, from true ones: after steps cut short the carried one serves no more."""
+    where = numbers[ALPHA_M] - numbers[ALPHA_F] if m.clock[LAST_STEP] > 0.0 else 0.0
+    for j in range(m.q.size):
+        a = m.stage_a[1, 0, j]
+        m.algorithmic[0, j] = a + where * (a - m.stage_a[0, 0, j])
+
+
+@routine
 def newmark_end(p, signals, numbers, varying, t, h, m, ws):
     """From the stage to the end of the step: q and v in ws.q and ws.v, the new algorithmic acceleration.
 

@@ -40,6 +40,8 @@ from paraflex.kernel.stage import CONVERGED, WORST_RATE, solve_stage
 ENOUGH_ITERATIONS, SERVED = 2, 5
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
+# Of a constraint's value where places are metres apart [m].
+ROUNDING = 1e-15
 
 
 @routine
@@ -156,14 +158,22 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     if fresh:
         renew_factor(p, b, m, ws)
     note_friction(p, m.q, m.v, ws.mu, ws.compliance)
+    # Turned to where bodies are halfway, the matrix serves all stages best.
+    for j in range(m.q.size):
+        m.qs[j] = m.q[j] + 0.5 * h * (m.v[j] + 0.25 * h * m.stage_a[1, 0, j])
     # Rows that depend on others here keep their multipliers: so a singular position is passed.
-    if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
+    if orient(p, m.qs, ws, controls.dependent_part) > controls.dependent_rows:
         note_passage(t, h, m)
     tolerance = controls.newton_fraction * controls.rate * h
+    if controls.treatment == POSITION:
+        # Positions have no more digits: divided by b, that is what accelerations can be told to.
+        tolerance = max(tolerance, ROUNDING * (1.0 + controls.newton_memory * g / b))
     slowest = 0
     i = 1
     while i < stages:
-        if not one_stage:
+        if one_stage:
+            x, g, b = newmark_start(tableau.newmark, t, h, m)
+        else:
             x, g, b = stage_start(tableau, i, t, h, m)
         m.stage_t[1, i] = t + tableau.c[i] * h
         predict(i, x, h, m)
