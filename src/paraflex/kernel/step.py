@@ -158,11 +158,8 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     if fresh:
         renew_factor(p, b, m, ws)
     note_friction(p, m.q, m.v, ws.mu, ws.compliance)
-    # Turned to where bodies are halfway, the matrix serves all stages best.
-    for j in range(m.q.size):
-        m.qs[j] = m.q[j] + 0.5 * h * (m.v[j] + 0.25 * h * m.stage_a[1, 0, j])
     # Rows that depend on others here keep their multipliers: so a singular position is passed.
-    if orient(p, m.qs, ws, controls.dependent_part) > controls.dependent_rows:
+    if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
         note_passage(t, h, m)
     tolerance = controls.newton_fraction * controls.rate * h
     if controls.treatment == POSITION:
