@@ -1,5 +1,6 @@
 """Time integration: methods by name, our own schemes as tableaux and parameters, SciPy's and SUNDIALS' as guests."""
 
+from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, SingularDistance, check_events
 from paraflex.integrators.integrate import integrate
 from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method
 from paraflex.integrators.options import IntegrationOptions, choose
@@ -11,9 +12,14 @@ __all__ = [
     "DEFAULT_METHOD",
     "METHODS",
     "TR_BDF2",
+    "DeflectionLimit",
+    "Event",
     "IntegrationOptions",
+    "JointLimit",
     "Method",
+    "SingularDistance",
     "Solution",
+    "check_events",
     "choose",
     "integrate",
     "make_problem",

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from paraflex.errors import InputError, suggestion
+from paraflex.integrators.events import Event
 from paraflex.integrators.methods import DEFAULT_METHOD, Method, Treatment, check_parameters, find_method
 
 _REMEDIES = {
@@ -47,6 +48,9 @@ class IntegrationOptions:
         Attempted steps before the run is given up.
     newton_fraction : float
         The part of the error allowed in a step that Newton's iteration may leave.
+    events : tuple of JointLimit, DeflectionLimit or SingularDistance
+        The run stops at the first of them. An excursion across a limit and back within a quarter of a step is
+        overlooked: where limits are grazed bound the step.
     """
 
     tolerance: float = 1e-4
@@ -60,6 +64,7 @@ class IntegrationOptions:
     step: float | None = None
     constraints: str | None = None
     automatic_gains: bool = False
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         for name, remedy in _REMEDIES.items():

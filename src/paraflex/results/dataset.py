@@ -48,6 +48,8 @@ UNITS = {
     "constraint_position_max": ("largest constraint violation in position", "m"),
     "constraint_velocity_max": ("largest constraint violation in velocity", "m/s"),
     "energy_balance_max": ("largest imbalance of energy and work", "J"),
+    "event": ("event that stopped the run", "1"),
+    "event_time": ("when it was stopped", "s"),
 }
 
 
