@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT
+from paraflex.mechanism import AxisJoint
 
 Array = NDArray[np.float64]
 
@@ -76,16 +76,29 @@ class SingularityMeasure:
 
     def _rows(self, q: Array) -> Array:
         jacobian = self.system.jacobian(q)[self._constraints]
-        held = [joint_coordinate(self.system, joint, q[None]).rows for joint in self._joints]
-        return np.vstack([jacobian, *held])
+        if not self.motors:
+            return jacobian
+        axes = [joint_coordinate(self.system, joint, q[None]).rows for joint in self._sliding]
+        return np.vstack([jacobian, self._turning, *axes])
 
     @cached_property
     def _constraints(self) -> NDArray[np.bool_]:
         return self.system.packed.rows["kind"] == CONSTRAINT
 
     @cached_property
-    def _joints(self) -> Sequence[str]:
-        return [motor.joint for motor in self.system.mechanism.motors if motor.name in self.motors]
+    def _turning(self) -> Array:
+        """Rows of joints that turn, which do not depend on the pose."""
+        rows = [joint_coordinate(self.system, joint, self.start[None]).rows for joint in self._joints(slides=False)]
+        return np.vstack(rows) if rows else np.zeros((0, self.system.n))
+
+    @cached_property
+    def _sliding(self) -> list[str]:
+        return self._joints(slides=True)
+
+    def _joints(self, *, slides: bool) -> list[str]:
+        mechanism = self.system.mechanism
+        joints = [motor.joint for motor in mechanism.motors if motor.name in self.motors]
+        return [joint for joint in joints if isinstance(mechanism.joint(joint), AxisJoint) is slides]
 
     @cached_property
     def _bodies(self) -> _Bodies:
