@@ -2,7 +2,7 @@
 
 from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, SingularDistance, check_events
 from paraflex.integrators.integrate import integrate
-from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method
+from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method, Treatment, find_method
 from paraflex.integrators.options import IntegrationOptions, choose
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.solution import Solution
@@ -19,8 +19,10 @@ __all__ = [
     "Method",
     "SingularDistance",
     "Solution",
+    "Treatment",
     "check_events",
     "choose",
+    "find_method",
     "integrate",
     "make_problem",
 ]

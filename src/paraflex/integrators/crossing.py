@@ -108,11 +108,15 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     problem, x = run.problem, crossing.fraction
     taken = run.samples.times[: run.reached]
     kept = slice(0, int(np.searchsorted(taken, crossing.t)))
-    first, middle, last = (_settled(problem, *_state(crossing, part)) for part in (0.0, 0.5 * x, x))
+    before = crossing.before
+    first = _settled(problem, before.t, before.q, before.v)
+    # Where something given jumps accelerations do: the step began with those after the jump.
+    before = replace(before, a=first.samples.a[0])
+    middle, last = (_settled(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
     # Simpson's rule: powers that jump do so at the ends of steps.
     powers = [one.state.power[0] for one in (first, middle, last)]
-    width = crossing.t - crossing.before.t
-    work = crossing.before.work + width / 6.0 * (powers[0] + 4.0 * powers[1] + powers[2])
+    width = crossing.t - before.t
+    work = before.work + width / 6.0 * (powers[0] + 4.0 * powers[1] + powers[2])
     packed = problem.system.packed
     points, end = make_point_scratch(packed), last.samples
     work += weight_work(packed, end.q[0], points) - weight_work(packed, problem.initial.q, points)
@@ -128,10 +132,9 @@ def _settled(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun
     return begun
 
 
-def _state(crossing: Crossing, x: float) -> tuple[float, Array, Array]:
+def _state(before: Instant, after: Instant, x: float) -> tuple[float, Array, Array]:
     """Time, positions and velocities at a fraction of a step: cubics."""
-    before, after = crossing.before, crossing.after
-    h, y = after.t - before.t, 1.0 - x
+    h = after.t - before.t
     v = _cubic(before.v, before.a, after.v, after.a, h, x)
     return before.t + x * h, _cubic(before.q, before.v, after.q, after.v, h, x), v
 

@@ -27,7 +27,7 @@ class JointLimit:
     high: float = math.inf
 
     def __post_init__(self) -> None:
-        if not self.low < self.high or math.isinf(self.low) and math.isinf(self.high):
+        if not self.low < self.high or (math.isinf(self.low) and math.isinf(self.high)):
             raise InputError(
                 "no limits that a joint can be between", field=f"limit of joint {self.joint}",
                 value=(self.low, self.high), remedy="give a lower limit, a higher upper one, or one of them",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -95,6 +96,16 @@ class IntegrationOptions:
     def treatment(self) -> Treatment:
         """What keeps the constraints."""
         return self.description.treatments[0] if self.constraints is None else Treatment(self.constraints)
+
+    def told(self) -> dict[str, str]:
+        """Method, parameters, treatment of constraints, step and events in words, for provenance."""
+        return {
+            "integration_method": self.method,
+            "method_parameters": json.dumps(self.all_parameters),
+            "constraints_treatment": self.treatment.value,
+            "steps": "chosen by their errors" if self.step is None else f"fixed, {self.step:g} s",
+            "stop_at": ", ".join(str(event) for event in self.events),
+        }
 
     def _check_step(self) -> None:
         if self.step is not None and not (math.isfinite(self.step) and self.description.fixed_step):

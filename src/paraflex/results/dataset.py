@@ -163,6 +163,8 @@ def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]
 
 
 def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> dict:
+    # Other models and engines integrate in ways of their own.
+    ours = options.told() if one.method == options.description.title else {}
     return {
         "mechanism": one.task.mechanism.name,
         "motion_end": one.task.path.duration,
@@ -170,6 +172,7 @@ def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> d
         "baumgarte_alpha": options.alpha,
         "baumgarte_beta": options.beta,
         "method": one.method,
+        **ours,
         "parameters": json.dumps(parameters, sort_keys=True),
         "paraflex_version": version("paraflex"),
         "numba_version": version("numba"),

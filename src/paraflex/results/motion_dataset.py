@@ -96,6 +96,7 @@ def motion_dataset(
         "kind": "motion",
         "tolerance": options.tolerance,
         "method": METHODS[solution.method].title,
+        **options.told(),
         "singular_positions": json.dumps(solution.singular_positions),
         "parameters": json.dumps(parameters or {}, sort_keys=True),
         "paraflex_version": version("paraflex"),
