@@ -1,6 +1,10 @@
 """Events that end a run: where closed forms say, for every kind of joint, in both geometries, with dependent rows."""
 
+import io
+import re
+from contextlib import redirect_stdout
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -385,3 +389,14 @@ def test_a_study_tells_which_modes_were_stopped():
     assert figures["+-+-"]["event"] == "joint A1"
     assert figures["+-+-"]["event_time"] == ended.solution.event_time
     assert "event" not in figures["++++"]
+
+
+def test_the_page_on_events_prints_what_it_says():
+    page = (Path(__file__).parents[1] / "docs" / "events.md").read_text(encoding="utf-8")
+    code, says = re.search(r"```python\n(.*?)```\n\nprints `([^`]*)`", page, re.DOTALL).groups()
+    out = io.StringIO()
+    with redirect_stdout(out):
+        exec(compile(code, "events.md", "exec"), {})
+    (found, time), (expected, when) = (text.removesuffix(" s").split("t = ") for text in (out.getvalue().strip(), says))
+    assert found == expected
+    assert float(time) == pytest.approx(float(when), rel=1e-4)

@@ -59,7 +59,7 @@ class SingularityMeasure:
             return columns if values.size == columns else 0
         return int(np.sum(values > _DEPENDENT))
 
-    def _values(self, q: Array) -> Array:
+    def _values(self, q: Array) -> NDArray:
         rows = self._scaled(q)
         return np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
 

@@ -157,4 +157,4 @@ def _root(gauge: Gauge, before: Instant, after: Instant, first: float, last: flo
     def inside(x: float) -> float:
         return float(gauge.inside(_poses(before, after, x))[0])
 
-    return float(scipy.optimize.brentq(inside, first, last, xtol=_FOUND, rtol=1e-15))
+    return float(scipy.optimize.root_scalar(inside, bracket=(first, last), method="brentq", xtol=_FOUND).root)
