@@ -3,7 +3,7 @@
 import io
 import re
 from contextlib import redirect_stdout
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,10 @@ from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import load
 from paraflex.integrators import DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance, integrate
-from paraflex.integrators.gauges import deflection_rows
+from paraflex.integrators.crossing import advance
+from paraflex.integrators.gauges import deflection_rows, make_gauges
+from paraflex.integrators.run import Instant
+from paraflex.kernel.run_state import PAUSED
 from paraflex.mechanism import (
     Assembly,
     ConstantSpeed,
@@ -103,13 +106,40 @@ def test_the_first_of_several_events_ends_the_run():
     assert stopped(let_go(), 2.0, *events).q[-1, 2] == pytest.approx(-np.pi / 2 + 1.5, abs=1e-12)
 
 
-def test_a_limit_that_is_only_touched_within_a_step_is_found():
-    """The pendulum turns at -2; a long step goes across the limit just before that and comes back."""
-    limit = JointLimit("pin", low=-np.pi / 2 - 2.0 + 1e-3)
-    solution = stopped(let_go(), 3.0, limit, tolerance=1e-4)
-    assert solution.event
-    turn = 2.0 * scipy.special.ellipk(np.sin(1.0) ** 2) / PACE
-    assert solution.t[-1] == pytest.approx(turn - np.sqrt(2e-3 / (PACE**2 * np.sin(2.0))), abs=2e-3)
+@dataclass
+class Thrown:
+    """A run in steps of one second along the angle (t - 5 - shift)^2, an arm that turns round within a step."""
+
+    shift: float
+    t: float = 0.0
+
+    def now(self):
+        x = self.t - 5.0 - self.shift
+        q, v, a = np.zeros((3, 3))
+        q[2], v[2], a[2] = x**2, 2.0 * x, 2.0
+        return Instant(self.t, q, v, a, np.zeros(2), 0.0)
+
+    def march(self, attempts):
+        self.t += attempts
+        return PAUSED
+
+
+@pytest.mark.parametrize("shift", np.linspace(0.0, 0.9, 10))
+def test_a_limit_is_found_that_is_crossed_and_left_within_a_step(shift):
+    system = build_system(pendulum())
+    gauges = make_gauges(system, np.array([0.0, 0.0, 1.0]), [JointLimit("pin", low=0.02)])
+    _, crossing = advance(Thrown(shift), gauges, 10)
+    assert crossing is not None
+    assert crossing.t == pytest.approx(5.0 + shift - np.sqrt(0.02), abs=1e-12)
+    _, crossing = advance(Thrown(shift), make_gauges(system, np.ones(3), [JointLimit("pin", low=-1e-9)]), 10)
+    assert crossing is None
+
+
+def test_work_at_an_event_is_that_of_the_motor():
+    mechanism = pendulum(motors=(Motor("drive", "pin"),))
+    options = IntegrationOptions(tolerance=1e-6, events=(JointLimit("pin", high=0.7),))
+    solution = simulate_motion(mechanism, 1.0, samples=11, torques={"drive": 2.0}, options=options).solution
+    assert solution.work[-1] == pytest.approx(2.0 * 0.2, rel=1e-6)
 
 
 def slider(**changes):
