@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from paraflex import plots
     from paraflex.errors import InputError, NumericalError, ParaflexError
     from paraflex.files import Model, library_names, load, load_path
-    from paraflex.integrators import METHODS, IntegrationOptions
+    from paraflex.integrators import METHODS, DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
     from paraflex.mechanism import Mechanism, chain_of_segments, four_bars_in_a_row, raparm_i
     from paraflex.results import load_results, save_results, summary, tracking_dataset
@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Circle": "kinematics",
+    "DeflectionLimit": "integrators",
     "InputError": "errors",
     "IntegrationOptions": "integrators",
+    "JointLimit": "integrators",
     "Line": "kinematics",
     "METHODS": "integrators",
     "Mechanism": "mechanism",
@@ -31,6 +33,7 @@ _HOME = {
     "ParaflexError": "errors",
     "PointPath": "kinematics",
     "Polygon": "kinematics",
+    "SingularDistance": "integrators",
     "chain_of_segments": "mechanism",
     "four_bars_in_a_row": "mechanism",
     "library_names": "files",
@@ -48,8 +51,10 @@ _HOME = {
 __all__ = [
     "METHODS",
     "Circle",
+    "DeflectionLimit",
     "InputError",
     "IntegrationOptions",
+    "JointLimit",
     "Line",
     "Mechanism",
     "Model",
@@ -57,6 +62,7 @@ __all__ = [
     "ParaflexError",
     "PointPath",
     "Polygon",
+    "SingularDistance",
     "chain_of_segments",
     "four_bars_in_a_row",
     "library_names",

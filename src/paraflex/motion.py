@@ -22,7 +22,7 @@ class MotionRun:
     ----------
     system : System
     times : (k,) array
-        At which results are kept [s].
+        At which results are kept [s]; where an event ends the run, those until then and its own.
     torques : mapping of str to float
         Of each motor, constant [N m].
     solution : Solution
@@ -100,4 +100,4 @@ def simulate_motion(
     except IntegrationError as error:
         error.partial = MotionRun(system, times, values, error.partial)
         raise
-    return MotionRun(system, times, values, solution)
+    return MotionRun(system, solution.t if solution.event else times, values, solution)

@@ -31,6 +31,9 @@ MechanismOption = Annotated[
 ]
 DurationOption = Annotated[float | None, typer.Option(metavar="S", help="Duration, dwell included.")]
 SamplesOption = Annotated[int | None, typer.Option(metavar="N", help="Samples kept.")]
+MethodOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Method of integration: paraflex methods lists them.")
+]
 AssemblyOption = Annotated[str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")]
 Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
 
@@ -70,6 +73,28 @@ def run(
     alpha: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient alpha.")] = None,
     beta: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient beta.")] = None,
     max_steps: Annotated[int | None, typer.Option(metavar="N", help="Steps before a run is given up.")] = None,
+    method: MethodOption = None,
+    method_parameter: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="A parameter of the method; repeatable.")
+    ] = None,
+    step: Annotated[
+        float | None, typer.Option(metavar="S", help="A fixed step. Default: steps are chosen by their errors.")
+    ] = None,
+    constraints: Annotated[
+        str | None,
+        typer.Option(metavar="baumgarte|projection|ggl", help="What keeps the constraints. Default: the method's."),
+    ] = None,
+    automatic_gains: Annotated[
+        bool, typer.Option("--automatic-gains", help="Baumgarte coefficients that follow the step.")
+    ] = False,
+    stop_at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="EVENT",
+            help="Where the run ends: joint:NAME=LOW..HIGH, deflection:BODY=METRES, singular=DISTANCE, "
+            "singular:MOTOR,...=DISTANCE; repeatable.",
+        ),
+    ] = None,
     rigid: Annotated[bool, typer.Option("--rigid", help="Take all bodies as rigid.")] = False,
     geometry: Annotated[
         str | None, typer.Option(metavar="linear|second-order", help="Shape of the beams. Default: the model's.")
@@ -91,21 +116,31 @@ def run(
 
     Writes summary.json, results.nc and figures/.
     """
+    from paraflex.cli.integration import IntegrationRequest
     from paraflex.cli.run import RunRequest, run_command
 
+    integration = IntegrationRequest(
+        tolerance=tol,
+        alpha=alpha,
+        beta=beta,
+        max_steps=max_steps,
+        method=method,
+        parameters=method_parameter or [],
+        step=step,
+        constraints=constraints,
+        automatic_gains=automatic_gains,
+        stop_at=stop_at or [],
+    )
     request = RunRequest(
         mechanism=mechanism,
         path=path,
         modes=mode or [],
-        tolerance=tol,
         duration=duration,
         samples=samples,
         assembly=assembly,
         out=out,
         json=json,
-        alpha=alpha,
-        beta=beta,
-        max_steps=max_steps,
+        integration=integration,
         rigid=rigid,
         geometry=geometry,
         segments=segments,
@@ -134,6 +169,7 @@ def verify(
         ),
     ] = None,
     tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance of runs with error control.")] = None,
+    method: MethodOption = None,
     segments: Annotated[int | None, typer.Option(metavar="N", help="Finite segments on the longest beam.")] = None,
     duration: DurationOption = None,
     samples: SamplesOption = None,
@@ -157,6 +193,7 @@ def verify(
         engines=engine or [],
         fidelities=model or [],
         segments=segments,
+        method=method,
     )
     raise typer.Exit(verify_command(request))
 
@@ -167,6 +204,14 @@ def modes(source: Source = "raparm_i", path: PathOption = None, json: Json = Fal
     from paraflex.cli.modes import modes_command
 
     modes_command(source, path, json)
+
+
+@app.command()
+def methods(json: Json = False) -> None:
+    """List the methods of integration, what each takes and what keeps the constraints."""
+    from paraflex.cli.methods import methods_command
+
+    methods_command(json)
 
 
 @app.command()

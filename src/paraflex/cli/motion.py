@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, StudyRequest, at_fault, results_folder, write_json
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import FINISHED, plain_console
 from paraflex.compilation import compile_kernels
 from paraflex.dynamics import State, build_system, consistent_state, start_state, static_equilibrium
 from paraflex.errors import AssemblyError, InputError, IntegrationError
@@ -28,9 +29,14 @@ _POINTS = 20
 
 
 def run_motion(
-    request: StudyRequest, model: Model, mechanism: Mechanism, options: IntegrationOptions, console: Console
+    request: StudyRequest,
+    model: Model,
+    mechanism: Mechanism,
+    options: IntegrationOptions,
+    console: Console,
+    how: dict[str, Any],
 ) -> int:
-    """Run a mechanism's own motion and write its results; the exit code."""
+    """Run a mechanism's own motion and write its results, how it was integrated among them; the exit code."""
     duration = model.study.duration if request.duration is None else request.duration
     if duration is None:
         raise InputError(
@@ -49,7 +55,7 @@ def run_motion(
     run = _simulate(console, model, mechanism, duration, samples, request, options)
     parameters = {
         "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "duration": duration, "samples": samples, "tolerance": options.tolerance},
+        "run": {"mechanism": model.source, "duration": duration, "samples": samples} | how,
     }
     data = motion_dataset(run, options=options, parameters=parameters)
     figures = motion_summary(data)
@@ -59,9 +65,11 @@ def run_motion(
     else:
         _report(figures, data)
         console.print(f"{time.perf_counter() - began:.1f} s; results and figures in {folder}")
-    if run.solution.status != "complete":
+    if run.solution.status not in FINISHED:
         console.print(f"error: {run.solution.message}", soft_wrap=True)
-    return {"complete": COMPLETE, "interrupted": INTERRUPTED}.get(run.solution.status, TROUBLE)
+    if run.solution.status in FINISHED:
+        return COMPLETE
+    return INTERRUPTED if run.solution.status == "interrupted" else TROUBLE
 
 
 def _simulate(
@@ -131,6 +139,8 @@ def _report(figures: dict, data: xr.Dataset) -> None:
     out = plain_console()
     final = figures["final"]
     out.print(f"{figures['mechanism']}: {figures['status']} at t = {final['time']:g} s, {figures['steps']} steps")
+    if figures["event"]:
+        out.print(figures["message"], soft_wrap=True)
     # Points that segments made by the program hang together at are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
     for point, position in list(places.items())[:_POINTS]:

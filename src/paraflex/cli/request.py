@@ -23,7 +23,6 @@ class StudyRequest:
     mechanism: str
     path: str | None
     modes: list[str]
-    tolerance: float | None
     duration: float | None
     samples: int | None
     assembly: str | None
@@ -87,7 +86,7 @@ def plan_study(
 
 def at_fault(error: InputError, model: Model) -> InputError:
     """The same error, naming the option it came from or else the model's file."""
-    flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly"}
+    flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly", "events": "--stop-at"}
     if error.field in flags:
         return InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy)
     return error.in_file(model.source)

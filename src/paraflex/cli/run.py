@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from paraflex.cli.integration import IntegrationRequest, check_stops, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
     TROUBLE,
     StudyRequest,
+    at_fault,
     find_modes,
     find_path,
     plan_study,
     results_folder,
     write_json,
 )
-from paraflex.cli.tables import failures, plain_console, study_table
+from paraflex.cli.tables import events, failures, plain_console, study_table
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -38,9 +40,7 @@ from paraflex.studies import Simulator, StudyResult, run_study
 class RunRequest(StudyRequest):
     """What `paraflex run` was asked for."""
 
-    alpha: float | None = None
-    beta: float | None = None
-    max_steps: int | None = None
+    integration: IntegrationRequest = field(default_factory=IntegrationRequest)
     rigid: bool = False
     geometry: str | None = None
     segments: int | None = None
@@ -51,23 +51,32 @@ def run_command(request: RunRequest) -> int:
     """Run a study and write its results; the exit code."""
     console = plain_console(stderr=True)
     model = load(request.mechanism)
-    options = integration_options(request)
     _check_fidelity(request)
+    options = integration_options(request.integration, model.study)
+    how = {} if request.ked else integration_parameters(options, request.integration)
     if not model.paths and request.path is None:
-        return run_motion(request, model, _without_path(model, request), options, console)
+        mechanism = _without_path(model, request)
+        check_stops(mechanism, options, request.integration)
+        return run_motion(request, model, mechanism, options, console, how)
     path, path_name = find_path(model, request.path)
     modes = find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     folder = results_folder(request.out)
     mechanism = asked_mechanism(model, request)
+    if request.segments is None:
+        check_stops(mechanism, options, request.integration)
     stiff = request.rigid or request.ked or request.segments is not None
     compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
     began = time.perf_counter()
     task = plan_study(model, mechanism, path, path_name, request)
     if request.segments is not None:
         task = task.in_segments(proportional_segments(mechanism, request.segments))
-    parameters = _parameters(model, path_name, modes, task, options, request)
-    result = _simulate(console, task, modes, options, parameters, _method(request, options))
+        check_stops(task.mechanism, options, request.integration)
+    parameters = _parameters(model, path_name, modes, task, how, request)
+    try:
+        result = _simulate(console, task, modes, options, parameters, _method(request, options))
+    except InputError as error:
+        raise at_fault(error, model) from None
     if result.data is None:
         failures(console, result)
         return INTERRUPTED if result.interrupted else TROUBLE
@@ -77,26 +86,12 @@ def run_command(request: RunRequest) -> int:
         print(json.dumps(figures, indent=2))
     else:
         plain_console().print(study_table(figures, task, _model_name(request, mechanism)))
+        events(plain_console(), figures)
         console.print(f"{time.perf_counter() - began:.1f} s; results and figures in {folder}")
     failures(console, result)
     if result.interrupted:
         return INTERRUPTED
     return COMPLETE if result.complete else TROUBLE
-
-
-def integration_options(request: RunRequest) -> IntegrationOptions:
-    """The options of the command line; errors name the flag."""
-    given = {
-        "tolerance": request.tolerance,
-        "alpha": request.alpha,
-        "beta": request.beta,
-        "max_steps": request.max_steps,
-    }
-    flags = {"tolerance": "--tol", "alpha": "--alpha", "beta": "--beta", "max_steps": "--max-steps"}
-    try:
-        return IntegrationOptions(**{key: value for key, value in given.items() if value is not None})
-    except InputError as error:
-        raise InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy) from None
 
 
 def _method(request: RunRequest, options: IntegrationOptions) -> Simulator | None:
@@ -139,9 +134,9 @@ def _check_fidelity(request: RunRequest) -> None:
         raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
-    given = {"--tol": request.tolerance, "--max-steps": request.max_steps, "--balanced": request.balanced or None}
+    given = request.integration.given() | ({"--balanced": True} if request.balanced else {})
     for flag, value in given.items():
-        if request.ked and value is not None:
+        if request.ked:
             raise InputError(
                 "means nothing with --ked", field=flag, value=value, remedy="its steps are fixed, its start undeformed"
             )
@@ -171,7 +166,7 @@ def _parameters(
     path: str,
     modes: list[ActuationMode],
     task: TrackingTask,
-    options: IntegrationOptions,
+    how: dict,
     request: RunRequest,
 ) -> dict:
     return {
@@ -182,15 +177,13 @@ def _parameters(
             "modes": [mode.name for mode in modes],
             "duration": float(task.motion.t[-1]),
             "samples": int(task.motion.t.size),
-            "tolerance": options.tolerance,
-            "alpha": options.alpha,
-            "beta": options.beta,
             "rigid": request.rigid,
             "segments": request.segments,
             "ked": request.ked,
             "balanced": request.balanced,
             "geometry": task.mechanism.geometry.value,
-        },
+        }
+        | how,
     }
 
 

@@ -11,6 +11,9 @@ from rich.table import Table
 from paraflex.simulate import TrackingTask
 from paraflex.studies import StudyResult
 
+# How a run ends that did what was asked.
+FINISHED = ("complete", "stopped")
+
 
 def plain_console(*, stderr: bool = False) -> Console:
     """A console that leaves square brackets alone: here they hold units."""
@@ -47,6 +50,13 @@ def study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Tabl
     return table
 
 
+def events(console: Console, figures: dict[str, Any]) -> None:
+    """One line for each mode that an event stopped."""
+    for name, mode in figures["modes"].items():
+        if mode["status"] == "stopped":
+            console.print(f'mode "{name}": {mode["message"]}', soft_wrap=True)
+
+
 def failures(console: Console, result: StudyResult) -> None:
     """One line for each mode that did not run to its end."""
     for reason in result.failed.values():
@@ -54,7 +64,7 @@ def failures(console: Console, result: StudyResult) -> None:
     if result.data is not None:
         for mode in result.data["mode"].values:
             run = result.data.sel(mode=mode)
-            if run["status"].item() != "complete":
+            if run["status"].item() not in FINISHED:
                 console.print(f'error: mode "{mode}": {run["message"].item()}', soft_wrap=True)
 
 

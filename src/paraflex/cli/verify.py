@@ -27,6 +27,7 @@ from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
 from paraflex.files import load
+from paraflex.integrators import find_method
 from paraflex.mechanism import ActuationMode, Geometry
 from paraflex.results import save_results
 from paraflex.simulate import TrackingTask
@@ -40,6 +41,8 @@ class VerifyRequest(StudyRequest):
     engines: list[str]
     fidelities: list[str]
     segments: int | None
+    tolerance: float | None = None
+    method: str | None = None
 
 
 def verify_command(request: VerifyRequest) -> int:
@@ -89,7 +92,12 @@ def _options(request: VerifyRequest) -> VerificationOptions:
         if value is not None and not 0 < value < float("inf"):
             raise InputError("must be positive", field=flag, value=value, remedy="leave it out for the default")
     default = VerificationOptions()
+    try:
+        method = find_method(default.method if request.method is None else request.method).name
+    except InputError as error:
+        raise InputError(error.problem, field="--method", value=error.value, remedy=error.remedy) from None
     return VerificationOptions(
+        method=method,
         tolerance=default.tolerance if request.tolerance is None else request.tolerance,
         segments=default.segments if request.segments is None else request.segments,
     )

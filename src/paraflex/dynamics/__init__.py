@@ -7,6 +7,7 @@ from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joi
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
+from paraflex.dynamics.singularity import SingularityMeasure
 from paraflex.dynamics.soundness import Closure, Mobility, Redundancy, closure_of, mobility, undeformed
 from paraflex.dynamics.start import start_state
 from paraflex.dynamics.state import (
@@ -29,6 +30,7 @@ __all__ = [
     "Mobility",
     "Reach",
     "Redundancy",
+    "SingularityMeasure",
     "State",
     "System",
     "Vibration",

@@ -38,6 +38,8 @@ class BodyShape:
         First and last end of what has such but no mesh, else none.
     slopes : (k, own) array
         Slope rows at places along the body that tell how far it bends.
+    line : tuple of PointShape
+        Of a bar of assumed modes, places along its centre line.
     """
 
     integrals: ShapeIntegrals
@@ -45,6 +47,7 @@ class BodyShape:
     points: Mapping[str, PointShape] = field(default_factory=dict)
     ends: tuple[PointShape, ...] = ()
     slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    line: tuple[PointShape, ...] = ()
 
 
 def body_shape(body: Body) -> BodyShape:
@@ -85,8 +88,9 @@ def _assumed(bar: AssumedModesBeam) -> BodyShape:
     ends = at(0.0), at(bar.length)
     inner = [at(x) for x in shapes.quadrature()[0].tolist()]
     points = {name: at(x) for name, x in bar.points.items()}
-    slopes = np.array([point.slope for point in (ends[0], *inner, ends[1])])
-    return BodyShape(bar.integrals, points=points, ends=ends, slopes=slopes)
+    line = (ends[0], *inner, ends[1])
+    slopes = np.array([point.slope for point in line])
+    return BodyShape(bar.integrals, points=points, ends=ends, slopes=slopes, line=line)
 
 
 def _modal(body: ModalBody) -> BodyShape:

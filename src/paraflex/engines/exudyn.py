@@ -447,6 +447,8 @@ def _record(
             "constraint_position_max": _largest(gaps[:, 0]),
             "constraint_velocity_max": _largest(gaps[:, 1]),
             "energy_balance_max": _largest(balance - balance[:1]),
+            "event": "",
+            "event_time": np.nan,
         },
     )
 

@@ -37,6 +37,7 @@ from paraflex.files.schema import (
     TorqueTable,
 )
 from paraflex.files.start import read_start
+from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
     ActuationMode,
@@ -91,6 +92,12 @@ class StudyDefaults:
         Constant motor torques of a run without a path [N m].
     orientation : float
         Angle of the end-effector along the path, where it is a task coordinate [rad].
+    method : str or None
+        Of integration; the program's own where None.
+    tolerance : float or None
+        Of the integration [m].
+    step : float or None
+        Fixed [s].
     """
 
     path: str | None = None
@@ -100,6 +107,9 @@ class StudyDefaults:
     assembly: str | None = None
     torques: Mapping[str, float] = field(default_factory=dict)
     orientation: float = 0.0
+    method: str | None = None
+    tolerance: float | None = None
+    step: float | None = None
 
 
 @dataclass(frozen=True)
@@ -230,6 +240,9 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
         assembly=table.study.assembly,
         torques=table.study.torques,
         orientation=table.study.orientation or 0.0,
+        method=table.study.method,
+        tolerance=table.study.tolerance,
+        step=table.study.step,
     )
     _check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
@@ -267,6 +280,11 @@ def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDe
         raise InputError("must be positive", field="study.duration", value=study.duration, remedy="give it in s")
     if study.samples < 2:
         raise InputError("too few samples", field="study.samples", value=study.samples, remedy="ask for at least 2")
+    given = {name: getattr(study, name) for name in ("method", "tolerance", "step")}
+    try:
+        IntegrationOptions(**{name: value for name, value in given.items() if value is not None})
+    except InputError as error:
+        raise error.within("study") from None
 
 
 def _mechanism(table: ModelTable) -> Mechanism:

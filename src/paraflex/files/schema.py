@@ -389,6 +389,9 @@ class StudyTable(_Table):
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
     )
+    method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
+    tolerance: Number | None = Field(default=None, description="the tolerance of the integration in m")
+    step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
 
 
 class ModelTable(_Table):

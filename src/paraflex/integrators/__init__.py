@@ -1,7 +1,8 @@
 """Time integration: methods by name, our own schemes as tableaux and parameters, SciPy's and SUNDIALS' as guests."""
 
+from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, SingularDistance, check_events
 from paraflex.integrators.integrate import integrate
-from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method
+from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method, Treatment, find_method
 from paraflex.integrators.options import IntegrationOptions, choose
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.solution import Solution
@@ -11,10 +12,17 @@ __all__ = [
     "DEFAULT_METHOD",
     "METHODS",
     "TR_BDF2",
+    "DeflectionLimit",
+    "Event",
     "IntegrationOptions",
+    "JointLimit",
     "Method",
+    "SingularDistance",
     "Solution",
+    "Treatment",
+    "check_events",
     "choose",
+    "find_method",
     "integrate",
     "make_problem",
 ]

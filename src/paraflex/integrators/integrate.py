@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import ConstraintDriftError, IntegrationError, Moment
 from paraflex.integrators import native
+from paraflex.integrators.crossing import Crossing, advance, samples_until
+from paraflex.integrators.gauges import make_gauges
 from paraflex.integrators.methods import Family
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Problem, Run, make_problem
@@ -62,6 +64,7 @@ def integrate(
     Returns
     -------
     Solution
+        Where an event ends the run its last sample is the state there, besides those at the times asked for.
 
     Raises
     ------
@@ -70,11 +73,13 @@ def integrate(
     ConstraintDriftError
         Constraints are left further than errors of integration explain; it carries the partial solution as well.
     InputError
-        Times that do not ascend from the start.
+        Times that do not ascend from the start; events that the mechanism cannot have, or a start beyond one.
     """
     began = time.perf_counter()
     options = options or IntegrationOptions()
-    run = prepare(make_problem(system, signals, initial, times, knots), options)
+    problem = make_problem(system, signals, initial, times, knots)
+    gauges, crossing = make_gauges(system, initial.q, options.events), None
+    run = prepare(problem, options)
     status, message, bent, drift, now = "complete", "", "", "", None
     code, limits = PAUSED, (run.dependent_rows, options.tolerance)
     try:
@@ -82,7 +87,10 @@ def integrate(
         while code == PAUSED:
             if run.attempts >= options.max_steps:
                 break
-            code = run.march(min(_SLICE, options.max_steps - run.attempts))
+            code, crossing = advance(run, gauges, min(_SLICE, options.max_steps - run.attempts))
+            if crossing is not None:
+                status, message = "stopped", crossing.message
+                break
             now = run.now()
             bent, drift = bent_too_far(system, now.q), come_apart(system, signals, now.t, now.q, *limits)
             if bent or drift:
@@ -91,8 +99,8 @@ def integrate(
                 on_progress(now.t)
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {run.now().t:.6g} s"
-    solution = _solution(run, options, time.perf_counter() - began, status, message)
-    if (code == FINISHED and not (bent or drift)) or status == "interrupted":
+    solution = _solution(run, options, time.perf_counter() - began, status, message, crossing)
+    if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution
     cause = bent or drift or (f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code])
     now = run.now()
@@ -113,9 +121,12 @@ def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     raise NotImplementedError(family)
 
 
-def _solution(run: Run, options: IntegrationOptions, wall_time: float, status: str, message: str) -> Solution:
-    samples, figures, system = run.samples, run.figures(), run.problem.system
-    reached = slice(0, run.reached)
+def _solution(
+    run: Run, options: IntegrationOptions, wall_time: float, status: str, message: str, crossing: Crossing | None
+) -> Solution:
+    samples = run.samples if crossing is None else samples_until(run, crossing)
+    figures, system = run.figures(), run.problem.system
+    reached = slice(0, run.reached if crossing is None else samples.times.size)
     multipliers = least_norm(system, samples.q[reached], samples.lam[reached], run.dependent_rows)
     for first, last in figures.passages.T:
         multipliers[(samples.times[reached] >= first) & (samples.times[reached] <= last)] = np.nan
@@ -141,4 +152,5 @@ def _solution(run: Run, options: IntegrationOptions, wall_time: float, status: s
         singular_positions=tuple(figures.passages.mean(axis=0).tolist()),
         method=options.method,
         evaluations=figures.evaluations,
+        event="" if crossing is None else str(crossing.gauge.event),
     )

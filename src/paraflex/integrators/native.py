@@ -98,13 +98,17 @@ class NativeRun:
 
     def march(self, attempts: int) -> int:
         """See `Run`."""
-        ahead = self.problem.jumps[self.problem.jumps > self.state.clock[TIME]]
+        jumps, now = self.problem.jumps, self.state.clock[TIME]
+        # The last call may have ended there: whoever looked at the run in between saw it as it was before the jump.
+        if np.any(jumps == now):
+            self._resume()
+        ahead = jumps[jumps > now]
         signals, stops = self.problem.signals, self.problem.stops
         if ahead.size:
             signals, stops = hidden_from(signals, ahead[0]), stops[stops <= ahead[0]]
         arguments = (self.problem.system.packed, signals, self.scheme, self.controls, stops, attempts)
         code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
-        return self._resume() if code == FINISHED and ahead.size else code
+        return PAUSED if code == FINISHED and ahead.size else code
 
     def now(self) -> Instant:
         """See `Run`."""
@@ -133,13 +137,12 @@ class NativeRun:
             passages=state.passages[:, : state.counts[PASSAGES]],
         )
 
-    def _resume(self) -> int:
+    def _resume(self) -> None:
         """A first stage with what is given after a jump; energies go on counting from the run's start."""
         kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
         arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
         start(*arguments, self.state, self.workspace, empty_samples(np.zeros(0), self.problem.system))
         self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
-        return PAUSED
 
 
 def _scheme(options: IntegrationOptions) -> Tableau:

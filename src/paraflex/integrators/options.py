@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from paraflex.errors import InputError, suggestion
+from paraflex.integrators.events import Event
 from paraflex.integrators.methods import DEFAULT_METHOD, Method, Treatment, check_parameters, find_method
 
 _REMEDIES = {
@@ -47,6 +49,9 @@ class IntegrationOptions:
         Attempted steps before the run is given up.
     newton_fraction : float, optional
         The part of the error allowed in a step that Newton's iteration may leave; the method's own by default.
+    events : tuple of JointLimit, DeflectionLimit or SingularDistance
+        The run stops at the first of them. An excursion across a limit and back within a quarter of a step is
+        overlooked: where limits are grazed bound the step.
     """
 
     tolerance: float = 1e-4
@@ -60,6 +65,7 @@ class IntegrationOptions:
     step: float | None = None
     constraints: str | None = None
     automatic_gains: bool = False
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         for name, remedy in _REMEDIES.items():
@@ -90,6 +96,16 @@ class IntegrationOptions:
     def treatment(self) -> Treatment:
         """What keeps the constraints."""
         return self.description.treatments[0] if self.constraints is None else Treatment(self.constraints)
+
+    def told(self) -> dict[str, str]:
+        """Method, parameters, treatment of constraints, step and events in words, for provenance."""
+        return {
+            "integration_method": self.method,
+            "method_parameters": json.dumps(self.all_parameters),
+            "constraints_treatment": self.treatment.value,
+            "steps": "chosen by their errors" if self.step is None else f"fixed, {self.step:g} s",
+            "stop_at": ", ".join(str(event) for event in self.events),
+        }
 
     def _check_step(self) -> None:
         if self.step is not None and not (math.isfinite(self.step) and self.description.fixed_step):

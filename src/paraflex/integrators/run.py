@@ -49,7 +49,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Instant:
-    """Where a run stands, between two steps; arrays of its own."""
+    """Where a run stands, between two steps; arrays of its own. Work [J] from the start, without that of weight."""
 
     t: float
     q: Array

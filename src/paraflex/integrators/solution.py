@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,8 @@ class Solution:
         The name of the method; empty for another model's.
     evaluations : int
         Of the equations of motion.
+    event : str
+        Which event stopped the run, whose time and state are then the last sample; empty for none.
     """
 
     t: NDArray[np.float64]
@@ -64,3 +67,9 @@ class Solution:
     singular_positions: tuple[float, ...] = ()
     method: str = ""
     evaluations: int = 0
+    event: str = ""
+
+    @property
+    def event_time(self) -> float:
+        """When the event was that stopped the run [s]; NaN for none."""
+        return float(self.t[-1]) if self.event else math.nan

@@ -48,6 +48,8 @@ UNITS = {
     "constraint_position_max": ("largest constraint violation in position", "m"),
     "constraint_velocity_max": ("largest constraint violation in velocity", "m/s"),
     "energy_balance_max": ("largest imbalance of energy and work", "J"),
+    "event": ("event that stopped the run", "1"),
+    "event_time": ("when it was stopped", "s"),
 }
 
 
@@ -62,8 +64,8 @@ def tracking_dataset(
     Parameters
     ----------
     runs : sequence of TrackingRun or Record
-        Of one task; runs that did not finish hold NaN after their last sample and say so in `status`. Runs of finite
-        segments are told as the links they were cut from.
+        Of one task; runs that did not finish hold NaN after their last sample and say so in `status`, and in `event`
+        and `event_time` where that stopped them. Runs of finite segments are told as the links they were cut from.
     options : IntegrationOptions, optional
         Kept as provenance.
     parameters : dict, optional
@@ -161,6 +163,8 @@ def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]
 
 
 def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> dict:
+    # Other models and engines integrate in ways of their own.
+    ours = options.told() if one.method == options.description.title else {}
     return {
         "mechanism": one.task.mechanism.name,
         "motion_end": one.task.path.duration,
@@ -168,6 +172,7 @@ def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> d
         "baumgarte_alpha": options.alpha,
         "baumgarte_beta": options.beta,
         "method": one.method,
+        **ours,
         "parameters": json.dumps(parameters, sort_keys=True),
         "paraflex_version": version("paraflex"),
         "numba_version": version("numba"),

@@ -35,7 +35,8 @@ def motion_dataset(
     Parameters
     ----------
     run : MotionRun
-        One that did not finish holds NaN after its last sample and says so in `status`.
+        One that did not finish holds NaN after its last sample and says so in `status`; of one that an event stopped
+        the time ends with the event.
     options : IntegrationOptions, optional
         Kept as provenance.
     parameters : dict, optional
@@ -96,6 +97,7 @@ def motion_dataset(
         "kind": "motion",
         "tolerance": options.tolerance,
         "method": METHODS[solution.method].title,
+        **options.told(),
         "singular_positions": json.dumps(solution.singular_positions),
         "parameters": json.dumps(parameters or {}, sort_keys=True),
         "paraflex_version": version("paraflex"),

@@ -26,6 +26,8 @@ FIGURES = (
     "constraint_position_max",
     "constraint_velocity_max",
     "energy_balance_max",
+    "event",
+    "event_time",
 )
 
 
@@ -90,7 +92,9 @@ class Record:
 def record(run: TrackingRun) -> Record:
     """What a run of our own says of the links; finite segments are told as the links they were cut from."""
     task, solution = run.task, run.solution
-    system, q, v, a = task.system, solution.q, solution.v, solution.a
+    # The state at an event is a sample more than the task's times.
+    k = solution.t.size - bool(solution.event)
+    system, q, v, a = task.system, solution.q[:k], solution.v[:k], solution.a[:k]
     whole = task if task.whole is None else task.whole
     effector = task.mechanism.end_effector
     assert effector is not None
@@ -116,10 +120,10 @@ def record(run: TrackingRun) -> Record:
         chord_rate=np.stack([rate for _, rate in chords], axis=1),
         tip=np.stack([_tip(system, names, q) for names in parts], axis=1),
         points=np.stack(points, axis=1) if points else np.zeros((q.shape[0], 0, 2)),
-        joint_force=joint_forces(system, [joint.name for joint in whole.mechanism.joints], q, solution.multipliers),
-        kinetic_energy=solution.kinetic_energy,
-        strain_energy=solution.strain_energy,
-        work=solution.work,
+        joint_force=joint_forces(system, [joint.name for joint in whole.mechanism.joints], q, solution.multipliers[:k]),
+        kinetic_energy=solution.kinetic_energy[:k],
+        strain_energy=solution.strain_energy[:k],
+        work=solution.work[:k],
         figures={name: getattr(solution, name) for name in FIGURES},
     )
 

@@ -42,6 +42,8 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         figures: dict[str, Any] = {"status": str(run["status"].item())}
         if figures["status"] != "complete":
             figures["message"] = str(run["message"].item())
+        if figures["status"] == "stopped":
+            figures |= {"event": str(run["event"].item()), "event_time": run["event_time"].item()}
         figures |= {key: finite_or_none(run[key].item()) for key in _FIGURES}
         figures |= {key: int(run[key].item()) for key in _COUNTS}
         for key in ("peak_torque", "rms_torque"):

@@ -48,8 +48,10 @@ class StudyResult:
 
     @property
     def complete(self) -> bool:
-        """Whether every mode ran to its end."""
-        return not self.failed and self.data is not None and bool((self.data["status"] == "complete").all())
+        """Whether every mode ran to its end, or to an event that was to stop it."""
+        return (
+            not self.failed and self.data is not None and bool(self.data["status"].isin(["complete", "stopped"]).all())
+        )
 
 
 def run_study(

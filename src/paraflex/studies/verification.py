@@ -14,7 +14,7 @@ from paraflex.engines import ENGINES, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
 from paraflex.errors import InputError, IntegrationError, NumericalError, suggestion
-from paraflex.integrators import IntegrationOptions
+from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions
 from paraflex.mechanism import (
     ActuationMode,
     Geometry,
@@ -48,6 +48,8 @@ class VerificationOptions:
         Of paraflex's own runs with error control [m].
     ked_step, exudyn_step, mujoco_step : float
         Of those with fixed steps [s].
+    method : str
+        Of paraflex's own runs with error control: see `paraflex.METHODS`.
     segments : int
         On the longest flexible beam; others get as many as their length takes.
     """
@@ -57,6 +59,7 @@ class VerificationOptions:
     exudyn_step: float = 5e-5
     mujoco_step: float = 1.0 / 30000.0
     segments: int = 8
+    method: str = DEFAULT_METHOD
 
 
 @dataclass(frozen=True)
@@ -223,7 +226,7 @@ def run_model(
     """
     finer, denser = level is Refinement.STEP, 2 if level is Refinement.MESH else 1
     half = 0.5 if finer else 1.0
-    tolerance = IntegrationOptions(tolerance=options.tolerance * (0.25 if finer else 1.0))
+    tolerance = IntegrationOptions(tolerance=options.tolerance * (0.25 if finer else 1.0), method=options.method)
     beams = task.mechanism.refined(denser)
     if name == "rigid":
         return record(simulate(task.remodelled(beams.rigid()), mode, options=tolerance))

@@ -1,0 +1,179 @@
+"""How a command integrates: method, steps, constraints and events from flags, or from the model's [study]."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from paraflex.errors import InputError
+from paraflex.files import StudyDefaults
+from paraflex.integrators import (
+    DeflectionLimit,
+    Event,
+    IntegrationOptions,
+    JointLimit,
+    SingularDistance,
+    Treatment,
+    check_events,
+)
+from paraflex.mechanism import Mechanism
+
+_FLAGS = {
+    "tolerance": "--tol",
+    "alpha": "--alpha",
+    "beta": "--beta",
+    "max_steps": "--max-steps",
+    "method": "--method",
+    "parameters": "--method-parameter",
+    "step": "--step",
+    "constraints": "--constraints",
+    "automatic_gains": "--automatic-gains",
+}
+_SPECS = "joint:NAME=LOW..HIGH, deflection:BODY=METRES or singular=DISTANCE"
+
+
+@dataclass(frozen=True)
+class IntegrationRequest:
+    """What was asked for on the command line; None takes the model's or the program's default."""
+
+    tolerance: float | None = None
+    alpha: float | None = None
+    beta: float | None = None
+    max_steps: int | None = None
+    method: str | None = None
+    parameters: Sequence[str] = field(default_factory=list)
+    step: float | None = None
+    constraints: str | None = None
+    automatic_gains: bool = False
+    stop_at: Sequence[str] = field(default_factory=list)
+
+    def given(self) -> dict[str, object]:
+        """Flags that were given, with their values."""
+        values = {flag: getattr(self, name) for name, flag in _FLAGS.items()} | {"--stop-at": self.stop_at}
+        listed = {flag: value[0] if isinstance(value, list) and value else value for flag, value in values.items()}
+        return {flag: value for flag, value in listed.items() if value not in (None, False, [])}
+
+
+def integration_options(request: IntegrationRequest, study: StudyDefaults) -> IntegrationOptions:
+    """The options of the command line, and for what it leaves out the study's; errors name the flag.
+
+    A step goes with a method: naming another method leaves the study's step out.
+    """
+    given: dict[str, Any] = {name: getattr(request, name) for name in _FLAGS if name != "parameters"}
+    if given["tolerance"] is None:
+        given["tolerance"] = study.tolerance
+    if given["method"] in (None, study.method):
+        given["method"] = study.method
+        given["step"] = study.step if given["step"] is None else given["step"]
+    given["parameters"] = dict(_parameter(text) for text in request.parameters)
+    given["events"] = tuple(parse_event(text) for text in request.stop_at)
+    try:
+        options = IntegrationOptions(**{name: value for name, value in given.items() if value is not None})
+    except InputError as error:
+        flag = _FLAGS[error.field.split(".")[0]]
+        value = error.field.partition(".")[2] + f"={error.value}" if "." in error.field else error.value
+        remedy = error.remedy.replace("constraints = ", "--constraints ")
+        raise InputError(error.problem, field=flag, value=value, remedy=remedy) from None
+    _check_coefficients(request, options)
+    return options
+
+
+def _check_coefficients(request: IntegrationRequest, options: IntegrationOptions) -> None:
+    """Baumgarte's coefficients where something else keeps the constraints, or chooses them."""
+    for flag, value in (("--alpha", request.alpha), ("--beta", request.beta)):
+        if value is None:
+            continue
+        if options.automatic_gains:
+            raise InputError(
+                "means nothing with --automatic-gains", field=flag, value=value, remedy="leave one of them out"
+            )
+        if options.treatment is not Treatment.BAUMGARTE:
+            raise InputError(
+                f"means nothing where {options.treatment.value} keeps the constraints", field=flag, value=value,
+                remedy="leave it out, or choose --constraints baumgarte with a method that has it",
+            )  # fmt: skip
+
+
+def _parameter(text: str) -> tuple[str, float]:
+    name, sign, value = text.partition("=")
+    if not (sign and name.strip()):
+        raise InputError(
+            "not NAME=VALUE", field="--method-parameter", value=text, remedy='say "spectral_radius=0.8"; '
+            "paraflex methods lists the parameters",
+        )  # fmt: skip
+    return name.strip(), _number(value, "--method-parameter", text)
+
+
+def parse_event(text: str) -> Event:
+    """Read an event: "joint:A1=0.1..1.4", "deflection:link1=0.002", "singular=0.05", "singular:tau1,tau5=0.05".
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    what, sign, value = text.rpartition("=")
+    kind, colon, name = (part.strip() for part in what.partition(":"))
+    named = bool(colon and name)
+    if sign and kind == "joint" and named:
+        return _event(JointLimit, text, name, *_range(value, text))
+    if sign and kind == "deflection" and named:
+        return _event(DeflectionLimit, text, name, _number(value, "--stop-at", text))
+    if sign and kind == "singular" and named is bool(colon):
+        motors = tuple(motor.strip() for motor in name.split(",")) if named else ()
+        return _event(SingularDistance, text, _number(value, "--stop-at", text), motors)
+    raise InputError("not an event", field="--stop-at", value=text, remedy=f"write {_SPECS}")
+
+
+def _event(kind: type, text: str, *arguments: Any) -> Event:
+    try:
+        return kind(*arguments)
+    except InputError as error:
+        raise InputError(error.problem, field="--stop-at", value=text, remedy=error.remedy) from None
+
+
+def _range(value: str, text: str) -> tuple[float, float]:
+    low, dots, high = value.partition("..")
+    if not dots or not (low.strip() or high.strip()):
+        raise InputError(
+            "not a range", field="--stop-at", value=text, remedy="write LOW..HIGH; either may be left out, say ..1.4"
+        )
+    lower = _number(low, "--stop-at", text) if low.strip() else -math.inf
+    return lower, _number(high, "--stop-at", text) if high.strip() else math.inf
+
+
+def _number(value: str, flag: str, text: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f'"{value.strip()}" is not a number', field=flag, value=text, remedy="give one, in SI units")
+    return number
+
+
+def check_stops(mechanism: Mechanism, options: IntegrationOptions, request: IntegrationRequest) -> None:
+    """Nothing, if the mechanism can have the events; errors name the flag."""
+    for event, text in zip(options.events, request.stop_at, strict=True):
+        try:
+            check_events(mechanism, (event,))
+        except InputError as error:
+            problem = f"{error.problem} {error.value}" if error.problem.startswith("unknown") else error.problem
+            raise InputError(problem, field="--stop-at", value=text, remedy=error.remedy) from None
+
+
+def integration_parameters(options: IntegrationOptions, request: IntegrationRequest) -> dict[str, Any]:
+    """How a run was integrated, for provenance."""
+    return {
+        "tolerance": options.tolerance,
+        "alpha": options.alpha,
+        "beta": options.beta,
+        "method": options.method,
+        "method_parameters": options.all_parameters,
+        "step": options.step,
+        "constraints": options.treatment.value,
+        "automatic_gains": options.automatic_gains,
+        "stop_at": list(request.stop_at),
+    }

@@ -1,0 +1,120 @@
+"""How far a pose is from a singular position: of the constraints, or of the mechanism with motors held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.system import System
+from paraflex.kernel.packed import CONSTRAINT
+from paraflex.mechanism import AxisJoint
+
+Array = NDArray[np.float64]
+
+# Rows with a smaller singular value than this follow from others everywhere; loops close far better.
+_DEPENDENT = 1e-6
+
+
+@dataclass(frozen=True)
+class SingularityMeasure:
+    """Distance from a singular position, without dimension: 0 there, at most 1.
+
+    Rows of Phi_q, and with motors those of their joints' coordinates, restricted to the motion of bodies that keep
+    their present shape: flexible ones give way at a singular position, and hide it. Lengths are measured by kinetic
+    energy, rows scaled to length one. The measure is a singular value of that matrix:
+
+    - of constraints alone the smallest that is not zero where the measure starts: rows that follow from others
+      everywhere are left out. Zero where constraints lose rank.
+    - with motors the smallest of all columns: how much, at least, a motion of unit energy turns held motors or opens
+      joints. Zero where the mechanism can move though they are held (Type II), and where they are too few.
+
+    Attributes
+    ----------
+    system : System
+    start : (n,) array
+        A pose that is not singular.
+    motors : tuple of str
+        Held; none for the constraints alone.
+    """
+
+    system: System
+    start: Array
+    motors: tuple[str, ...] = ()
+
+    def __call__(self, q: Array) -> Array:
+        """Of every pose (k, n): (k,)."""
+        if self._number == 0:
+            return np.zeros(len(q)) if self.motors else np.ones(len(q))
+        return np.array([self._values(pose)[self._number - 1] for pose in q])
+
+    @cached_property
+    def _number(self) -> int:
+        """Which singular value it is, counted from the largest; none is 0."""
+        values, columns = self._values(self.start), 3 * len(self.system.bodies)
+        if self.motors:
+            return columns if values.size == columns else 0
+        return int(np.sum(values > _DEPENDENT))
+
+    def _values(self, q: Array) -> NDArray:
+        rows = self._scaled(q)
+        return np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
+
+    def _scaled(self, q: Array) -> Array:
+        """The matrix (rows, 3 bodies): columns of the centre of mass and of the turn about it, by root of inertia."""
+        rows, parts = self._rows(q), self._bodies
+        at = parts.offsets
+        x, y, turn = rows[:, at], rows[:, at + 1], rows[:, at + 2]
+        c, s = np.cos(q[at + 2]), np.sin(q[at + 2])
+        arm_x, arm_y = c * parts.cx - s * parts.cy, s * parts.cx + c * parts.cy
+        about = turn + x * arm_y - y * arm_x
+        scaled = np.hstack([x / parts.root_m, y / parts.root_m, about / parts.root_J])
+        return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+
+    def _rows(self, q: Array) -> Array:
+        jacobian = self.system.jacobian(q)[self._constraints]
+        if not self.motors:
+            return jacobian
+        axes = [joint_coordinate(self.system, joint, q[None]).rows for joint in self._sliding]
+        return np.vstack([jacobian, self._turning, *axes])
+
+    @cached_property
+    def _constraints(self) -> NDArray[np.bool_]:
+        return self.system.packed.rows["kind"] == CONSTRAINT
+
+    @cached_property
+    def _turning(self) -> Array:
+        """Rows of joints that turn, which do not depend on the pose."""
+        rows = [joint_coordinate(self.system, joint, self.start[None]).rows for joint in self._joints(slides=False)]
+        return np.vstack(rows) if rows else np.zeros((0, self.system.n))
+
+    @cached_property
+    def _sliding(self) -> list[str]:
+        return self._joints(slides=True)
+
+    def _joints(self, *, slides: bool) -> list[str]:
+        mechanism = self.system.mechanism
+        joints = [motor.joint for motor in mechanism.motors if motor.name in self.motors]
+        return [joint for joint in joints if isinstance(mechanism.joint(joint), AxisJoint) is slides]
+
+    @cached_property
+    def _bodies(self) -> _Bodies:
+        bodies = self.system.bodies
+        m = np.array([body.integrals.m for body in bodies])
+        cx, cy = (np.array([body.integrals.S1[k] for body in bodies]) / m for k in range(2))
+        J = np.array([body.integrals.I0 + body.integrals.J for body in bodies]) - m * (cx**2 + cy**2)
+        return _Bodies(np.array([body.offset for body in bodies]), np.sqrt(m), np.sqrt(J), cx, cy)
+
+
+@dataclass(frozen=True)
+class _Bodies:
+    """Of every body, undeformed: where its coordinates start, roots of mass and inertia, its centre of mass."""
+
+    offsets: NDArray[np.int64]
+    root_m: Array
+    root_J: Array
+    cx: Array
+    cy: Array

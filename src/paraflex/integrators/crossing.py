@@ -1,0 +1,160 @@
+"""Marching to the first event: looked for within each step, found there, and the state at it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.optimize
+from numpy.typing import NDArray
+
+from paraflex.dynamics import State
+from paraflex.integrators import native
+from paraflex.integrators.gauges import Gauge
+from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.run import Instant, Problem, Run
+from paraflex.kernel.bodies import weight_work
+from paraflex.kernel.packed import make_point_scratch
+from paraflex.kernel.run_state import PAUSED, Samples
+
+Array = NDArray[np.float64]
+
+# Places within a step at which events are looked for, its end last: an excursion between two of them is overlooked.
+_PLACES = np.array([0.25, 0.5, 0.75, 1.0])
+# They are looked at where a value is no further inside its bounds than so many times what it changed by in this step
+# and the one before: a parabola that turns within the step changes in one of them by more than it dips.
+_NEAR = 4.0
+# How exactly an event is found, as a fraction of the step.
+_FOUND = 1e-13
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """An event on the way from one instant to the next.
+
+    Attributes
+    ----------
+    gauge : Gauge
+    before, after : Instant
+        Ends of the step.
+    fraction : float
+        Of the step until the event.
+    """
+
+    gauge: Gauge
+    before: Instant
+    after: Instant
+    fraction: float
+
+    @property
+    def t(self) -> float:
+        """Of the event [s]."""
+        return self.before.t + self.fraction * (self.after.t - self.before.t)
+
+    @property
+    def message(self) -> str:
+        """What was reached and when."""
+        return f"{self.gauge.reached(_poses(self.before, self.after, self.fraction)[0])} at t = {self.t:.6g} s"
+
+
+def advance(run: Run, gauges: Sequence[Gauge], attempts: int) -> tuple[int, Crossing | None]:
+    """March by so many attempted steps, or to the first event among them; the code of the last one."""
+    if not gauges:
+        return run.march(attempts), None
+    code, before = PAUSED, run.now()
+    inside = _inside(gauges, before)
+    change = np.full(inside.size, np.inf)
+    for _ in range(attempts):
+        code = run.march(1)
+        after = run.now()
+        if after.t > before.t:
+            then, last_change = inside, change
+            inside = _inside(gauges, after)
+            change = np.abs(inside - then)
+            near = np.minimum(inside, then) <= _NEAR * (change + last_change)
+            found = first_crossing([gauge for gauge, x in zip(gauges, near, strict=True) if x], before, after)
+            if found is not None:
+                return code, found
+        if code != PAUSED:
+            break
+        before = after
+    return code, None
+
+
+def _inside(gauges: Sequence[Gauge], instant: Instant) -> Array:
+    """How far inside its bounds each gauge is."""
+    return np.array([gauge.inside(instant.q[None])[0] for gauge in gauges])
+
+
+def first_crossing(gauges: Sequence[Gauge], before: Instant, after: Instant) -> Crossing | None:
+    """The first event of a step that starts inside all bounds; None for none."""
+    found = []
+    for gauge in gauges:
+        outside = np.nonzero(gauge.inside(_poses(before, after, _PLACES)) <= 0.0)[0]
+        if outside.size:
+            last = float(_PLACES[outside[0]])
+            first = float(_PLACES[outside[0] - 1]) if outside[0] else 0.0
+            found.append(Crossing(gauge, before, after, _root(gauge, before, after, first, last)))
+    return min(found, key=lambda crossing: crossing.fraction, default=None)
+
+
+def samples_until(run: Run, crossing: Crossing) -> Samples:
+    """Samples taken before an event, and the state at it as the last.
+
+    Positions and velocities are those of cubics through both ends of the step; accelerations and multipliers follow
+    from them by the equations of motion.
+    """
+    problem, x = run.problem, crossing.fraction
+    taken = run.samples.times[: run.reached]
+    kept = slice(0, int(np.searchsorted(taken, crossing.t)))
+    before = crossing.before
+    first = _settled(problem, before.t, before.q, before.v)
+    # Where something given jumps accelerations do: the step began with those after the jump.
+    before = replace(before, a=first.samples.a[0])
+    middle, last = (_settled(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
+    # Simpson's rule: powers that jump do so at the ends of steps.
+    powers = [one.state.power[0] for one in (first, middle, last)]
+    width = crossing.t - before.t
+    work = before.work + width / 6.0 * (powers[0] + 4.0 * powers[1] + powers[2])
+    packed = problem.system.packed
+    points, end = make_point_scratch(packed), last.samples
+    work += weight_work(packed, end.q[0], points) - weight_work(packed, problem.initial.q, points)
+    end.energy[0, 2] = work
+    return Samples(*(np.concatenate([old[kept], new]) for old, new in zip(run.samples, end, strict=True)))
+
+
+def _settled(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
+    """A run begun at a state: what its first sample holds, and the power there, follow from the state alone."""
+    here = replace(problem, initial=State(t, q, v), times=np.array([t]), stops=np.array([t + problem.span]))
+    begun = native.prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))
+    begun.start()
+    return begun
+
+
+def _state(before: Instant, after: Instant, x: float) -> tuple[float, Array, Array]:
+    """Time, positions and velocities at a fraction of a step: cubics."""
+    h = after.t - before.t
+    v = _cubic(before.v, before.a, after.v, after.a, h, x)
+    return before.t + x * h, _cubic(before.q, before.v, after.q, after.v, h, x), v
+
+
+def _poses(before: Instant, after: Instant, fractions: Array | float) -> Array:
+    """Positions (k, n) at fractions of a step."""
+    x = np.atleast_1d(fractions)[:, None]
+    return _cubic(before.q, before.v, after.q, after.v, after.t - before.t, x)
+
+
+def _cubic(y0: Array, dy0: Array, y1: Array, dy1: Array, h: float, x: Array | float) -> Array:
+    """The cubic with values y and derivatives dy at both ends of an interval h, at fractions x of it."""
+    y = 1.0 - x
+    return y * y * ((1.0 + 2.0 * x) * y0 + h * x * dy0) + x * x * ((1.0 + 2.0 * y) * y1 - h * y * dy1)
+
+
+def _root(gauge: Gauge, before: Instant, after: Instant, first: float, last: float) -> float:
+    """The fraction of a step between two others, inside and outside, at which the bound is met."""
+
+    def inside(x: float) -> float:
+        return float(gauge.inside(_poses(before, after, x))[0])
+
+    return float(scipy.optimize.root_scalar(inside, bracket=(first, last), method="brentq", xtol=_FOUND).root)

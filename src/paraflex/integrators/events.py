@@ -1,0 +1,130 @@
+"""Events that end a run: a joint at its limit, a link bent too far, a singular position near."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from paraflex.errors import InputError, suggestion
+from paraflex.mechanism import Mechanism, RigidBody, WeldJoint
+
+
+@dataclass(frozen=True)
+class JointLimit:
+    """A joint between stops: the run ends where its coordinate reaches one of them.
+
+    Attributes
+    ----------
+    joint : str
+    low, high : float
+        Of a revolute joint's angle [rad]: that of body b less that of body a, slopes of beams included, counted on
+        through whole turns from the start's angles; of the travel of a joint that slides [m]. Either may be infinite.
+    """
+
+    joint: str
+    low: float = -math.inf
+    high: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not self.low < self.high or (math.isinf(self.low) and math.isinf(self.high)):
+            raise InputError(
+                "no limits that a joint can be between", field=f"limit of joint {self.joint}",
+                value=(self.low, self.high), remedy="give a lower limit, a higher upper one, or one of them",
+            )  # fmt: skip
+
+    def __str__(self) -> str:
+        return f"joint {self.joint}"
+
+
+@dataclass(frozen=True)
+class DeflectionLimit:
+    """A link that must not bend further.
+
+    Attributes
+    ----------
+    body : str
+    limit : float
+        Of its largest transverse displacement [m]: from the x axis of its body frame, as results tell it of its tip,
+        so that it is what the reference condition of the link makes it, from the tangent at the first end or from the
+        line through both ends. Taken at ends and quarters of every element. Of a modal body the largest displacement of
+        its points.
+    """
+
+    body: str
+    limit: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.limit) and self.limit > 0.0):
+            raise InputError(
+                "must be positive", field=f"deflection limit of {self.body}", value=self.limit,
+                remedy="give a length in metres",
+            )  # fmt: skip
+
+    def __str__(self) -> str:
+        return f"deflection of {self.body}"
+
+
+@dataclass(frozen=True)
+class SingularDistance:
+    """A singular position that must not come nearer.
+
+    Attributes
+    ----------
+    distance : float
+        Without dimension, between 0 and 1: see `dynamics.SingularityMeasure`.
+    motors : tuple of str
+        Held: then it is a Type II singularity of these motors. None for one of the constraints.
+    """
+
+    distance: float
+    motors: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.distance < 1.0:
+            raise InputError(
+                "not between 0 and 1", field="distance from singular positions", value=self.distance,
+                remedy="choose it from 0 (singular) to 1 (all constraints independent), say 0.05",
+            )  # fmt: skip
+
+    def __str__(self) -> str:
+        held = f" of {', '.join(self.motors)}" if self.motors else ""
+        return f"singular position{held}"
+
+
+Event = JointLimit | DeflectionLimit | SingularDistance
+
+
+def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:
+    """Nothing, if events are such as this mechanism can have.
+
+    Raises
+    ------
+    InputError
+        A name that is none of the mechanism's, a joint that cannot move or a body that cannot bend.
+    """
+    for event in events:
+        if isinstance(event, JointLimit):
+            _known("joint", event.joint, [joint.name for joint in mechanism.joints])
+            if isinstance(mechanism.joint(event.joint), WeldJoint):
+                raise InputError(
+                    "a weld does not move", field="events", value=event.joint, remedy="name a joint that does"
+                )
+        elif isinstance(event, DeflectionLimit):
+            _known("body", event.body, [body.name for body in mechanism.bodies])
+            body = mechanism.body(event.body)
+            if isinstance(body, RigidBody) or not body.flexible:
+                raise InputError("a rigid body does not bend", field="events", value=event.body, remedy="leave it out")
+        elif isinstance(event, SingularDistance):
+            for name in event.motors:
+                _known("motor", name, [motor.name for motor in mechanism.motors])
+        else:
+            raise InputError(
+                "not an event", field="events", value=event,
+                remedy="give JointLimit, DeflectionLimit or SingularDistance",
+            )  # fmt: skip
+
+
+def _known(kind: str, name: str, names: list[str]) -> None:
+    if name not in names:
+        raise InputError(f"unknown {kind}", field="events", value=name, remedy=suggestion(name, names))

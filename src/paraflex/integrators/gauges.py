@@ -1,0 +1,120 @@
+"""What a run with events looks at: a number for each event, and the bounds it is to stay between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import BodyCoordinates, SingularityMeasure, System, joint_coordinate
+from paraflex.errors import InputError
+from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, check_events
+from paraflex.mechanism import AxisJoint
+
+Array = NDArray[np.float64]
+
+# Places looked at within an element, its last end among them.
+_PLACES = 4
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """What tells of an event: a value of the pose, and the bounds it is to stay between.
+
+    Attributes
+    ----------
+    event : Event
+    value : callable
+        Of poses (k, n), a value (k,).
+    low, high : float
+    unit : str
+    """
+
+    event: Event
+    value: Callable[[Array], Array]
+    low: float
+    high: float
+    unit: str
+
+    def inside(self, q: Array) -> Array:
+        """How far poses (k, n) are inside the bounds (k,): positive inside, zero at the event."""
+        value = self.value(q)
+        return np.minimum(value - self.low, self.high - value)
+
+    def reached(self, q: Array) -> str:
+        """What is reached at a pose (n,), in words."""
+        event, value = self.event, float(self.value(q[None])[0])
+        if isinstance(event, JointLimit):
+            lower = value - self.low < self.high - value
+            side, bound = ("lower", self.low) if lower else ("upper", self.high)
+            return f"{event} reached its {side} limit {bound:g} {self.unit}"
+        if isinstance(event, DeflectionLimit):
+            return f"the {event} reached its limit {self.high:g} {self.unit}"
+        return f"a {event} came as near as {self.low:g}"
+
+
+def make_gauges(system: System, q: Array, events: Sequence[Event]) -> tuple[Gauge, ...]:
+    """Gauges of events, for runs that start at q (n,).
+
+    Raises
+    ------
+    InputError
+        See `check_events`; or the start is not inside.
+    """
+    check_events(system.mechanism, events)
+    gauges = tuple(_gauge(system, q, event) for event in events)
+    for gauge in gauges:
+        if not gauge.inside(q[None])[0] > 0.0:
+            value, unit = float(gauge.value(q[None])[0]), f" {gauge.unit}" if gauge.unit else ""
+            bounds = {"above": gauge.low, "below": gauge.high}
+            wanted = " and ".join(f"{side} {x:g}{unit}" for side, x in bounds.items() if math.isfinite(x))
+            raise InputError(
+                f"the run would start outside the limits of {gauge.event}", field="events", value=value,
+                remedy=f"start {wanted}, or move the limit",
+            )  # fmt: skip
+    return gauges
+
+
+def _gauge(system: System, q: Array, event: Event) -> Gauge:
+    if isinstance(event, JointLimit):
+        unit = "m" if isinstance(system.mechanism.joint(event.joint), AxisJoint) else "rad"
+        return Gauge(event, _joint_value(system, event.joint), event.low, event.high, unit)
+    if isinstance(event, DeflectionLimit):
+        return Gauge(event, _deflection(system, event.body), -math.inf, event.limit, "m")
+    return Gauge(event, SingularityMeasure(system, q, event.motors), event.distance, math.inf, "")
+
+
+def _joint_value(system: System, joint: str) -> Callable[[Array], Array]:
+    """Angle or travel of a joint; an angle is linear in the coordinates."""
+    if isinstance(system.mechanism.joint(joint), AxisJoint):
+        return lambda q: joint_coordinate(system, joint, q).value
+    row = joint_coordinate(system, joint, np.zeros((1, system.n))).rows[0]
+    return lambda q: q @ row
+
+
+def _deflection(system: System, name: str) -> Callable[[Array], Array]:
+    """Largest displacement along a body."""
+    body = system.body(name)
+    rows = deflection_rows(body)
+    return lambda q: np.max(np.linalg.norm(np.tensordot(q[:, body.flexible], rows, (1, 2)), axis=2), axis=1, initial=0)
+
+
+def deflection_rows(body: BodyCoordinates) -> Array:
+    """Rows (places, directions, nf) of a flexible body's displacements in its frame, per modal coordinate.
+
+    Of a beam or bar the transverse one, of a beam at ends and quarters of its elements; of a modal body both, at its
+    points.
+    """
+    D, mesh = body.integrals.D, body.mesh
+    if mesh is not None:
+        inner = [np.linspace(a, b, _PLACES + 1)[1:] for a, b in pairwise(mesh.nodes)]
+        places = np.concatenate([mesh.nodes[:1], *inner])
+        return np.array([mesh.shape_at(float(x))[0][1:] @ D for x in places])
+    if body.shape.line:
+        return np.array([point.N[1:] @ D for point in body.shape.line])
+    points = [point.N @ D for point in body.shape.points.values()]
+    return np.array(points).reshape(-1, 2, body.nf)
