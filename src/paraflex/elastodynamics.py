@@ -28,7 +28,8 @@ from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.dynamics import BodyCoordinates, System, joint_coordinate, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
-from paraflex.integrators.generalised_alpha import Block, GeneralisedAlpha, Response, march
+from paraflex.integrators.linear_structure import Block, Response, march
+from paraflex.integrators.newmark import NewmarkNumbers
 from paraflex.kernel.bodies import motion_forces, system_energy
 from paraflex.kernel.packed import make_point_scratch
 from paraflex.mechanism import ActuationMode, Geometry
@@ -93,13 +94,13 @@ def simulate_ked(
     condition = actuation_condition(task.effort, torques.mode)
     substeps = max(1, math.ceil((samples[1] - samples[0]) / step * (1.0 - _ROUNDING)))
     times = np.linspace(samples[0], samples[-1], substeps * (samples.size - 1) + 1)
-    scheme = GeneralisedAlpha(float(times[1] - times[0]), spectral_radius)
+    numbers = NewmarkNumbers.by_spectral_radius(spectral_radius)
     nominal = _nominal(task, times)
     blocks = [Block(body.all, _mass(body), _stiffness(body)) for body in task.system.bodies]
     held = [motor.joint for motor in task.mechanism.motors if motor.name in torques.mode.motors]
     kept, steps, status, message, failure = [], 0, "complete", "", None
     try:
-        responses = march(scheme, blocks, lambda instants: nominal[instants].structure(held), times)
+        responses = march(numbers, blocks, lambda instants: nominal[instants].structure(held), times)
         for steps, response in enumerate(responses):
             if steps % substeps == 0:
                 kept.append(response)

@@ -44,6 +44,10 @@ class NewmarkNumbers:
         """Generalised alpha by its spectral radius at infinite frequency (Chung and Hulbert 1993)."""
         return cls.damped((2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0))
 
+    def weight(self, step: float) -> float:
+        """What a new position has of the new acceleration: b in q_1 = q* + b v_1' [s^2]."""
+        return self.beta * step**2 * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
+
     @property
     def order(self) -> int:
         """Two, or one for a method that damps at the cost of accuracy."""

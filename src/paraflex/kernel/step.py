@@ -161,10 +161,9 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     # Rows that depend on others here keep their multipliers: so a singular position is passed.
     if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
         note_passage(t, h, m)
-    tolerance = controls.newton_fraction * controls.rate * h
-    if controls.treatment == POSITION:
-        # Positions have no more digits: divided by b, that is what accelerations can be told to.
-        tolerance = max(tolerance, ROUNDING * (1.0 + controls.newton_memory * g / b))
+    # Positions have no more digits; where they decide, divided by b, accelerations have fewer.
+    digits = controls.newton_memory * g / b if controls.treatment == POSITION else 0.0
+    tolerance = max(controls.newton_fraction * controls.rate * h, ROUNDING * (1.0 + digits))
     slowest = 0
     i = 1
     while i < stages:

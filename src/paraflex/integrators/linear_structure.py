@@ -1,4 +1,4 @@
-"""Generalised alpha for linear structures whose constraints change in time, such as a mechanism pose by pose.
+"""The Newmark family for linear structures whose constraints change in time, such as a mechanism pose by pose.
 
     M x'' + K x + C(t)^T mu = f(t),    C(t) x = 0
 
@@ -8,7 +8,6 @@ M and K are constant and made of small blocks on the diagonal, one a body; rows 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from paraflex.errors import IntegrationError, Moment
+from paraflex.integrators.newmark import NewmarkNumbers
 
 Array = NDArray[np.float64]
 
@@ -23,53 +23,6 @@ Array = NDArray[np.float64]
 _CHUNK = 128
 # Eigenvalues of the scaled Schur complement below this fraction of the largest are those of dependent rows.
 _DEPENDENT = 1e-12
-
-
-@dataclass(frozen=True)
-class GeneralisedAlpha:
-    """The generalised-alpha method with the algorithmic acceleration carried, of second order for index 3.
-
-    (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) x_1'' + alpha_f x_0''
-    x_1 = x_0 + h x_0' + h^2 ((1/2 - beta) a_0 + beta a_1),    x_1' = x_0' + h ((1 - gamma) a_0 + gamma a_1)
-
-    Chung and Hulbert (1993), J. Appl. Mech. 60, 371-375, for the parameters; Arnold and Brüls (2007), Multibody Syst.
-    Dyn. 18, 185-202, for balance and constraints at the end of the step.
-
-    Attributes
-    ----------
-    step : float
-        h [s].
-    spectral_radius : float
-        At infinite frequency.
-    """
-
-    step: float
-    spectral_radius: float
-
-    @property
-    def alpha_m(self) -> float:
-        """Weight of the old algorithmic acceleration."""
-        return (2.0 * self.spectral_radius - 1.0) / (self.spectral_radius + 1.0)
-
-    @property
-    def alpha_f(self) -> float:
-        """Weight of the old acceleration."""
-        return self.spectral_radius / (self.spectral_radius + 1.0)
-
-    @property
-    def gamma(self) -> float:
-        """Of Newmark's velocity: second order."""
-        return 0.5 + self.alpha_f - self.alpha_m
-
-    @property
-    def beta(self) -> float:
-        """Of Newmark's position: most damping of high frequencies."""
-        return 0.25 * (0.5 + self.gamma) ** 2
-
-    @property
-    def weight(self) -> float:
-        """What the new position has of the new acceleration, b in x_1 = x* + b x_1'' [s^2]."""
-        return self.beta * self.step**2 * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
 
 
 class Block(NamedTuple):
@@ -90,7 +43,7 @@ class Response(NamedTuple):
 
 
 def march(
-    scheme: GeneralisedAlpha,
+    numbers: NewmarkNumbers,
     blocks: Sequence[Block],
     outside: Callable[[slice], tuple[Array, Array]],
     times: Array,
@@ -99,12 +52,13 @@ def march(
 
     Parameters
     ----------
-    scheme : GeneralisedAlpha
+    numbers : NewmarkNumbers
+        Of the method.
     blocks : sequence of Block
     outside : callable
         For some of the times the constraints C (k, rows, n) and forces f (k, n).
     times : (steps + 1,) array
-        Evenly spaced by the scheme's step.
+        Evenly spaced by the step.
 
     Yields
     ------
@@ -116,8 +70,9 @@ def march(
     IntegrationError
         The rank of the constraints changes.
     """
-    h, b = scheme.step, scheme.weight
-    alpha_m, alpha_f, beta, gamma = scheme.alpha_m, scheme.alpha_f, scheme.beta, scheme.gamma
+    h = float(times[1] - times[0])
+    b = numbers.weight(h)
+    alpha_m, alpha_f, beta, gamma = numbers.alpha_m, numbers.alpha_f, numbers.beta, numbers.gamma
     inverses = _inverses(blocks, b)
     soften = scipy.sparse.block_diag(
         [inverse @ block.stiffness for inverse, block in zip(inverses, blocks, strict=True)], "csr"
