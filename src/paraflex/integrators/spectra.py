@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.integrate
@@ -19,8 +20,8 @@ from paraflex.integrators.methods import check_parameters, find_method
 from paraflex.integrators.tableaux import TR_BDF2
 from paraflex.kernel.run_state import Tableau
 
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+Array = NDArray[Any]
+Roots = NDArray[Any]
 
 _ESDIRK: Mapping[str, Tableau] = {"tr-bdf2": TR_BDF2}
 MULTISTEP = ("ndf", "adams", "bdf", "ida")
@@ -154,7 +155,7 @@ def tableau_of(method: str) -> tuple[Array, Array]:
 
 def stability(A: Array, b: Array, z: complex) -> complex:
     """R(z) = 1 + z b (1 - z A)^-1 1 of a Runge-Kutta method: what a step makes of x' = z/h x."""
-    return 1.0 + z * (b @ np.linalg.solve(np.eye(b.size) - z * A, np.ones(b.size)))
+    return complex(1.0 + z * (b @ np.linalg.solve(np.eye(b.size) - z * A, np.ones(b.size))))
 
 
 def _collocation(*nodes: float) -> tuple[Array, Array]:
