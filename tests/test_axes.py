@@ -188,12 +188,12 @@ def kinds(system, *wanted):
     return np.isin(system.packed.rows["kind"], wanted)
 
 
-def terms(system, q, v, a, lam, torques, weights=(0.0, 0.0), noted=None):
+def terms(system, q, v, a, lam, torques, weights=(1.0, 0.0, 0.0), noted=None):
     """f and rows of the equations of motion."""
     ws = system.workspace()
     note_friction(system.packed, q, v if noted is None else noted, ws.mu, ws.compliance)
     signals = twins.still_signals(system, torques)
-    equations(system.packed, signals, TIME, *weights, q, v, a, lam, np.zeros(len(torques)), ws)
+    equations(system.packed, signals, TIME, weights, q, v, a, lam, np.zeros(len(torques)), ws)
     return ws.f.copy(), ws.rows.copy()
 
 
@@ -236,10 +236,9 @@ def test_constraints_their_rate_and_jacobian(sliders):
 
 def test_acceleration_rows_are_second_derivatives_along_a_motion(sliders):
     q0, v0, a0 = random_state(sliders, 42)
-    weight_v, weight_q = 40.0, 400.0
+    weight_a, weight_v, weight_q = 0.7, 40.0, 400.0
     torques = np.zeros(4)
-    # Baumgarte's weights are 2 alpha and beta^2.
-    _, rows = terms(sliders, q0, v0, a0, np.zeros(sliders.m), torques, (20.0, 20.0))
+    _, rows = terms(sliders, q0, v0, a0, np.zeros(sliders.m), torques, (weight_a, weight_v, weight_q))
 
     def value(t):
         return row_values(sliders, TIME, q0 + np.sin(t) * v0 + (1 - np.cos(t)) * a0)
@@ -251,7 +250,7 @@ def test_acceleration_rows_are_second_derivatives_along_a_motion(sliders):
     second = (d[-2] - 8 * d[-1] + 8 * d[1] - d[2]) / (12 * h)
     law = np.zeros((2, sliders.m))
     law[:, sliders.rows.index("drive travel")] = 0.4 * TIME - 1, 0.4
-    expected = second - law[1] + weight_v * (first - law[0]) + weight_q * value(0.0)
+    expected = weight_a * (second - law[1]) + weight_v * (first - law[0]) + weight_q * value(0.0)
     rigid = kinds(sliders, CONSTRAINT)
     np.testing.assert_allclose(rows[rigid], expected[rigid], rtol=1e-8, atol=1e-7)
 

@@ -162,7 +162,7 @@ def test_residuals_are_those_of_the_index_1_equations(system, alpha, beta):
     rng, t, ws = np.random.default_rng(29), 0.2, system.workspace()
     lam, torques = rng.normal(size=system.m), rng.normal(size=len(system.mechanism.motors))
     signals = twins.still_signals(system, torques)
-    equations(system.packed, signals, t, alpha, beta, q, v, a, lam, np.zeros(torques.size), ws)
+    equations(system.packed, signals, t, (1.0, 2.0 * alpha, beta**2), q, v, a, lam, np.zeros(torques.size), ws)
 
     J = twins.constraint_jacobian(system, q)
     motors = [twins.joint_angle_row(system, motor.joint) for motor in system.mechanism.motors]
@@ -285,7 +285,7 @@ def accelerations(system, q, v, torques, t=0.2):
     """Accelerations and multipliers of the index-1 equations, without Baumgarte terms."""
     a, lam, ws = np.zeros(system.n), np.zeros(system.m), system.workspace()
     signals = twins.still_signals(system, torques)
-    equations(system.packed, signals, t, 0.0, 0.0, q, v, a, lam, np.zeros(len(torques)), ws)
+    equations(system.packed, signals, t, (1.0, 0.0, 0.0), q, v, a, lam, np.zeros(len(torques)), ws)
     factor_system(system.packed, 0.0, q, ws)
     x, mu = -ws.f, -ws.rows
     solve_system(system.packed, ws, x, mu)

@@ -16,7 +16,7 @@ from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.packed import CONSTRAINT
+from paraflex.kernel.packed import CONSTRAINT, INDEX_1
 from paraflex.kernel.stage import equations
 
 _MAX_ITERATIONS = 50
@@ -144,7 +144,7 @@ class _Residual:
         system, ws, still = self.system, self.workspace, self.still
         q, lam, torque = np.split(z, [system.n, system.n + system.m])
         q, lam = np.ascontiguousarray(q), np.ascontiguousarray(lam)
-        equations(system.packed, self.signals, self.time, 0.0, 0.0, q, still, still, lam, self.torques, ws)
+        equations(system.packed, self.signals, self.time, INDEX_1, q, still, still, lam, self.torques, ws)
         phi, _ = system.constraints(self.signals, self.time, q, still)
         # Rows of springs have no second derivatives in them, those of dampers hold no force at rest.
         closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)

@@ -15,7 +15,7 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.packed import CONSTRAINT, Signals
+from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
 from paraflex.kernel.stage import equations
 from paraflex.mechanism import GROUND, Assembly, PointJoint
 from paraflex.mechanism.poses import approximate_poses
@@ -246,7 +246,7 @@ def check_accelerations(
     no_force = np.zeros(system.m)
 
     def rows(a: NDArray[np.float64]) -> NDArray[np.float64]:
-        equations(system.packed, signals, t, 0.0, 0.0, q, v, a, no_force, torques, workspace)
+        equations(system.packed, signals, t, INDEX_1, q, v, a, no_force, torques, workspace)
         return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
 
     wanted = rows(np.zeros(system.n))

@@ -10,7 +10,7 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import greedy_colours, tied_bodies, without_stiffness
 from paraflex.dynamics.state import point_position
 from paraflex.dynamics.system import System
-from paraflex.kernel.packed import SPRING
+from paraflex.kernel.packed import INDEX_1, SPRING
 from paraflex.kernel.stage import equations
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ class RestingForces:
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
         """At coordinates (n,) with multipliers (m,)."""
         ws, still = self.workspace, self.still
-        equations(self.packed, self.signals, self.time, 0.0, 0.0, q, still, still, lam, self.torques, ws)
+        equations(self.packed, self.signals, self.time, INDEX_1, q, still, still, lam, self.torques, ws)
         return ws.f.copy(), ws.rows[self.springs]
 
 

@@ -110,7 +110,8 @@ _ALL = (
     _esdirk("tr-bdf2", "TR-BDF2", 2, "Hosea and Shampine (1996), Appl. Numer. Math. 20, 21-37"),
     _esdirk("trapezoidal", "Trapezoidal rule", 2, "Hairer and Wanner (1996), Solving ODEs II, IV.3"),
     _esdirk("esdirk3", "ESDIRK 3(2)", 3, "Kennedy and Carpenter (2003), Appl. Numer. Math. 44, 139-181"),
-    _esdirk("esdirk4", "ESDIRK 4(3)", 4, "Kennedy and Carpenter (2003), Appl. Numer. Math. 44, 139-181"),
+    _esdirk("esdirk4", "ESDIRK 4(3)", 4, "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"),
+    _esdirk("esdirk5", "ESDIRK 5(4)", 5, "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"),
     _newmark(
         "newmark", "Newmark", 1, "Newmark (1959), J. Eng. Mech. 85, 67-94", Treatment.POSITION,
         gamma=Parameter(0.6, 0.5, 1.0, "velocity weight: 1/2 does not damp, above that the order is 1"),

@@ -6,23 +6,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paraflex.integrators.methods import Family, Treatment
+from paraflex.integrators.newmark import newmark_numbers, newmark_scheme
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Figures, Instant, Problem, empty_samples
 from paraflex.integrators.stretches import hidden_from
-from paraflex.integrators.tableaux import TR_BDF2
+from paraflex.integrators.tableaux import TABLEAUX
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Workspace
 from paraflex.kernel.run_state import (
     BALANCE,
+    BAUMGARTE,
     DPHI_MAX,
     ENERGY_0,
     FACTORS,
     FINISHED,
+    GGL,
     ITERATIONS,
     PASSAGES,
     PAUSED,
     PHI_MAX,
+    POSITION,
+    PROJECTION,
     REJECTED,
     SAMPLE,
     STEP,
@@ -49,12 +55,21 @@ _MEMORY = 0.25
 _DEPENDENT_PART = 1e-7
 
 
+# Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
+_GAIN = 0.1
+_TREATMENTS = {
+    Treatment.BAUMGARTE: BAUMGARTE,
+    Treatment.PROJECTION: PROJECTION,
+    Treatment.GGL: GGL,
+}
+
+
 @dataclass(frozen=True)
 class NativeRun:
     """Everything the kernel's time loop works on: a `Run`."""
 
     problem: Problem
-    tableau: Tableau
+    scheme: Tableau
     controls: Controls
     state: March
     workspace: Workspace
@@ -78,7 +93,7 @@ class NativeRun:
 
     def start(self) -> None:
         """See `Run`."""
-        arguments = (self.problem.system.packed, self.problem.signals, self.tableau, self.controls)
+        arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
         start(*arguments, self.state, self.workspace, self.samples)
 
     def march(self, attempts: int) -> int:
@@ -87,7 +102,7 @@ class NativeRun:
         signals, stops = self.problem.signals, self.problem.stops
         if ahead.size:
             signals, stops = hidden_from(signals, ahead[0]), stops[stops <= ahead[0]]
-        arguments = (self.problem.system.packed, signals, self.tableau, self.controls, stops, attempts)
+        arguments = (self.problem.system.packed, signals, self.scheme, self.controls, stops, attempts)
         code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
         return self._resume() if code == FINISHED and ahead.size else code
 
@@ -121,17 +136,24 @@ class NativeRun:
     def _resume(self) -> int:
         """A first stage with what is given after a jump; energies go on counting from the run's start."""
         kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
-        arguments = (self.problem.system.packed, self.problem.signals, self.tableau, self.controls)
+        arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
         start(*arguments, self.state, self.workspace, empty_samples(np.zeros(0), self.problem.system))
         self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
         return PAUSED
 
 
+def _scheme(options: IntegrationOptions) -> Tableau:
+    if options.description.family == Family.ESDIRK:
+        return TABLEAUX[options.method]
+    return newmark_scheme(newmark_numbers(options.method, options.all_parameters))
+
+
 def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     """Set up a run."""
     system, initial, span = problem.system, problem.initial, problem.span
-    tableau = TR_BDF2
-    state = make_march(system.n, system.m, tableau.c.size, len(system.mechanism.motors))
+    newmark = options.description.family == Family.NEWMARK
+    scheme, treatment = _scheme(options), POSITION if newmark else _TREATMENTS[options.treatment]
+    state = make_march(system.n, system.m, scheme.c.size, len(system.mechanism.motors), treatment)
     state.q[:], state.v[:] = initial.q, initial.v
     state.clock[TIME], state.clock[STEP] = initial.time, min(_FIRST_STEP * span, options.max_step)
     workspace = system.workspace()
@@ -142,13 +164,16 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         memory=_MEMORY * span,
         alpha=options.alpha,
         beta=options.beta,
+        gain=_GAIN if options.automatic_gains else 0.0,
+        treatment=treatment,
+        fixed_step=options.step or 0.0,
         max_step=options.max_step,
         dependent_part=_DEPENDENT_PART,
         dependent_rows=int(factor_system(system.packed, 0.0, initial.q, workspace)),
     )
     return NativeRun(
         problem=problem,
-        tableau=tableau,
+        scheme=scheme,
         controls=controls,
         state=state,
         workspace=workspace,

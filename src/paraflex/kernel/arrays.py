@@ -20,6 +20,13 @@ def copy(x, to):
 
 
 @routine
+def add(x, to):
+    """Add a vector to another."""
+    for i in range(x.size):
+        to[i] += x[i]
+
+
+@routine
 def largest(x):
     """Largest magnitude in a vector; zero for an empty one."""
     size = 0.0

@@ -137,7 +137,7 @@ def apply_axis(p, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f):
 
 
 @kernel
-def apply_axes(p, q, v, a, lam, weight_v, weight_q, torques, f, rows):
+def apply_axes(p, q, v, a, lam, weights, torques, f, rows):
     """Add the rows of all axes and their forces to rows and f, and subtract the forces of motors along them from f."""
     for k in range(p.axes.size):
         axis = p.axes[k]
@@ -148,7 +148,7 @@ def apply_axes(p, q, v, a, lam, weight_v, weight_q, torques, f, rows):
             force = lam[axis.row]
             kind = p.rows[axis.row].kind
             if kind == CONSTRAINT:
-                rows[axis.row] += acceleration + weight_v * rate + weight_q * value
+                rows[axis.row] += weights[0] * acceleration + weights[1] * rate + weights[2] * value
             else:
                 rows[axis.row] += value if kind == SPRING else rate
         apply_axis(p, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f)

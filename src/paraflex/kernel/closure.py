@@ -17,6 +17,7 @@ from paraflex.kernel.joints import (
     marker_motion,
     start_rows,
 )
+from paraflex.kernel.packed import INDEX_1
 
 MAX_ITERATIONS = 20
 # Newton has converged when no coordinate moves by more than this [m, rad].
@@ -161,10 +162,10 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
             for i in range(tasks):
                 basis[k, j, i] = right[j, 1 + i]
         # The part of Phi'' and of the task's acceleration that does not depend on the accelerations.
-        start_rows(p, signals, t, 0.0, 0.0, phi)
+        start_rows(p, signals, t, INDEX_1, phi)
         for i in range(p.bodies.size):
-            body_joints(p, i, q[k], v[k], zero, lam, 0.0, 0.0, unused, phi)
-        apply_axes(p, q[k], v[k], zero, lam, 0.0, 0.0, idle, unused, phi)
+            body_joints(p, i, q[k], v[k], zero, lam, INDEX_1, unused, phi)
+        apply_axes(p, q[k], v[k], zero, lam, INDEX_1, idle, unused, phi)
         here = task_values(p, marker, coordinates, q[k], v[k], zero)
         for r in range(m):
             single[r, 0] = -phi[r]

@@ -136,14 +136,15 @@ def apply_torque(p, marker, torque, f):
 
 
 @kernel
-def start_rows(p, signals, t, weight_v, weight_q, rows):
+def start_rows(p, signals, t, weights, rows):
     """Constraint rows before any body: what ground points and prescribed values contribute."""
+    weight_a, weight_v, weight_q = weights
     for r in range(p.rows.size):
         row = p.rows[r]
         rows[r] = weight_q * row.ground
         if row.signal >= 0:
             value, rate, acceleration = evaluate_signal(signals, row.signal, t)
-            rows[r] -= acceleration + weight_v * rate + weight_q * value
+            rows[r] -= weight_a * acceleration + weight_v * rate + weight_q * value
 
 
 @routine
@@ -263,8 +264,9 @@ def load_power(p, q, v):
 
 
 @inlined
-def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
-    """Add body i's part of Phi'' + weight_v Phi' + weight_q Phi to rows, and Phi_q^T lambda to f."""
+def body_joints(p, i, q, v, a, lam, weights, f, rows):
+    """Add body i's part of the weighted sum of Phi'', Phi' and Phi to rows, and Phi_q^T lambda to f."""
+    weight_a, weight_v, weight_q = weights
     body = p.bodies[i]
     for k in range(body.port, body.port_end):
         port = p.ports[k]
@@ -277,15 +279,15 @@ def body_joints(p, i, q, v, a, lam, weight_v, weight_q, f, rows):
                 rows[r] += sign * marker_angle(p, marker, v)
             else:
                 rows[r] += sign * (
-                    marker_angle(p, marker, a)
+                    weight_a * marker_angle(p, marker, a)
                     + weight_v * marker_angle(p, marker, v)
                     + weight_q * marker_angle(p, marker, q)
                 )
             apply_torque(p, marker, sign * lam[r], f)
         elif port.kind != AXIS:
             px, py, vx, vy, ax, ay, rx, ry = marker_motion(p, marker, q, v, a)
-            rows[r] += sign * (ax + weight_v * vx + weight_q * px)
-            rows[r + 1] += sign * (ay + weight_v * vy + weight_q * py)
+            rows[r] += sign * (weight_a * ax + weight_v * vx + weight_q * px)
+            rows[r + 1] += sign * (weight_a * ay + weight_v * vy + weight_q * py)
             apply_force(p, marker, q, sign * lam[r], sign * lam[r + 1], rx, ry, f)
 
 

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from paraflex.kernel.arrays import copy
+from math import ceil
+
+from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import factor_bodies, orient, right_hand_side, solve_system
+from paraflex.kernel.packed import INDEX_1
+from paraflex.kernel.projection import project
 from paraflex.kernel.run_state import (
     AGE,
     BALANCE,
+    BAUMGARTE,
     DPHI_MAX,
     ENERGY_0,
     ERROR_TEST,
-    FACTOR_G,
+    FACTOR_B,
     FAILURES,
     FINISHED,
+    LAST_STEP,
     PAUSED,
     PHI_MAX,
+    PROJECTION,
     REJECTED,
     SAMPLE,
     STEP,
@@ -67,18 +74,39 @@ def write_samples(p, tableau, t, h, m, ws, out):
                 m.stage_q[s0, j], m.stage_v[s0, j], m.stage_a[1, s0, j],
                 m.stage_q[s1, j], m.stage_v[s1, j], m.stage_a[1, s1, j], width, x,
             )  # fmt: skip
-        for r in range(m.stage_lam.shape[1]):
-            out.lam[i, r] = (1.0 - x) * m.stage_lam[s0, r] + x * m.stage_lam[s1, r]
+        interpolate_multipliers(tableau, (time - t) / h, m, out.lam[i])
         out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i], ws.points)
         out.energy[i, 1] += spring_energy(p, out.lam[i]) + line_energy(p, out.q[i], out.v[i])[0]
-        # Work by the trapezoidal rule within the step: the sum over whole steps is the scheme's own quadrature.
-        done = (time - t) / h
-        out.energy[i, 2] = m.clock[WORK] + h * done * (
-            (1.0 - 0.5 * done) * m.power[0] + 0.5 * done * m.power[m.power.size - 1]
-        )
+        # Within the step by the cubic with the power at its ends; over the whole step by the scheme's own quadrature.
+        done, last = min(max((time - t) / h, 0.0), 1.0), m.power.size - 1
+        left = 1.0 - done
+        out.energy[i, 2] = m.clock[WORK] + done * done * (3.0 - 2.0 * done) * step_work(tableau, h, m)
+        out.energy[i, 2] += h * done * left * (left * m.power[0] - done * m.power[last])
         out.energy[i, 2] += weight_work(p, out.q[i], ws.points) - m.clock[WEIGHT_0]
         i += 1
     m.counts[SAMPLE] = i
+
+
+@routine
+def step_work(tableau, h, m):
+    """Work done in the step, by the scheme's own quadrature."""
+    last, work = tableau.c.size - 1, 0.0
+    for s in range(last + 1):
+        work += h * tableau.A[last, s] * m.power[s]
+    return work
+
+
+@routine
+def interpolate_multipliers(tableau, x, m, lam):
+    """Multipliers at fraction x of the step: the polynomial through those at the nodes."""
+    fill(lam, 0.0)
+    for k in tableau.nodes:
+        weight = 1.0
+        for l in tableau.nodes:
+            if l != k:
+                weight *= (x - tableau.c[l]) / (tableau.c[k] - tableau.c[l])
+        for r in range(lam.size):
+            lam[r] += weight * m.stage_lam[k, r]
 
 
 @routine
@@ -88,16 +116,17 @@ def first_stage(p, signals, t, controls, m, ws):
     note_friction(p, m.q, m.v, ws.mu, ws.compliance)
     factor_bodies(p, 0.0, m.q, ws)
     orient(p, m.q, ws, controls.dependent_part)
-    m.clock[FACTOR_G] = -1.0
+    weights = INDEX_1
+    if controls.treatment == BAUMGARTE and controls.gain == 0.0:
+        weights = (1.0, 2.0 * controls.alpha, controls.beta * controls.beta)
+    m.clock[FACTOR_B] = -1.0
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
     for _ in range(2):
-        equations(p, signals, t, controls.alpha, controls.beta, m.q, m.v, a, lam, m.torques, ws)
+        equations(p, signals, t, weights, m.q, m.v, a, lam, m.torques, ws)
         right_hand_side(p, ws, 1.0)
         solve_system(p, ws, ws.x, ws.mu)
-        for j in range(a.size):
-            a[j] += ws.x[j]
-        for r in range(lam.size):
-            lam[r] += ws.mu[r]
+        add(ws.x, a)
+        add(ws.mu, lam)
 
 
 @kernel
@@ -109,6 +138,9 @@ def start(p, signals, tableau, controls, m, ws, out):
     m.stage_t[1, 0] = t
     copy(m.q, m.stage_q[0])
     copy(m.v, m.stage_v[0])
+    copy(m.v, m.stage_d[0])
+    copy(a, m.algorithmic[0])
+    m.clock[LAST_STEP] = 0.0
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques, ws)
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
     strain += spring_energy(p, lam) + line_energy(p, m.q, m.v)[0]
@@ -134,20 +166,24 @@ def note_constraints(p, signals, t, m, ws):
 
 
 @routine
-def accept(p, signals, tableau, t, h, m, ws, out):
+def accept(p, signals, tableau, controls, t, h, m, ws, out):
     """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1
+    if controls.treatment == PROJECTION:
+        project(p, signals, t + h, m.stage_q[last], m.stage_v[last], ws)
     write_samples(p, tableau, t, h, m, ws, out)
     copy(m.stage_q[last], m.q)
     copy(m.stage_v[last], m.v)
-    for s in range(last + 1):
-        m.clock[WORK] += h * tableau.A[last, s] * m.power[s]
+    m.clock[WORK] += step_work(tableau, h, m)
+    m.clock[LAST_STEP] = h
     copy(m.stage_t[1], m.stage_t[0])
     for s in range(last + 1):
         copy(m.stage_a[1, s], m.stage_a[0, s])
     m.stage_t[1, 0] = t + h
     copy(m.q, m.stage_q[0])
     copy(m.v, m.stage_v[0])
+    copy(m.stage_d[last], m.stage_d[0])
+    copy(m.algorithmic[1], m.algorithmic[0])
     copy(m.stage_a[0, last], m.stage_a[1, 0])
     copy(m.stage_lam[last], m.stage_lam[0])
     m.power[0] = m.power[last]
@@ -182,15 +218,20 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
         left = stops[m.counts[STOP]] - t
         h = min(m.clock[STEP], controls.max_step)
         landing = False
+        if controls.fixed_step > 0.0:
+            # Stretches between stops are divided evenly.
+            h = left / max(1.0, ceil(left / controls.fixed_step - 1e-6))
         if left <= h * (1.0 + 1e-9):
             h, landing = left, True
-        elif left < 2.0 * h:
+        elif left < 2.0 * h and controls.fixed_step == 0.0:
             h = 0.5 * left
         cause, error = attempt(p, signals, tableau, controls, t, h, m, ws, slow)
         if cause == PAUSED and error <= 1.0:
             after_failure = m.counts[FAILURES] > 0
-            accept(p, signals, tableau, t, h, m, ws, out)
+            accept(p, signals, tableau, controls, t, h, m, ws, out)
             m.clock[TIME] = stops[m.counts[STOP]] if landing else t + h
+            if controls.fixed_step > 0.0:
+                continue
             factor = min(MAX_FACTOR, SAFETY * (1.0 / max(error, 1e-12)) ** exponent)
             # Keep the step, and with it the factor, unless the change is worth it; a step cut short to land on a stop
             # says nothing about longer ones.
@@ -198,6 +239,8 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
                 m.clock[STEP] = factor * h
             continue
         m.counts[REJECTED] += 1
+        if controls.fixed_step > 0.0:
+            return cause
         if m.counts[FAILURES] == 1:
             # The first stage is the last step's last, with the error its longer step could bear: not so a shorter one.
             first_stage(p, signals, t, controls, m, ws)

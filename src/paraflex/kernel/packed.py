@@ -20,6 +20,8 @@ NX, NY, SLOPE = range(3)
 POINT, ANGLE, AXIS = range(3)
 # Kinds of row: Phi = 0, or a multiplier that is the torque or force of a spring, of a damper or of dry friction.
 CONSTRAINT, SPRING, DAMPER, FRICTION = range(4)
+# Weights of Phi'', Phi' and Phi: constraints on accelerations, without Baumgarte's terms.
+INDEX_1 = (1.0, 0.0, 0.0)
 # Rows of Workspace.flex: M_phif, 1/(1 + b omega^2), and B D^-1 of the three rigid rows.
 MPF, DINV, YX, YY, YP = range(5)
 

@@ -12,19 +12,30 @@ MOST_PASSAGES = 1000
 # Why `march` returned.
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # March.clock
-TIME, STEP, WORK, FACTOR_G, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX = range(10)
+TIME, STEP, WORK, FACTOR_B, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP = range(11)
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES, PASSAGES = range(9)
 
 
+# What keeps the constraints, as integers for kernels; index 3 is POSITION.
+BAUMGARTE, PROJECTION, GGL, POSITION = range(4)
+# Entries of Tableau.newmark.
+ALPHA_M, ALPHA_F, BETA, GAMMA, THETA = range(5)
+
+
 class Tableau(NamedTuple):
-    """An ESDIRK scheme: A, c, the difference b - b^ of the embedded formula, and where dense output may join."""
+    """A scheme: of the ESDIRK family A, c and what else Runge-Kutta methods have; of the Newmark family its numbers.
+
+    A scheme of the Newmark family has the A and c of the trapezoidal rule, by which energy is counted.
+    """
 
     A: NDArray[np.float64]
     c: NDArray[np.float64]
-    error: NDArray[np.float64]
+    error: NDArray[np.float64]  # b - b^ of the embedded formula; empty where the error is estimated from the last step
     dense: NDArray[np.int64]  # stages accurate enough to interpolate between, first and last among them
-    order: int
+    nodes: NDArray[np.int64]  # stages through which multipliers are interpolated, ascending in time
+    order: int  # of the error estimate
+    newmark: NDArray[np.float64]  # alpha_m, alpha_f, beta, gamma, theta; empty for ESDIRK
 
 
 class Controls(NamedTuple):
@@ -40,7 +51,10 @@ class Controls(NamedTuple):
     memory: float  # how long a velocity error of a step does, where no vibration turns it round [s]
     alpha: float
     beta: float
+    gain: float  # where positive alpha and beta are this over the step
+    treatment: int
     max_step: float
+    fixed_step: float  # zero where steps are chosen by their errors
     dependent_rows: int
     dependent_part: float  # a row with less than this of its diagonal left when others are eliminated depends on them
 
@@ -55,6 +69,8 @@ class March(NamedTuple):
     stage_t: NDArray[np.float64]  # (2, stages): of the last accepted step and of this one
     stage_q: NDArray[np.float64]  # (stages, n)
     stage_v: NDArray[np.float64]
+    stage_d: NDArray[np.float64]  # q' at the stages: stage_v itself, but for stabilised index 2
+    shift: NDArray[np.float64]  # (n,) of stabilised index 2, else empty
     stage_a: NDArray[np.float64]  # (2, stages, n)
     stage_lam: NDArray[np.float64]  # (stages, m)
     power: NDArray[np.float64]  # (stages,)
@@ -63,6 +79,9 @@ class March(NamedTuple):
     eq: NDArray[np.float64]
     ev: NDArray[np.float64]
     torques: NDArray[np.float64]
+    algorithmic: NDArray[
+        np.float64
+    ]  # (2, n) acceleration that the Newmark family carries, of the last step and of this
     passages: NDArray[np.float64]  # (2, MOST_PASSAGES) from when to when more rows were dependent than at the start
     guess_t: NDArray[np.float64]  # (3,) times of the stages a guess is extrapolated from
     guess_s: NDArray[np.int64]  # (3, 2) and where they stand in stage_a
@@ -79,16 +98,19 @@ class Samples(NamedTuple):
     energy: NDArray[np.float64]  # (times, 3): kinetic, strain, work done by motors and prescribed motion
 
 
-def make_march(n: int, m: int, stages: int, motors: int) -> March:
+def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGARTE) -> March:
     """Allocate the state of a run with n coordinates and m constraint rows."""
+    stage_v = np.zeros((stages, n))
     return March(
-        clock=np.zeros(10),
+        clock=np.zeros(11),
         counts=np.zeros(9, dtype=np.int64),
         q=np.zeros(n),
         v=np.zeros(n),
         stage_t=np.zeros((2, stages)),
         stage_q=np.zeros((stages, n)),
-        stage_v=np.zeros((stages, n)),
+        stage_v=stage_v,
+        stage_d=np.zeros((stages, n)) if treatment == GGL else stage_v,
+        shift=np.zeros(n if treatment == GGL else 0),
         stage_a=np.zeros((2, stages, n)),
         stage_lam=np.zeros((stages, m)),
         power=np.zeros(stages),
@@ -97,6 +119,7 @@ def make_march(n: int, m: int, stages: int, motors: int) -> March:
         eq=np.zeros(n),
         ev=np.zeros(n),
         torques=np.zeros(motors),
+        algorithmic=np.zeros((2, n)),
         passages=np.zeros((2, MOST_PASSAGES)),
         guess_t=np.zeros(3),
         guess_s=np.zeros((3, 2), dtype=np.int64),

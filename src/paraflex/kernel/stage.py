@@ -1,22 +1,25 @@
-"""The implicit stage solver: index-1 equations with Baumgarte terms, solved for accelerations and multipliers.
+"""The implicit stage solver: equations of motion and constraints, solved for accelerations and multipliers.
 
 With q = q* + b a and v = v* + g a the unknowns of a stage are a and lambda,
 
     M a + h + K q + Phi_q^T lambda - F = 0
-    Phi'' + 2 alpha Phi' + beta^2 Phi = 0
+    w_a Phi'' + w_v Phi' + w_q Phi = 0
 
-(Eqs. 56-57). DIRK schemes have g = d h and b = g^2; other schemes have other numbers, one solver serves all. The
-iteration matrix is [M + b K, Phi_q^T; Phi_q, 0]: gyroscopic terms are dropped, and the constraint row is divided by
-1 + 2 alpha g + beta^2 b, which makes it symmetric.
+Weights (1, 2 alpha, beta^2) make the second line Baumgarte's (Eqs. 56-57, index 1), (0, 1, 0) that of index 2 and
+(0, 0, 1) that of index 3. DIRK schemes have g = d h and b = g^2, the Newmark family other numbers; one solver serves
+all. The iteration matrix is [M + b K, Phi_q^T; Phi_q, 0]: gyroscopic terms are dropped, and the constraint row is
+divided by w_a + w_v g + w_q b, which makes it symmetric and keeps it well conditioned however small the step.
 """
 
 from __future__ import annotations
 
 from math import isfinite
 
+from paraflex.kernel.arrays import add
 from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.bodies import body_terms
-from paraflex.kernel.compiling import kernel, routine
+from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.joints import (
     apply_lines,
     apply_loads,
@@ -27,6 +30,7 @@ from paraflex.kernel.joints import (
     start_rows,
 )
 from paraflex.kernel.linear import mass_norm, right_hand_side, solve_system
+from paraflex.kernel.projection import least_change
 from paraflex.kernel.signals import evaluate_signal
 
 MAX_ITERATIONS = 8
@@ -38,31 +42,36 @@ AGEING = 1.05
 
 
 @kernel
-def equations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
-    """Residuals of the equations of motion (ws.f) and of the constraints (ws.rows) at one instant."""
-    weight_v, weight_q = 2.0 * alpha, beta * beta
+def equations(p, signals, t, weights, q, v, a, lam, torques, ws):
+    """Residuals of the equations of motion (ws.f) and of the constraints (ws.rows) at one instant.
+
+    The latter are w_a Phi'' + w_v Phi' + w_q Phi for weights (w_a, w_v, w_q).
+    """
     for k in range(torques.size):
         torques[k] = evaluate_signal(signals, k, t)[0]
-    start_rows(p, signals, t, weight_v, weight_q, ws.rows)
+    start_rows(p, signals, t, weights, ws.rows)
     start_compliant_rows(p, lam, ws.rows)
     for i in range(p.bodies.size):
         body_terms(p, i, q, v, a, ws.f, ws.points)
-        body_joints(p, i, q, v, a, lam, weight_v, weight_q, ws.f, ws.rows)
+        body_joints(p, i, q, v, a, lam, weights, ws.f, ws.rows)
         body_efforts(p, i, torques, ws.f)
-    apply_axes(p, q, v, a, lam, weight_v, weight_q, torques, ws.f, ws.rows)
+    apply_axes(p, q, v, a, lam, weights, torques, ws.f, ws.rows)
     finish_friction(p, lam, ws.compliance, ws.rows)
     apply_loads(p, q, ws.f)
     apply_lines(p, q, v, ws.f)
 
 
 @routine
-def solve_stage(p, signals, t, g, b, alpha, beta, qs, vs, a, lam, torques, tolerance, time_scale, rate, ws):
+def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, tolerance, time_scale, rate, ws):
     """Newton iteration for one stage; a and lam are starting guesses and then the solution.
 
     Parameters
     ----------
     qs, vs : (n,) arrays
         The explicit parts q*, v*.
+    shift : (n,) array
+        Of stabilised index 2 (Gear, Gupta and Leimkuhler): what q takes besides, such that Phi = 0 as well; a guess
+        and then the solution. Empty for all else.
     tolerance : float
         Largest error left in q, in the mass norm; in v it is tolerance / time_scale.
     rate : float
@@ -73,20 +82,22 @@ def solve_stage(p, signals, t, g, b, alpha, beta, qs, vs, a, lam, torques, toler
     status, iterations, rate
         ws.q and ws.v hold the stage's q and v.
     """
-    scale = 1.0 / (1.0 + 2.0 * alpha * g + beta * beta * b)
+    scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     previous = 0.0
     for iteration in range(1, MAX_ITERATIONS + 1):
-        for j in range(a.size):
-            ws.q[j] = qs[j] + b * a[j]
-            ws.v[j] = vs[j] + g * a[j]
-        equations(p, signals, t, alpha, beta, ws.q, ws.v, a, lam, torques, ws)
+        place(qs, vs, g, b, a, shift, ws)
+        equations(p, signals, t, weights, ws.q, ws.v, a, lam, torques, ws)
         right_hand_side(p, ws, scale)
         solve_system(p, ws, ws.x, ws.mu)
-        for j in range(a.size):
-            a[j] += ws.x[j]
-        for r in range(lam.size):
-            lam[r] += ws.mu[r]
+        add(ws.x, a)
+        add(ws.mu, lam)
         change = mass_norm(p, ws, ws.x) * max(b, g * time_scale)
+        if shift.size > 0:
+            place(qs, vs, g, b, a, shift, ws)
+            constraint_values(p, signals, t, ws.q, ws.v, ws.rows, ws.mu)
+            least_change(p, ws.rows, ws)
+            add(ws.x, shift)
+            change = max(change, mass_norm(p, ws, ws.x))
         if not isfinite(change):
             return DIVERGED, iteration, rate
         if iteration > 1:
@@ -96,9 +107,17 @@ def solve_stage(p, signals, t, g, b, alpha, beta, qs, vs, a, lam, torques, toler
         else:
             rate = min(WORST_RATE, AGEING * rate)
         if change * rate <= tolerance * (1.0 - min(rate, WORST_RATE)):
-            for j in range(a.size):
-                ws.q[j] = qs[j] + b * a[j]
-                ws.v[j] = vs[j] + g * a[j]
+            place(qs, vs, g, b, a, shift, ws)
             return CONVERGED, iteration, rate
         previous = change
     return DIVERGED, MAX_ITERATIONS, rate
+
+
+@inlined
+def place(qs, vs, g, b, a, shift, ws):
+    """Q and v of a stage into ws.q and ws.v."""
+    for j in range(a.size):
+        ws.q[j] = qs[j] + b * a[j]
+        ws.v[j] = vs[j] + g * a[j]
+    for j in range(shift.size):
+        ws.q[j] += shift[j]

@@ -1,9 +1,8 @@
-"""One step of an ESDIRK scheme: its stages and the error estimate. A tableau is data.
+"""One step: its stages and its error, of a scheme that is data.
 
 A diagonally implicit scheme with explicit first stage and stiffly accurate last one: stage i stands at
 q_i = q_n + h sum_j A_ij v_j and v_i = v_n + h sum_j A_ij a_j, its own v_i and a_i among them, and the last stage is
-the new step's first. The error estimate is filtered through the iteration matrix (Hosea and Shampine 1996): without
-that an undamped axial mode would dictate the step.
+the new step's first. The Newmark family takes its one stage from `kernel.newmark`.
 """
 
 from __future__ import annotations
@@ -12,41 +11,35 @@ from math import isfinite
 
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.axes import axis_power
-from paraflex.kernel.bending import note_all_axial_forces, subtract_geometric
+from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import dissipated_power, note_friction
+from paraflex.kernel.error import embedded_error, filtered_error, history_error
 from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
-from paraflex.kernel.linear import (
-    factor_bodies,
-    factor_system,
-    jacobian_times,
-    mass_norm,
-    mass_times,
-    orient,
-    solve_system,
-    to_body_frame,
-    to_ground_frame,
-)
-from paraflex.kernel.packed import OMEGA2
+from paraflex.kernel.linear import factor_bodies, orient
+from paraflex.kernel.newmark import newmark_end, newmark_start
+from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
     AGE,
-    FACTOR_G,
+    FACTOR_B,
     FACTORS,
+    GGL,
     ITERATIONS,
     NO_CONVERGENCE,
     NOT_FINITE,
     PASSAGES,
     PAUSED,
+    POSITION,
+    PROJECTION,
     RATE,
-    STEPS,
 )
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.stage import CONVERGED, WORST_RATE, solve_stage
 
 # A stage that takes more iterations than this asks for a new factor, once the old one has served a few steps.
 ENOUGH_ITERATIONS, SERVED = 2, 5
-# Steps after which the factor that filters velocity errors is renewed; it serves a norm, so an old one will do.
-SLOW_AGE = 25
+# Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
+SAME_TIME = 1e-6
 
 
 @routine
@@ -65,97 +58,39 @@ def input_power(p, signals, t, q, v, lam, torques, ws):
 
 
 @routine
-def predict(tableau, i, t, h, m):
-    """Starting guess for stage i: the accelerations of the last three stages, extrapolated."""
-    stages = tableau.c.size
+def predict(i, t, h, m):
+    """Starting guess for stage i at time t: the accelerations of the last three stages, extrapolated."""
+    stages = m.stage_v.shape[0]
     a, times, rows = m.stage_a[1, i], m.guess_t, m.guess_s
     found = 0
-    for j in range(i - 1, -1, -1):
-        if found < 3:
-            times[found], rows[found, 0], rows[found, 1] = m.stage_t[1, j], 1, j
+    # This step's stages, the latest first, then the last step's.
+    for k in range(i + stages):
+        step, j = (1, i - 1 - k) if k < i else (0, stages - 1 - (k - i))
+        distinct = found < 3
+        for l in range(found):
+            if abs(m.stage_t[step, j] - times[l]) < SAME_TIME * h:
+                distinct = False
+        if distinct:
+            times[found], rows[found, 0], rows[found, 1] = m.stage_t[step, j], step, j
             found += 1
-    if m.counts[STEPS] > 0:
-        for j in range(stages - 2, -1, -1):
-            if found < 3:
-                times[found], rows[found, 0], rows[found, 1] = m.stage_t[0, j], 0, j
-                found += 1
-    x = t + tableau.c[i] * h
     fill(a, 0.0)
     for k in range(found):
         weight = 1.0
         for l in range(found):
             if l != k:
-                weight *= (x - times[l]) / (times[k] - times[l])
+                weight *= (t - times[l]) / (times[k] - times[l])
         source = m.stage_a[rows[k, 0], rows[k, 1]]
         for j in range(a.size):
             a[j] += weight * source[j]
 
 
 @routine
-def filtered_error(p, tableau, h, controls, m, ws, slow):
-    """Error of the step in the mass norm, in position and by what its velocity error does later: (metres, metres).
-
-    The velocity error is filtered once more, as if by a step as long as `memory`: what is left of it is the part that
-    no elastic force turns round, and that moves the mechanism by memory times its size before the run ends.
-
-    With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
-    (M + g D + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
-    for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2.
-    """
-    stages = tableau.c.size
-    g = tableau.A[stages - 1, stages - 1] * h
-    for j in range(m.q.size):
-        m.eq[j] = 0.0
-        m.ev[j] = 0.0
-    for s in range(stages):
-        weight = h * tableau.error[s]
-        for j in range(m.q.size):
-            m.eq[j] += weight * m.stage_v[s, j]
-            m.ev[j] += weight * m.stage_a[1, s, j]
-    filter_error(p, g, controls, m.eq, m.ev, ws)
-    for j in range(m.q.size):
-        m.eq[j] += g * ws.x[j]
-    position = mass_norm(p, ws, m.eq)
-    if m.counts[STEPS] % SLOW_AGE == 0:
-        note_friction(p, m.q, m.v, slow.mu, slow.compliance)
-        factor_system(p, controls.memory * controls.memory, m.q, slow)
-    for j in range(m.q.size):
-        m.eq[j] = 0.0
-        m.ev[j] = ws.x[j]
-    filter_error(p, controls.memory, controls, m.eq, m.ev, slow)
-    return position, controls.memory * mass_norm(p, slow, slow.x)
-
-
-@routine
-def filter_error(p, g, controls, eq, ev, ws):
-    """eps_v of (1 - g J) eps = (e_q, e_v) into ws.x, with the factor in ws made for b = g^2."""
-    scale = 1.0 + 2.0 * controls.alpha * g + controls.beta * controls.beta * g * g
-    for j in range(eq.size):
-        ws.x[j] = ev[j]
-        ws.f[j] = eq[j]
-    fill(ws.mu, 0.0)
-    for i in range(p.bodies.size):
-        body = p.bodies[i]
-        to_body_frame(p, i, ws, ws.x)
-        to_body_frame(p, i, ws, ws.f)
-        jacobian_times(p, i, ws, ws.x, 1.0 / scale, 0.0, 0.0, ws.mu)
-        jacobian_times(p, i, ws, ws.f, -controls.beta * controls.beta * g / scale, -1.0 / g, 0.0, ws.mu)
-        mass_times(p, i, ws, ws.mass, ws.x)
-        e = body.offset + 3
-        for j in range(body.nf):
-            ws.x[e + j] -= g * p.modal[OMEGA2, body.flex + j] * eq[e + j]
-        subtract_geometric(p, i, ws.geometric, g, eq, ws.x)
-        to_ground_frame(p, i, ws, ws.x)
-    solve_system(p, ws, ws.x, ws.mu)
-
-
-@routine
-def renew_factor(p, g, m, ws):
-    """Factor the bodies for stages of this g at the present deformation."""
+def renew_factor(p, b, m, ws):
+    """Factor the bodies for stages of this b at the present deformation."""
     note_all_axial_forces(p, m.q, m.v, m.stage_a[1, 0], m.stage_lam[0], ws, ws.geometric)
-    factor_bodies(p, g * g, m.q, ws)
+    factor_bodies(p, b, m.q, ws)
     m.counts[FACTORS] += 1
-    m.clock[FACTOR_G], m.clock[RATE], m.counts[AGE] = g, WORST_RATE, 0
+    m.clock[FACTOR_B], m.clock[RATE], m.counts[AGE] = b, WORST_RATE, 0
 
 
 @routine
@@ -172,6 +107,38 @@ def note_passage(t, h, m):
 
 
 @routine
+def stage_start(tableau, i, t, h, m):
+    """Explicit parts of stage i into m.qs and m.vs; its time, g and b."""
+    g = tableau.A[i, i] * h
+    for j in range(m.q.size):
+        m.vs[j] = m.v[j]
+        m.qs[j] = m.q[j]
+    for s in range(i):
+        weight = h * tableau.A[i, s]
+        for j in range(m.q.size):
+            m.vs[j] += weight * m.stage_a[1, s, j]
+            m.qs[j] += weight * m.stage_d[s, j]
+    for j in range(m.q.size):
+        m.qs[j] += g * m.vs[j]
+    return t + tableau.c[i] * h, g, g * g
+
+
+@routine
+def constraint_weights(controls, h):
+    """Weights of Phi'', Phi' and Phi in the stage equations, and the `rates` of `filtered_error`."""
+    if controls.treatment == POSITION:
+        return (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+    if controls.treatment == GGL:
+        return (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)
+    alpha, beta = controls.alpha, controls.beta
+    if controls.gain > 0.0:
+        alpha = beta = controls.gain / h
+    if controls.treatment == PROJECTION:
+        return INDEX_1, (0.0, 0.0, 0.0)
+    return (1.0, 2.0 * alpha, beta * beta), (1.0, alpha, beta)
+
+
+@routine
 def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     """One step from t: all stages and the error estimate, relative to what is allowed.
 
@@ -180,12 +147,14 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     cause, error
         cause is PAUSED where the stages were solved.
     """
-    stages = tableau.c.size
-    g = tableau.A[stages - 1, stages - 1] * h
-    b = g * g
-    fresh = m.clock[FACTOR_G] != g
+    stages, one_stage = tableau.c.size, tableau.newmark.size > 0
+    weights, rates = constraint_weights(controls, h)
+    x, g, b = t, tableau.A[1, 1] * h, (tableau.A[1, 1] * h) ** 2
+    if one_stage:
+        x, g, b = newmark_start(tableau.newmark, t, h, m)
+    fresh = m.clock[FACTOR_B] != b
     if fresh:
-        renew_factor(p, g, m, ws)
+        renew_factor(p, b, m, ws)
     note_friction(p, m.q, m.v, ws.mu, ws.compliance)
     # Rows that depend on others here keep their multipliers: so a singular position is passed.
     if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
@@ -194,22 +163,15 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     slowest = 0
     i = 1
     while i < stages:
-        for j in range(m.q.size):
-            m.vs[j] = m.v[j]
-            m.qs[j] = m.q[j]
-        for s in range(i):
-            weight = h * tableau.A[i, s]
-            for j in range(m.q.size):
-                m.vs[j] += weight * m.stage_a[1, s, j]
-                m.qs[j] += weight * m.stage_v[s, j]
-        for j in range(m.q.size):
-            m.qs[j] += g * m.vs[j]
+        if not one_stage:
+            x, g, b = stage_start(tableau, i, t, h, m)
         m.stage_t[1, i] = t + tableau.c[i] * h
-        predict(tableau, i, t, h, m)
+        predict(i, x, h, m)
         copy(m.stage_lam[i - 1], m.stage_lam[i])
+        fill(m.shift, 0.0)
         status, iterations, rate = solve_stage(
-            p, signals, m.stage_t[1, i], g, b, controls.alpha, controls.beta, m.qs, m.vs,
-            m.stage_a[1, i], m.stage_lam[i], m.torques, tolerance, controls.newton_memory, m.clock[RATE], ws,
+            p, signals, x, g, b, weights, m.qs, m.vs, m.stage_a[1, i], m.stage_lam[i], m.shift,
+            m.torques, tolerance, controls.newton_memory, m.clock[RATE], ws,
         )  # fmt: skip
         m.counts[ITERATIONS] += iterations
         m.clock[RATE] = rate
@@ -217,19 +179,30 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
             if fresh:
                 return NO_CONVERGENCE, 0.0
             # An old factor may be to blame: once more with a new one before the step is cut.
-            renew_factor(p, g, m, ws)
+            renew_factor(p, b, m, ws)
             orient(p, m.q, ws, controls.dependent_part)
             fresh = True
             continue
         slowest = max(slowest, iterations)
+        if one_stage:
+            newmark_end(p, signals, tableau.newmark, controls.fixed_step == 0.0, t, h, m, ws)
         copy(ws.q, m.stage_q[i])
         copy(ws.v, m.stage_v[i])
+        if m.shift.size > 0:
+            for j in range(m.q.size):
+                m.stage_d[i, j] = ws.v[j] + m.shift[j] / g
         m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques, ws)
         i += 1
-    error_q, error_v = filtered_error(p, tableau, h, controls, m, ws, slow)
     if slowest > ENOUGH_ITERATIONS and m.counts[AGE] >= SERVED:
-        m.clock[FACTOR_G] = -1.0
-    error = max(error_q, error_v) / (controls.rate * h)
+        m.clock[FACTOR_B] = -1.0
+    error = 0.0
+    if controls.fixed_step == 0.0:
+        if tableau.error.size > 0:
+            embedded_error(tableau, h, m)
+        else:
+            history_error(h, m)
+        error_q, error_v = filtered_error(p, b**0.5, rates, controls.memory, m, ws, slow)
+        error = max(error_q, error_v) / (controls.rate * h)
     if not isfinite(error):
         return NOT_FINITE, 0.0
     return PAUSED, error

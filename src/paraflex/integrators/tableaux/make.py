@@ -1,0 +1,55 @@
+"""A tableau from its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from paraflex.kernel.run_state import Tableau
+
+Number = str | float
+
+
+def make_tableau(
+    rows: Sequence[Sequence[Number]],
+    companion: Sequence[Number] = (),
+    *,
+    error_order: int,
+    nodes: Sequence[int],
+    dense: Sequence[int] | None = None,
+) -> Tableau:
+    """A tableau from the lower triangle of A, whose last row is b.
+
+    Parameters
+    ----------
+    rows : sequence of sequences
+        Fractions as strings, or numbers. c is their sums.
+    companion : sequence
+        b^ of the embedded formula; without one the error is estimated from the last step's acceleration.
+    error_order : int
+        The power of h that the error estimated per unit of time falls with.
+    nodes : sequence of int
+        Stages at different times, ascending, through which multipliers are interpolated.
+    dense : sequence of int, optional
+        Stages accurate enough to interpolate q and v between; first and last by default.
+    """
+    stages = len(rows)
+    A = np.zeros((stages, stages))
+    for i, row in enumerate(rows):
+        A[i, : len(row)] = [_value(entry) for entry in row]
+    b_hat = np.array([_value(entry) for entry in companion])
+    return Tableau(
+        A=A,
+        c=A.sum(axis=1),
+        error=A[-1] - b_hat if companion else b_hat,
+        dense=np.array([0, stages - 1] if dense is None else dense),
+        nodes=np.array(nodes),
+        order=error_order,
+        newmark=np.zeros(0),
+    )
+
+
+def _value(entry: Number) -> float:
+    return float(Fraction(entry)) if isinstance(entry, str) else entry

@@ -1,0 +1,108 @@
+"""Error of a step: an estimate, filtered through the iteration matrix, in metres.
+
+Without the filter (Hosea and Shampine 1996) an undamped axial mode would dictate the step.
+"""
+
+from __future__ import annotations
+
+from paraflex.kernel.arrays import fill
+from paraflex.kernel.bending import subtract_geometric
+from paraflex.kernel.compiling import routine
+from paraflex.kernel.constraints import note_friction
+from paraflex.kernel.linear import (
+    factor_system,
+    jacobian_times,
+    mass_norm,
+    mass_times,
+    solve_system,
+    to_body_frame,
+    to_ground_frame,
+)
+from paraflex.kernel.packed import OMEGA2
+from paraflex.kernel.run_state import LAST_STEP, STEPS
+
+# Steps after which the factor that filters velocity errors is renewed; it serves a norm, so an old one will do.
+SLOW_AGE = 25
+
+
+@routine
+def embedded_error(tableau, h, m):
+    """Difference to the embedded formula, in q and v, into m.eq and m.ev."""
+    fill(m.eq, 0.0)
+    fill(m.ev, 0.0)
+    for s in range(tableau.c.size):
+        weight = h * tableau.error[s]
+        for j in range(m.q.size):
+            m.eq[j] += weight * m.stage_d[s, j]
+            m.ev[j] += weight * m.stage_a[1, s, j]
+
+
+@routine
+def history_error(h, m):
+    """Difference to formulas of higher order through the last step's acceleration, into m.eq and m.ev.
+
+    For v the integral of the parabola through the accelerations at t - h_0, t and t + h, for q that of the cubic with
+    the velocities and accelerations at t and t + h.
+    """
+    h0 = m.clock[LAST_STEP]
+    if h0 > 0.0:
+        before, end = -h * h * h / (6.0 * h0 * (h0 + h)), h * (h / 3.0 + 0.5 * h0) / (h + h0)
+    else:
+        # Nothing is known of the third derivative: it changes acceleration as much as the second does.
+        before, end = -h / 12.0, 5.0 * h / 12.0
+    middle, last = h - before - end, m.stage_v.shape[0] - 1
+    for j in range(m.q.size):
+        a0, a1 = m.stage_a[1, 0, j], m.stage_a[1, last, j]
+        a_before = m.stage_a[0, 0, j] if h0 > 0.0 else a0
+        m.ev[j] = m.stage_v[last, j] - m.v[j] - before * a_before - middle * a0 - end * a1
+        m.eq[j] = m.stage_q[last, j] - m.q[j] - 0.5 * h * (m.v[j] + m.stage_v[last, j]) - h * h / 12.0 * (a0 - a1)
+
+
+@routine
+def filtered_error(p, g, rates, memory, m, ws, slow):
+    """The estimate in m.eq and m.ev in the mass norm, in position and by what its velocity error does later: metres.
+
+    The velocity error is filtered once more, as if by a step as long as `memory`: what is left of it is the part that
+    no elastic force turns round, and that moves the mechanism by memory times its size before the run ends.
+
+    With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
+    (M + g D + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
+    for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2. Where Phi' = 0 is
+    imposed, and no outcome of integration, Phi_q eps_v = 0. `rates` says which: 1 or 0, and alpha and beta.
+    """
+    filter_error(p, g, rates, m.eq, m.ev, ws)
+    for j in range(m.q.size):
+        m.eq[j] += g * ws.x[j]
+    position = mass_norm(p, ws, m.eq)
+    if m.counts[STEPS] % SLOW_AGE == 0:
+        note_friction(p, m.q, m.v, slow.mu, slow.compliance)
+        factor_system(p, memory * memory, m.q, slow)
+    for j in range(m.q.size):
+        m.eq[j] = 0.0
+        m.ev[j] = ws.x[j]
+    filter_error(p, memory, rates, m.eq, m.ev, slow)
+    return position, memory * mass_norm(p, slow, slow.x)
+
+
+@routine
+def filter_error(p, g, rates, eq, ev, ws):
+    """eps_v of (1 - g J) eps = (e_q, e_v) into ws.x, with the factor in ws made for b = g^2."""
+    of_v, alpha, beta = rates
+    scale = 1.0 + 2.0 * alpha * g + beta * beta * g * g
+    for j in range(eq.size):
+        ws.x[j] = ev[j]
+        ws.f[j] = eq[j]
+    fill(ws.mu, 0.0)
+    for i in range(p.bodies.size):
+        body = p.bodies[i]
+        to_body_frame(p, i, ws, ws.x)
+        to_body_frame(p, i, ws, ws.f)
+        jacobian_times(p, i, ws, ws.x, of_v / scale, 0.0, 0.0, ws.mu)
+        jacobian_times(p, i, ws, ws.f, -beta * beta * g / scale, -1.0 / g, 0.0, ws.mu)
+        mass_times(p, i, ws, ws.mass, ws.x)
+        e = body.offset + 3
+        for j in range(body.nf):
+            ws.x[e + j] -= g * p.modal[OMEGA2, body.flex + j] * eq[e + j]
+        subtract_geometric(p, i, ws.geometric, g, eq, ws.x)
+        to_ground_frame(p, i, ws, ws.x)
+    solve_system(p, ws, ws.x, ws.mu)

@@ -1,0 +1,99 @@
+"""A step of the Newmark family on the index-3 equations, with the algorithmic acceleration carried.
+
+    (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) v_1' + alpha_f v_0'
+    q_1 = q_0 + h v_0 + h^2 ((1/2 - beta) a_0 + beta a_1),    v_1 = v_0 + h ((1 - gamma) a_0 + gamma a_1)
+
+with balance and Phi = 0 at the end of the step (Arnold and Brüls 2007). Newmark's own method has alpha_m = alpha_f = 0,
+that of Hilber, Hughes and Taylor alpha_m = 0. The carried a_0 stands for v' at t + (alpha_m - alpha_f) h: where h
+changes it moves along. Wilson's method takes acceleration as linear up to t + theta h, has balance and Phi = 0 there,
+and what it has at t + h is brought back to the constraints and their two derivatives.
+"""
+
+from __future__ import annotations
+
+from paraflex.kernel.arrays import add, copy
+from paraflex.kernel.compiling import routine
+from paraflex.kernel.packed import CONSTRAINT, INDEX_1
+from paraflex.kernel.projection import least_change, project
+from paraflex.kernel.run_state import ALPHA_F, ALPHA_M, BETA, GAMMA, LAST_STEP, THETA
+from paraflex.kernel.stage import equations
+
+
+@routine
+def newmark_start(numbers, t, h, m):
+    """Explicit parts of the stage into m.qs and m.vs; its time, g and b of q = q* + b v', v = v* + g v'."""
+    a0, theta = m.algorithmic[0], numbers[THETA]
+    if theta > 1.0:
+        h = theta * h
+        for j in range(m.q.size):
+            m.qs[j] = m.q[j] + h * m.v[j] + h * h / 3.0 * a0[j]
+            m.vs[j] = m.v[j] + 0.5 * h * a0[j]
+        return t + h, 0.5 * h, h * h / 6.0
+    alpha_m, alpha_f, beta, gamma = numbers[ALPHA_M], numbers[ALPHA_F], numbers[BETA], numbers[GAMMA]
+    part = (1.0 - alpha_f) / (1.0 - alpha_m)
+    moved = shifted(alpha_m - alpha_f, h, m)
+    for j in range(m.q.size):
+        a = a0[j] + moved * (m.stage_a[1, 0, j] - m.stage_a[0, 0, j])
+        carried = (alpha_f * m.stage_a[1, 0, j] - alpha_m * a) / (1.0 - alpha_m)
+        m.qs[j] = m.q[j] + h * m.v[j] + h * h * ((0.5 - beta) * a + beta * carried)
+        m.vs[j] = m.v[j] + h * ((1.0 - gamma) * a + gamma * carried)
+    return t + h, gamma * h * part, beta * h * h * part
+
+
+@routine
+def shifted(where, h, m):
+    """What of the last step's change of acceleration to add where the step changes from that of the last one."""
+    last = m.clock[LAST_STEP]
+    return where * (h - last) / last if last > 0.0 else 0.0
+
+
+@routine
+def newmark_end(p, signals, numbers, varying, t, h, m, ws):
+    """From the stage to the end of the step: q and v in ws.q and ws.v, the new algorithmic acceleration.
+
+    Where steps vary, and with Wilson's method, velocities and algorithmic accelerations are brought back to their
+    constraints: what a step leaves of Phi' the next one takes back, and if that is shorter, by a larger force.
+    """
+    if numbers[THETA] > 1.0:
+        wilson_end(numbers[THETA], h, m, ws)
+    else:
+        carry(numbers, h, m)
+    if numbers[THETA] > 1.0 or varying:
+        project(p, signals, t + h, ws.q, ws.v, ws)
+        allow_acceleration(p, signals, t + h, m.algorithmic[1], m, ws)
+    if numbers[THETA] > 1.0:
+        copy(m.algorithmic[1], m.stage_a[1, 1])
+
+
+@routine
+def carry(numbers, h, m):
+    """The new algorithmic acceleration from the old one and those of both ends."""
+    a0, a1, start, end = m.algorithmic[0], m.algorithmic[1], m.stage_a[1, 0], m.stage_a[1, 1]
+    alpha_m, alpha_f = numbers[ALPHA_M], numbers[ALPHA_F]
+    moved = shifted(alpha_m - alpha_f, h, m)
+    for j in range(m.q.size):
+        a = a0[j] + moved * (start[j] - m.stage_a[0, 0, j])
+        a1[j] = ((1.0 - alpha_f) * end[j] + alpha_f * start[j] - alpha_m * a) / (1.0 - alpha_m)
+
+
+@routine
+def wilson_end(theta, h, m, ws):
+    """From what was found at t + theta h to t + h, acceleration and multipliers being linear in time."""
+    a0, a1, found = m.algorithmic[0], m.algorithmic[1], m.stage_a[1, 1]
+    for j in range(m.q.size):
+        a1[j] = a0[j] + (found[j] - a0[j]) / theta
+        ws.q[j] = m.q[j] + h * m.v[j] + h * h / 6.0 * (2.0 * a0[j] + a1[j])
+        ws.v[j] = m.v[j] + 0.5 * h * (a0[j] + a1[j])
+    for r in range(m.stage_lam.shape[1]):
+        m.stage_lam[1, r] = m.stage_lam[0, r] + (m.stage_lam[1, r] - m.stage_lam[0, r]) / theta
+
+
+@routine
+def allow_acceleration(p, signals, t, a, m, ws):
+    """Change an acceleration to the nearest one that the constraints allow at ws.q and ws.v."""
+    equations(p, signals, t, INDEX_1, ws.q, ws.v, a, m.stage_lam[1], m.torques, ws)
+    for r in range(ws.rows.size):
+        if p.rows[r].kind != CONSTRAINT:
+            ws.rows[r] = 0.0
+    least_change(p, ws.rows, ws)
+    add(ws.x, a)

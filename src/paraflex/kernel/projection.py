@@ -1,0 +1,41 @@
+"""Back onto the constraints: positions, then velocities, the least change in the metric of the factor.
+
+That metric is M + b K, the mass matrix and the stiffness as a step of g^2 = b feels it (Cuadrado, Cardenal and
+Bayo 1997): with the mass alone a correction would ring in the stiffest modes.
+"""
+
+from __future__ import annotations
+
+from paraflex.kernel.arrays import add, fill, largest
+from paraflex.kernel.compiling import routine
+from paraflex.kernel.constraints import constraint_values
+from paraflex.kernel.linear import solve_system
+
+# Violations this small count as none [m, rad]; the factor is of the step's start, so each pass leaves a small part.
+CLOSED, PASSES = 1e-14, 4
+
+
+@routine
+def project(p, signals, t, q, v, ws):
+    """Change q until Phi = 0, then v until Phi' = 0."""
+    for _ in range(PASSES):
+        constraint_values(p, signals, t, q, v, ws.rows, ws.mu)
+        if largest(ws.rows) <= CLOSED:
+            break
+        least_change(p, ws.rows, ws)
+        add(ws.x, q)
+    for _ in range(PASSES):
+        constraint_values(p, signals, t, q, v, ws.mu, ws.rows)
+        if largest(ws.rows) <= CLOSED:
+            break
+        least_change(p, ws.rows, ws)
+        add(ws.x, v)
+
+
+@routine
+def least_change(p, violation, ws):
+    """The least x with Phi_q x = -violation, into ws.x."""
+    for r in range(violation.size):
+        ws.mu[r] = -violation[r]
+    fill(ws.x, 0.0)
+    solve_system(p, ws, ws.x, ws.mu)
