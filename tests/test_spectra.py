@@ -10,7 +10,17 @@ from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.integrators.spectra import multistep_formula, spectrum, stability, tableau_of, wilson_step
 from paraflex.mechanism import Assembly, Mechanism, PointRef, RevoluteJoint, RigidBody, TorsionalSpring
 
-NATIVE = ("tr-bdf2", "trapezoidal", "esdirk3", "esdirk4", "newmark", "wilson-theta", "hht-alpha", "generalised-alpha")
+NATIVE = (
+    "tr-bdf2",
+    "trapezoidal",
+    "esdirk3",
+    "esdirk4",
+    "esdirk5",
+    "newmark",
+    "wilson-theta",
+    "hht-alpha",
+    "generalised-alpha",
+)
 FREQUENCIES = np.geomspace(1e-2, 1e3, 40)
 
 

@@ -15,15 +15,13 @@ import scipy.integrate
 from numpy.typing import ArrayLike, NDArray
 
 from paraflex.errors import InputError
-from paraflex.integrators.generalised_alpha import GeneralisedAlpha
-from paraflex.integrators.methods import check_parameters, find_method
-from paraflex.integrators.tableaux import TR_BDF2
-from paraflex.kernel.run_state import Tableau
+from paraflex.integrators.methods import Family, check_parameters, find_method
+from paraflex.integrators.newmark import NewmarkNumbers, newmark_numbers
+from paraflex.integrators.tableaux import TABLEAUX
 
 Array = NDArray[Any]
 Roots = NDArray[Any]
 
-_ESDIRK: Mapping[str, Tableau] = {"tr-bdf2": TR_BDF2}
 MULTISTEP = ("ndf", "adams", "bdf", "ida")
 # Of NDF, orders 0 to 5, as SciPy has them: Shampine and Reichelt (1997), Table 1.
 _KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
@@ -119,7 +117,8 @@ def _followed(roots: list[Roots], near: complex) -> Roots:
 
 def _roots(method: str, order: int | None, parameters: Mapping[str, float]) -> Callable[[float], Roots]:
     """The characteristic roots as a function of h omega."""
-    values = check_parameters(find_method(method), parameters)
+    found = find_method(method)
+    values = check_parameters(found, parameters)
     if method in MULTISTEP:
         left, right = multistep_formula(method, order)
         return lambda x: np.roots(left - 1j * x * right)
@@ -127,11 +126,11 @@ def _roots(method: str, order: int | None, parameters: Mapping[str, float]) -> C
         raise InputError(
             f"{method} has one order only", field="order", value=order, remedy=f"leave it out, or take {MULTISTEP}"
         )
-    if method == "wilson-theta":
-        return lambda x: np.linalg.eigvals(wilson_step(x, values["theta"]))
-    if method in _NEWMARK:
-        weights = _NEWMARK[method](values)
-        return lambda x: np.linalg.eigvals(newmark_step(x, weights))
+    if found.family is Family.NEWMARK:
+        numbers = newmark_numbers(method, values)
+        if numbers.theta > 1.0:
+            return lambda x: np.linalg.eigvals(wilson_step(x, numbers.theta))
+        return lambda x: np.linalg.eigvals(newmark_step(x, numbers))
     A, b = tableau_of(method)
     return lambda x: np.array([stability(A, b, 1j * x)])
 
@@ -148,8 +147,8 @@ def tableau_of(method: str) -> tuple[Array, Array]:
         return np.pad(scipy.integrate.RK45.A, ((0, 0), (0, 1))), scipy.integrate.RK45.B
     if method == "radau":
         return _collocation((4.0 - np.sqrt(6.0)) / 10.0, (4.0 + np.sqrt(6.0)) / 10.0, 1.0)
-    if method in _ESDIRK:
-        return _ESDIRK[method].A, _ESDIRK[method].A[-1]
+    if method in TABLEAUX:
+        return TABLEAUX[method].A, TABLEAUX[method].A[-1]
     raise InputError("no tableau", field="method", value=method, remedy="take a Runge-Kutta method")
 
 
@@ -168,36 +167,9 @@ def _collocation(*nodes: float) -> tuple[Array, Array]:
     return A, A[-1]
 
 
-@dataclass(frozen=True)
-class NewmarkWeights:
-    """Of Newmark's formulas and of the algorithmic acceleration: see `generalised_alpha.GeneralisedAlpha`."""
-
-    beta: float
-    gamma: float
-    alpha_m: float = 0.0
-    alpha_f: float = 0.0
-
-
-def _hht(parameters: Mapping[str, float]) -> NewmarkWeights:
-    alpha = parameters["alpha"]
-    return NewmarkWeights(beta=0.25 * (1.0 - alpha) ** 2, gamma=0.5 - alpha, alpha_f=-alpha)
-
-
-def _generalised(parameters: Mapping[str, float]) -> NewmarkWeights:
-    scheme = GeneralisedAlpha(step=1.0, spectral_radius=parameters["spectral_radius"])
-    return NewmarkWeights(scheme.beta, scheme.gamma, scheme.alpha_m, scheme.alpha_f)
-
-
-_NEWMARK: Mapping[str, Callable[[Mapping[str, float]], NewmarkWeights]] = {
-    "newmark": lambda parameters: NewmarkWeights(parameters["beta"], parameters["gamma"]),
-    "hht-alpha": _hht,
-    "generalised-alpha": _generalised,
-}
-
-
-def newmark_step(x: float, weights: NewmarkWeights) -> Array:
+def newmark_step(x: float, numbers: NewmarkNumbers) -> Array:
     """A step's matrix for (x, h x', h^2 a), a the algorithmic acceleration; balance holds at both ends of the step."""
-    beta, gamma, alpha_m, alpha_f = weights.beta, weights.gamma, weights.alpha_m, weights.alpha_f
+    beta, gamma, alpha_m, alpha_f = numbers.beta, numbers.gamma, numbers.alpha_m, numbers.alpha_f
     stiffness = x**2
     new = np.array(
         [[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [(1.0 - alpha_f) * stiffness, 0.0, 1.0 - alpha_m]]
