@@ -1,12 +1,14 @@
 """Characteristic roots: closed forms, published limits, and what `integrate` really does to an oscillator."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.integrate
 
 from paraflex.dynamics import build_system, consistent_state, pack_signals
 from paraflex.errors import InputError
-from paraflex.integrators import IntegrationOptions, integrate
+from paraflex.integrators import METHODS, IntegrationOptions, integrate
 from paraflex.integrators.spectra import multistep_formula, spectrum, stability, tableau_of, wilson_step
 from paraflex.mechanism import Assembly, Mechanism, PointRef, RevoluteJoint, RigidBody, TorsionalSpring
 
@@ -155,6 +157,22 @@ def test_bad_input(arguments, says):
     method, frequency, *order = arguments
     with pytest.raises(InputError, match=says):
         spectrum(method, frequency, order=order[0] if order else None)
+
+
+def test_the_documents_table_says_what_the_roots_are():
+    orders = {"ndf": 2, "adams": 4, "bdf": 2}
+    lines = (Path(__file__).parents[1] / "docs" / "integrators.md").read_text(encoding="utf-8").splitlines()
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| `")]
+    told = {row[0].split("`")[1]: row[4:] for row in rows if len(row) == 7}
+    assert set(told) == set(METHODS) - {"ida"}
+    for name, (decay, period, radius) in told.items():
+        found = spectrum(name, [2.0 * np.pi / 20.0, 1e6], order=orders.get(name))
+        for text, value in ((decay, found.amplitude_decay[0]), (period, found.period_error[0])):
+            assert float(text.split(" %")[0]) == pytest.approx(100.0 * value, rel=0.06, abs=1e-8)
+        if radius in ("∞", "> 1"):
+            assert found.radius[1] > 1.0
+        else:
+            assert float(radius) == pytest.approx(found.radius[1], abs=6e-3)
 
 
 def oscillator(omega: float) -> Mechanism:
