@@ -29,6 +29,7 @@ from paraflex.studies import (
     tracking_case,
 )
 from test_cli import paraflex
+from test_plots import stays_on_the_page
 
 LOOSE = ComparisonOptions(tolerances=(1e-3, 1e-4), repetitions=1)
 
@@ -227,6 +228,12 @@ def test_the_figure_has_a_line_a_method_in_the_units_it_names():
     assert len(looks) == 2
     with pytest.raises(InputError, match="no run got to its end"):
         plots.work_precision(replace(found, measurements=()).figures())
+
+
+def test_nothing_overlaps_or_leaves_the_page():
+    every = {name.replace("-", "_"): [(1e-2 / k, 1e-3 * k), (1e-9, 1e4 * k)] for k, name in enumerate(METHODS, 1)}
+    stays_on_the_page(plots.work_precision(comparison(**every).figures()))
+    stays_on_the_page(plots.numerical_damping())
 
 
 def test_numerical_damping_shows_what_spectra_say():
