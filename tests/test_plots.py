@@ -31,6 +31,8 @@ DESIRED_TWINS = (
     "angular_acceleration",
 )
 SINGLE = ("tip_deflections", "link_motions", "end_effector_path", "end_effector_motion", "phase_diagrams")
+# Of methods of integration, not of a dataset: test_compare.py.
+METHODS = ("numerical_damping", "work_precision")
 COMPARED = ("compared_links", "compared_paths")
 NAMES = (
     "fig11_desired_path",
@@ -167,10 +169,15 @@ def test_every_axis_label_names_its_unit(data: xr.Dataset, name: str, units: set
 
 
 @pytest.mark.parametrize("mode", [FULL, PARTIAL])
-@pytest.mark.parametrize("name", [name for name in plots.__all__ if not name.startswith("save")])
+@pytest.mark.parametrize(
+    "name", [name for name in plots.__all__ if not name.startswith("save") and name not in METHODS]
+)
 def test_nothing_overlaps_or_leaves_the_page(data: xr.Dataset, name: str, mode: str) -> None:
     data["angular_acceleration"] *= 50.0  # five digits and a sign
-    figure = figure_of(name, data, mode)
+    stays_on_the_page(figure_of(name, data, mode))
+
+
+def stays_on_the_page(figure: Figure) -> None:
     figure.draw_without_rendering()
     boxes = [axes.get_tightbbox() for axes in figure.axes]
     boxes += [legend.get_window_extent() for legend in figure.legends]

@@ -198,6 +198,52 @@ def verify(
     raise typer.Exit(verify_command(request))
 
 
+@app.command("compare-methods")
+def compare_methods(
+    mechanism: MechanismOption = "raparm_i",
+    path: PathOption = None,
+    mode: Annotated[
+        str | None, typer.Option(metavar="MODE", help="Actuation mode. Default: the study's with most motors.")
+    ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Method of integration; repeatable. Default: all of them.")
+    ] = None,
+    tol: Annotated[
+        list[float] | None,
+        typer.Option(metavar="METRES", help="Tolerance; repeatable. Default: 1e-3, 1e-4, 1e-5, 1e-6."),
+    ] = None,
+    step: Annotated[
+        list[float] | None,
+        typer.Option(metavar="S", help="Fixed step; repeatable. Without --tol fixed steps are all there is."),
+    ] = None,
+    limit: Annotated[float | None, typer.Option(metavar="S", help="Wall time of a run. Default: 60.")] = None,
+    duration: DurationOption = None,
+    samples: SamplesOption = None,
+    assembly: AssemblyOption = None,
+    out: Annotated[str, typer.Option(metavar="DIR", help="Folder for numbers and figure.")] = "comparison",
+    json: Json = False,
+) -> None:
+    """Time every method of integration against its error; write compare-methods.json and figures/."""
+    from paraflex.cli.compare import CompareRequest, compare_command
+
+    request = CompareRequest(
+        mechanism=mechanism,
+        path=path,
+        modes=[] if mode is None else [mode],
+        tolerance=None,
+        duration=duration,
+        samples=samples,
+        assembly=assembly,
+        out=out,
+        json=json,
+        methods=method or [],
+        tolerances=tol or [],
+        steps=step or [],
+        limit=limit,
+    )
+    raise typer.Exit(compare_command(request))
+
+
 @app.command()
 def modes(source: Source = "raparm_i", path: PathOption = None, json: Json = False) -> None:
     """List the actuation modes and how well each can drive the path."""

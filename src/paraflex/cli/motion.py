@@ -92,7 +92,7 @@ def _simulate(
 
     assembly = request.assembly or model.study.assembly
     try:
-        start = _start(model, mechanism, assembly, request.balanced)
+        start = start_of(model, mechanism, assembly, balanced=request.balanced)
         return simulate_motion(
             mechanism,
             duration,
@@ -116,7 +116,7 @@ def _simulate(
             progress.stop()
 
 
-def _start(model: Model, mechanism: Mechanism, assembly: str | None, balanced: bool) -> State | None:
+def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanced: bool) -> State | None:
     """The state the file describes, from static equilibrium if asked for; None for an assembly undeformed at rest."""
     if balanced and model.start is not None and model.start.places:
         raise InputError(

@@ -2,10 +2,12 @@
 
 from paraflex.plots.agreement import compared_links, compared_paths, model_distances
 from paraflex.plots.modes import motor_torques, tracking_errors
+from paraflex.plots.numerical_damping import numerical_damping
 from paraflex.plots.overview import motion_overview
 from paraflex.plots.phase import phase_diagrams
-from paraflex.plots.save import save_agreement_figures, save_figures, save_overview
+from paraflex.plots.save import save_agreement_figures, save_figures, save_overview, save_work_precision
 from paraflex.plots.time_series import end_effector_motion, link_motions, tip_deflections
+from paraflex.plots.work_precision import work_precision
 from paraflex.plots.workspace import desired_path, end_effector_path
 
 __all__ = [
@@ -18,10 +20,13 @@ __all__ = [
     "model_distances",
     "motion_overview",
     "motor_torques",
+    "numerical_damping",
     "phase_diagrams",
     "save_agreement_figures",
     "save_figures",
     "save_overview",
+    "save_work_precision",
     "tip_deflections",
     "tracking_errors",
+    "work_precision",
 ]

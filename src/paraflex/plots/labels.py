@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _GREEK = ("alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "tau", "omega")
 
 
@@ -41,6 +43,14 @@ def peak(values: ArrayLike) -> float:
 def three_digits(value: float) -> str:
     """A value to three significant digits: 48.0, 0.377, 120; 0."""
     return f"{value:#.3g}".rstrip(".") if value else "0"
+
+
+def power_of_ten(value: float) -> str:
+    """A power of ten as print shows it: "10⁻⁵"; anything else as a plain number."""
+    exponent = round(math.log10(value)) if value > 0.0 else 0
+    if not math.isclose(value, 10.0**exponent, rel_tol=1e-9):
+        return f"{value:g}"
+    return "10" + str(exponent).translate(_RAISED)
 
 
 def symbol(name: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -17,6 +18,7 @@ from paraflex.plots.phase import phase_diagrams
 from paraflex.plots.runs import default_mode
 from paraflex.plots.style import journal_style
 from paraflex.plots.time_series import end_effector_motion, link_motions, tip_deflections
+from paraflex.plots.work_precision import work_precision
 from paraflex.plots.workspace import desired_path, end_effector_path
 
 # Files that do not depend on when they were written.
@@ -101,6 +103,19 @@ def save_overview(data: xr.Dataset, folder: str | Path) -> list[Path]:
         The folder cannot be written.
     """
     return _save({"motion_overview": partial(motion_overview, data)}, Path(folder))
+
+
+def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
+    """Write the figure of a comparison of methods as PNG and SVG; none where no run got to its end.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    if not any(run["status"] == "complete" for method in figures["methods"].values() for run in method["runs"]):
+        return []
+    return _save({"work_precision": partial(work_precision, figures)}, Path(folder))
 
 
 def _save(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:

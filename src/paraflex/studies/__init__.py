@@ -1,6 +1,9 @@
 """Many runs as one result."""
 
 from paraflex.studies.agreement import agreement
+from paraflex.studies.cases import Case, motion_case, tracking_case
+from paraflex.studies.compare import ComparisonOptions, compare_methods
+from paraflex.studies.comparison import Measurement, MethodComparison, Reference
 from paraflex.studies.tracking import Simulator, StudyResult, run_study
 from paraflex.studies.verification import (
     FIDELITIES,
@@ -15,7 +18,12 @@ from paraflex.studies.verification import (
 
 __all__ = [
     "FIDELITIES",
+    "Case",
+    "ComparisonOptions",
+    "Measurement",
+    "MethodComparison",
     "ModelRuns",
+    "Reference",
     "Refinement",
     "Simulator",
     "StudyResult",
@@ -23,7 +31,10 @@ __all__ = [
     "VerificationOptions",
     "agreement",
     "check_model",
+    "compare_methods",
+    "motion_case",
     "reference_model",
     "run_study",
+    "tracking_case",
     "verify",
 ]

@@ -1,0 +1,106 @@
+"""What `paraflex compare-methods` prints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from paraflex.cli.tables import number
+
+_KEPT = {
+    "gap\n[m]": "constraint_position_max",
+    "its rate\n[m/s]": "constraint_velocity_max",
+    "energy\n[J]": "energy_balance_max",
+}
+_COUNTS = {
+    "steps\n": "steps",
+    "rejected\n": "rejected",
+    "Newton\niter.": "newton_iterations",
+    "factor-\nings": "factorisations",
+    "evalu-\nations": "evaluations",
+}
+_SETTING = "tol. [m],\nstep [s]"
+
+
+def print_comparison(console: Console, figures: dict[str, Any]) -> None:
+    """Work of every run, what it kept, time of every method for an error, and the fastest."""
+    reference = figures["reference"]
+    if reference is None:
+        return
+    console.print(
+        f"{figures['mechanism']}, {figures['case']}, {figures['duration']:g} s. Errors are distances from "
+        f"{reference['method']} at {reference['tolerance']:g} m, certain to {reference['uncertainty']:.0e} m "
+        f"(as far as {reference['check_method']} at {reference['check_tolerance']:g} m is off).",
+        soft_wrap=True,
+    )
+    told = {name: method for name, method in figures["methods"].items() if _complete(method)}
+    if told:
+        for title, table in (
+            ("Error, time, violation of constraints, imbalance of energy", _precision(told, reference["uncertainty"])),
+            ("Work", _work(told)),
+            ("Wall time to an error [s]; the last column at 1e-5 m", _times(told, figures)),
+        ):
+            console.print(title)
+            console.print(table)
+    _print_reasons(console, figures["methods"])
+    fastest = [f"{level} m {name}" for level, name in figures["fastest"].items() if name is not None]
+    if fastest:
+        console.print(f"Fastest: {', '.join(fastest)}", soft_wrap=True)
+
+
+def _complete(method: dict[str, Any]) -> list[dict[str, Any]]:
+    return [run for run in method["runs"] if run["status"] == "complete"]
+
+
+def _precision(methods: dict[str, Any], uncertainty: float) -> Table:
+    table = _table("method", _SETTING, "error\n[m]", "wall\n[s]", *_KEPT)
+    for name, method in methods.items():
+        for run in _complete(method):
+            error = f"{run['error']:.1e}" if run["error"] > uncertainty else f"<{uncertainty:.0e}"
+            kept = (number(run[key], ".1e") for key in _KEPT.values())
+            table.add_row(name, _setting(run), error, f"{run['wall_time']:.3g}", *kept)
+    return table
+
+
+def _work(methods: dict[str, Any]) -> Table:
+    table = _table("method", _SETTING, *_COUNTS)
+    for name, method in methods.items():
+        for run in _complete(method):
+            table.add_row(name, _setting(run), *(str(run[key]) for key in _COUNTS.values()))
+    return table
+
+
+def _times(methods: dict[str, Any], figures: dict[str, Any]) -> Table:
+    levels = list(figures["fastest"])
+    table = _table("method", *(f"{level} m" for level in levels), "x TR-BDF2")
+    for name, method in methods.items():
+        times = (number(method["time_to_reach"][level], ".3g") for level in levels)
+        table.add_row(name, *times, number(method["relative_time"], ".2f"))
+    return table
+
+
+def _print_reasons(console: Console, methods: dict[str, Any]) -> None:
+    for name, method in methods.items():
+        for run in method["runs"]:
+            where = f" at {_setting(run)}" if _setting(run) else ""
+            if run["status"] != "complete":
+                console.print(f"{name}{where}: {run['status']}, {run['reason']}", soft_wrap=True)
+            for text in run["warnings"]:
+                console.print(f"{name}{where}: warns: {text}", soft_wrap=True)
+
+
+def _setting(run: dict[str, Any]) -> str:
+    if run["step"] is not None:
+        return f"{run['step']:g} s"
+    return "" if run["tolerance"] is None else f"{run['tolerance']:g}"
+
+
+def _table(first: str, *headings: str) -> Table:
+    table = Table(box=box.SIMPLE, collapse_padding=True, pad_edge=False)
+    table.add_column(first, no_wrap=True)
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    return table

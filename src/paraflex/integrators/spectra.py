@@ -1,0 +1,223 @@
+"""What each method does to x'' = -omega^2 x in steps of h: damping and period error over h omega.
+
+A step takes a vector of values to a matrix (or, of several steps, a companion matrix) times that vector; its
+eigenvalues are the method's characteristic roots. The principal root is the one that follows exp(i h omega).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.integrate
+from numpy.typing import ArrayLike, NDArray
+
+from paraflex.errors import InputError
+from paraflex.integrators.methods import Family, check_parameters, find_method
+from paraflex.integrators.newmark import NewmarkNumbers, newmark_numbers
+from paraflex.integrators.tableaux import TABLEAUX
+
+Array = NDArray[Any]
+Roots = NDArray[Any]
+
+MULTISTEP = ("ndf", "adams", "bdf", "ida")
+# Of NDF, orders 0 to 5, as SciPy has them: Shampine and Reichelt (1997), Table 1.
+_KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
+# Frequencies between which the principal root moves little, as a factor, and where following it begins.
+_DENSE, _START = 1.02, 1e-3
+# Orders whose formulas are stable: of backward differences (and NDF), of Adams-Moulton as CVODE has them.
+_HIGHEST = {"ndf": 5, "bdf": 5, "ida": 5, "adams": 12}
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Characteristic roots of a method.
+
+    Attributes
+    ----------
+    frequency : (k,) array
+        h omega, ascending [rad].
+    principal : (k,) array
+        The root that follows exp(i h omega).
+    phase : (k,) array
+        Of the principal root, continued from zero [rad].
+    radius : (k,) array
+        Largest modulus of any root: above 1 the method is unstable.
+    """
+
+    frequency: Array
+    principal: Roots
+    phase: Array
+    radius: Array
+
+    @property
+    def damping_ratio(self) -> Array:
+        """Of the free vibration that the steps describe (Hughes 1987, 9.1); the true one is zero."""
+        with np.errstate(divide="ignore"):
+            return -np.log(np.abs(self.principal)) / self.phase
+
+    @property
+    def amplitude_decay(self) -> Array:
+        """The part of the amplitude lost in a period."""
+        return 1.0 - np.exp(-2.0 * np.pi * self.damping_ratio)
+
+    @property
+    def period_error(self) -> Array:
+        """Of the free vibration's period, as a fraction of the true one; positive where it is too long."""
+        return self.frequency / self.phase - 1.0
+
+
+def spectrum(
+    method: str, frequency: ArrayLike, *, order: int | None = None, parameters: Mapping[str, float] | None = None
+) -> Spectrum:
+    """Characteristic roots of a method of `METHODS`.
+
+    Parameters
+    ----------
+    method : str
+    frequency : (k,) array
+        h omega, ascending from above zero [rad].
+    order : int, optional
+        Of a multistep method, which needs one: it changes order on its way, and its roots with it.
+    parameters : mapping of str to float, optional
+        Those of the method that are not to be at their defaults.
+
+    Raises
+    ------
+    InputError
+        No such method, order or parameter; frequencies that do not ascend from above zero.
+    """
+    wanted = np.asarray(frequency, dtype=float).reshape(-1)
+    if not (wanted.size and np.all(np.isfinite(wanted)) and wanted[0] > 0.0 and np.all(np.diff(wanted) > 0.0)):
+        raise InputError("must ascend from above zero", field="frequency", remedy="say numpy.geomspace(0.01, 100, 200)")
+    roots = _roots(method, order, parameters or {})
+    first = min(_START, wanted[0])
+    steps = int(np.log(wanted[-1] / first) / np.log(_DENSE)) + 2
+    grid = np.union1d(np.geomspace(first, wanted[-1], steps), wanted)
+    every = [roots(x) for x in grid]
+    principal = _followed(every, np.exp(1j * first))
+    here = np.searchsorted(grid, wanted)
+    return Spectrum(
+        frequency=wanted,
+        principal=principal[here],
+        phase=np.unwrap(np.angle(principal))[here],
+        radius=np.array([np.max(np.abs(every[k])) for k in here]),
+    )
+
+
+def _followed(roots: list[Roots], near: complex) -> Roots:
+    """Of each set of roots the one nearest to that of the set before."""
+    out = np.zeros(len(roots), dtype=complex)
+    for k, candidates in enumerate(roots):
+        near = out[k] = candidates[np.argmin(np.abs(candidates - near))]
+    return out
+
+
+def _roots(method: str, order: int | None, parameters: Mapping[str, float]) -> Callable[[float], Roots]:
+    """The characteristic roots as a function of h omega."""
+    found = find_method(method)
+    values = check_parameters(found, parameters)
+    if method in MULTISTEP:
+        left, right = multistep_formula(method, order)
+        return lambda x: np.roots(left - 1j * x * right)
+    if order is not None:
+        raise InputError(
+            f"{method} has one order only", field="order", value=order, remedy=f"leave it out, or take {MULTISTEP}"
+        )
+    if found.family is Family.NEWMARK:
+        numbers = newmark_numbers(method, values)
+        if numbers.theta > 1.0:
+            return lambda x: np.linalg.eigvals(wilson_step(x, numbers.theta))
+        return lambda x: np.linalg.eigvals(newmark_step(x, numbers))
+    A, b = tableau_of(method)
+    return lambda x: np.array([stability(A, b, 1j * x)])
+
+
+def tableau_of(method: str) -> tuple[Array, Array]:
+    """The matrix A and weights b of a Runge-Kutta method.
+
+    Raises
+    ------
+    InputError
+        It is none, or its tableau is not known here.
+    """
+    if method == "rk45":
+        return np.pad(scipy.integrate.RK45.A, ((0, 0), (0, 1))), scipy.integrate.RK45.B
+    if method == "radau":
+        return _collocation((4.0 - np.sqrt(6.0)) / 10.0, (4.0 + np.sqrt(6.0)) / 10.0, 1.0)
+    if method in TABLEAUX:
+        return TABLEAUX[method].A, TABLEAUX[method].A[-1]
+    raise InputError("no tableau", field="method", value=method, remedy="take a Runge-Kutta method")
+
+
+def stability(A: Array, b: Array, z: complex) -> complex:
+    """R(z) = 1 + z b (1 - z A)^-1 1 of a Runge-Kutta method: what a step makes of x' = z/h x."""
+    return complex(1.0 + z * (b @ np.linalg.solve(np.eye(b.size) - z * A, np.ones(b.size))))
+
+
+def _collocation(*nodes: float) -> tuple[Array, Array]:
+    """Tableau of collocation at nodes of which the last is 1: integrals of Lagrange's polynomials."""
+    A = np.zeros((len(nodes), len(nodes)))
+    for j, own in enumerate(nodes):
+        others = [node for node in nodes if node != own]
+        basis = np.polynomial.Polynomial.fromroots(others) / np.prod([own - node for node in others])
+        A[:, j] = basis.integ()(np.array(nodes))
+    return A, A[-1]
+
+
+def newmark_step(x: float, numbers: NewmarkNumbers) -> Array:
+    """A step's matrix for (x, h x', h^2 a), a the algorithmic acceleration; balance holds at both ends of the step."""
+    beta, gamma, alpha_m, alpha_f = numbers.beta, numbers.gamma, numbers.alpha_m, numbers.alpha_f
+    stiffness = x**2
+    new = np.array(
+        [[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [(1.0 - alpha_f) * stiffness, 0.0, 1.0 - alpha_m]]
+    )  # fmt: skip
+    old = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [-alpha_f * stiffness, 0.0, -alpha_m]])
+    return np.linalg.solve(new, old)
+
+
+def wilson_step(x: float, theta: float) -> Array:
+    """A step's matrix for (x, h x', h^2 x''): acceleration linear up to theta h, where balance is asked for."""
+    stiffness = (x * theta) ** 2
+    # theta^2 a_theta = -stiffness x_theta,  x_theta = x + theta x' + theta^2 (2 a + a_theta) / 6
+    at_theta = -np.array([1.0, theta, theta**2 / 3.0]) * stiffness / (theta**2 * (1.0 + stiffness / 6.0))
+    acceleration = np.array([0.0, 0.0, 1.0 - 1.0 / theta]) + at_theta / theta
+    return np.array(
+        [
+            np.array([1.0, 1.0, 1.0 / 3.0]) + acceleration / 6.0,
+            np.array([0.0, 1.0, 0.5]) + 0.5 * acceleration,
+            acceleration,
+        ]
+    )
+
+
+def multistep_formula(method: str, order: int | None) -> tuple[Array, Array]:
+    """Coefficients of the new and old values and of their derivatives, the newest first, padded to one length."""
+    highest = _HIGHEST[method]
+    if order is None or not (isinstance(order, int) and 1 <= order <= highest):
+        raise InputError(
+            f"{method} needs an order", field="order", value=order, remedy=f"choose one from 1 to {highest}"
+        )
+    values, rates = _adams(order) if method == "adams" else _backward_differences(order, method == "ndf")
+    size = max(values.size, rates.size)
+    return np.pad(values, (0, size - values.size)), np.pad(rates, (0, size - rates.size))
+
+
+def _backward_differences(order: int, numerical: bool) -> tuple[Array, Array]:
+    """sum_m (1/m) D^m x_1 - kappa gamma D^(k+1) x_1 = h x_1', D x_1 = x_1 - x_0; kappa = 0 is Gear's formula."""
+    difference = np.polynomial.Polynomial([1.0, -1.0])
+    values = sum((difference**m / m for m in range(1, order + 1)), start=np.polynomial.Polynomial([0.0]))
+    if numerical:
+        gamma = sum(1.0 / m for m in range(1, order + 1))
+        values = values - _KAPPA[order] * gamma * difference ** (order + 1)
+    return values.coef, np.array([1.0])
+
+
+def _adams(order: int) -> tuple[Array, Array]:
+    """x_1 - x_0 = h times the integral of the polynomial through the newest `order` rates, the new one among them."""
+    nodes = 1.0 - np.arange(order)
+    powers = np.arange(order)
+    rates = np.linalg.solve(nodes[None, :] ** powers[:, None], 1.0 / (powers + 1.0))
+    return np.array([1.0, -1.0]), rates

@@ -1,0 +1,76 @@
+"""What each method does to a free vibration: damping, period, and what becomes of high frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
+
+from paraflex.integrators import METHODS
+from paraflex.integrators.spectra import MULTISTEP, Spectrum, spectrum
+from paraflex.plots.labels import power_of_ten
+from paraflex.plots.layout import lay_out, panels
+from paraflex.plots.style import ZERO, journal_style
+from paraflex.plots.work_precision import method_look
+
+# Of multistep methods the orders at which they start to differ; IDA's roots are those of BDF.
+_ORDERS = {"adams": (4,), "bdf": (2, 5), "ndf": (2,)}
+CURVES = tuple((name, order) for name in METHODS if name != "ida" for order in _ORDERS.get(name, (None,)))
+# Frequencies at which a step still describes a vibration; and up to where modes are only to vanish.
+_RESOLVED, _HIGH = np.geomspace(0.1, 3.0, 120), np.geomspace(0.1, 1e4, 240)
+# Fractions shown, and a radius beyond which all that is to be said is said.
+_SHOWN, _GROWN = (1e-6, 1.0), 1.5
+
+
+@journal_style()
+def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figure:
+    """Damping ratio, period error and spectral radius over h omega (x'' = -omega^2 x, steps of h).
+
+    Damping ratio and period error are shown where a method is stable and does damp.
+
+    Parameters
+    ----------
+    curves : sequence of (str, int or None)
+        Methods by name, with an order where they have several.
+    """
+    figure, axes = panels(1, 3)
+    members: dict[str, int] = {}
+    for name, order in curves:
+        method = METHODS[name]
+        number = members[method.family.value] = members.get(method.family.value, -1) + 1
+        look: dict[str, Any] = method_look(method.family.value, number) | {"marker": ""}
+        label = method.title if name not in MULTISTEP else f"{method.title.split(' ')[0]} {order}"
+        low, high = (spectrum(name, frequency, order=order) for frequency in (_RESOLVED, _HIGH))
+        axes[0, 0].plot(low.frequency, _shown(low, low.damping_ratio), label=label, **look)
+        axes[0, 1].plot(low.frequency, _shown(low, np.abs(low.period_error)), label=label, **look)
+        axes[0, 2].plot(high.frequency, np.where(high.radius < _GROWN, high.radius, np.nan), label=label, **look)
+    titles = ("damping ratio", "period error, as a fraction", "spectral radius")
+    for panel, title in zip(axes[0], titles, strict=True):
+        panel.set_title(title)
+        panel.set_xlabel(r"$h\,\omega$ [rad]")
+        panel.set_xscale("log")
+        _mark_powers(panel.xaxis)
+    for panel in axes[0, :2]:
+        panel.set_yscale("log")
+        panel.set_ylim(*_SHOWN)
+        panel.grid(color="0.9", linewidth=0.4)
+        _mark_powers(panel.yaxis)
+    axes[0, 2].set_ylim(0.0, _GROWN)
+    axes[0, 2].axhline(1.0, **ZERO)
+    return lay_out(figure, axes, panel_height=62.0)
+
+
+def _shown(found: Spectrum, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What a logarithmic axis can show: not what is zero, nor what grows, which is not what a vibration does."""
+    return np.where((found.radius < 1.0 + 1e-9) & (values > 0.1 * _SHOWN[0]), values, np.nan)
+
+
+def _mark_powers(axis: Axis) -> None:
+    axis.set_major_locator(LogLocator(numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    axis.set_minor_formatter(NullFormatter())

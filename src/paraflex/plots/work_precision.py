@@ -1,0 +1,97 @@
+"""Wall time and steps of every method over its error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import power_of_ten
+from paraflex.plots.layout import lay_out, panels
+from paraflex.plots.style import BLACK, COLOURS, SHADE, journal_style
+
+# A family shares mark and dashes; its members differ in colour.
+_FAMILIES: Mapping[str, dict[str, Any]] = {
+    "esdirk": {"marker": "o", "linestyle": "-"},
+    "newmark": {"marker": "s", "linestyle": (0, (5, 1.5))},
+    "scipy": {"marker": "^", "linestyle": (0, (5, 1.5, 1, 1.5))},
+    "sundials": {"marker": "D", "linestyle": (0, (1, 1))},
+}
+
+
+def method_look(family: str, number: int) -> dict[str, Any]:
+    """How a method is drawn: the so-manieth of its family."""
+    colours = [BLACK, *(colour for colour in COLOURS if colour != BLACK)]
+    return {
+        "color": colours[number % len(colours)],
+        "markersize": 3.0,
+        "linewidth": 1.3 if family == "esdirk" and number == 0 else 0.9,
+        **_FAMILIES[family],
+    }
+
+
+@journal_style()
+def work_precision(figures: Mapping[str, Any]) -> Figure:
+    """Wall time and accepted steps of every method over its error, both axes logarithmic.
+
+    Runs with fixed steps and those with error control are lines of their own; the former have open marks. What the
+    reference cannot tell is shaded.
+
+    Parameters
+    ----------
+    figures : mapping
+        From `studies.MethodComparison.figures`, or read from `compare-methods.json`.
+
+    Raises
+    ------
+    InputError
+        No run of them got to its end.
+    """
+    lines = _lines(figures["methods"])
+    if not lines:
+        raise InputError("no run got to its end", field="figures", remedy="see the reasons in `methods`")
+    figure, axes = panels(1, 2)
+    for panel, key, label in zip(axes[0], ("wall_time", "steps"), ("wall time [s]", "accepted steps"), strict=True):
+        for title, look, runs in lines:
+            panel.plot([run["error"] for run in runs], [run[key] for run in runs], label=title, **look)
+        _logarithmic(panel)
+        uncertainty = figures["reference"]["uncertainty"]
+        low, high = panel.get_xlim()
+        if low < uncertainty < high:
+            panel.axvspan(low, uncertainty, color=SHADE, linewidth=0.0, zorder=0.0, label="below the reference's own")
+        panel.set_xlim(low, high)
+        panel.set_xlabel("largest error of position [m]")
+        panel.set_ylabel(label)
+    return lay_out(figure, axes, panel_height=72.0)
+
+
+def _lines(methods: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], list[dict[str, Any]]]]:
+    """Title, look and complete runs of each line, in order of error; a run exactly on the reference has no place."""
+    members: dict[str, int] = {}
+    lines = []
+    for method in methods.values():
+        number = members[method["family"]] = members.get(method["family"], -1) + 1
+        done = [run for run in method["runs"] if run["status"] == "complete" and run["error"] > 0.0]
+        for fixed in (False, True):
+            runs = [run for run in done if (run["step"] is not None) == fixed]
+            look = method_look(method["family"], number) | ({"markerfacecolor": "white"} if fixed else {})
+            title = f"{method['title']}, fixed steps" if fixed else method["title"]
+            if runs:
+                lines.append((title, look, sorted(runs, key=lambda run: -run["error"])))
+    return lines
+
+
+def _logarithmic(panel: Axes) -> None:
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.margins(0.06)
+    panel.grid(color="0.9", linewidth=0.4)
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(LogLocator(numticks=12))
+        # Plain text: the layout knows how wide digits are.
+        axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+        axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,120 @@
+"""What methods are compared on: one motion, run by whatever method, and the points that its error is taken at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import State, System, build_system
+from paraflex.errors import InputError, IntegrationError
+from paraflex.integrators import IntegrationOptions, Solution
+from paraflex.mechanism import ActuationMode, Mechanism, PointRef
+from paraflex.motion import MotionRun, simulate_motion
+from paraflex.results.motion import point_motion
+from paraflex.simulate import TrackingRun, TrackingTask, simulate
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A motion to be integrated again and again.
+
+    Attributes
+    ----------
+    name : str
+        In words.
+    system : System
+    duration : float
+        [s]
+    samples : int
+    points : tuple of PointRef
+        Whose places are compared; the origins of all body frames where there are none.
+    solve : callable
+        The solution with options, telling a callable the time reached [s].
+    """
+
+    name: str
+    system: System
+    duration: float
+    samples: int
+    points: tuple[PointRef, ...]
+    solve: Callable[[IntegrationOptions, Progress | None], Solution]
+
+    def places(self, solution: Solution) -> NDArray[np.float64]:
+        """Positions (k, points, 2) at the samples [m]."""
+        q, v, a = solution.q, solution.v, solution.a
+        if not self.points:
+            return np.stack([q[:, body.position] for body in self.system.bodies], axis=1)
+        return np.stack([point_motion(self.system, point, q, v, a).position for point in self.points], axis=1)
+
+
+def tracking_case(task: TrackingTask, mode: str | ActuationMode) -> Case:
+    """One mode of a task; the error is the end-effector's.
+
+    Raises
+    ------
+    InputError
+        No such mode.
+    """
+    chosen, effector = task.mode(mode), task.mechanism.end_effector
+    assert effector is not None
+
+    def solve(options: IntegrationOptions, on_progress: Progress | None) -> Solution:
+        run = partial(simulate, task, chosen, options=options, on_progress=on_progress)
+        return _solution(run)
+
+    times = task.motion.t
+    name = f"mode {chosen.name}"
+    return Case(name, task.system, float(times[-1] - times[0]), times.size, (effector.point,), solve)
+
+
+def motion_case(
+    mechanism: Mechanism,
+    duration: float,
+    *,
+    samples: int = 701,
+    torques: Mapping[str, float] | None = None,
+    start: State,
+) -> Case:
+    """A mechanism's own motion; the error is the end-effector's, or else the largest of all named points.
+
+    Parameters
+    ----------
+    mechanism, duration, samples, torques, start
+        See `motion.simulate_motion`.
+
+    Raises
+    ------
+    InputError
+        A duration or number of samples that makes no sense.
+    """
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
+    if samples < 2:
+        raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+    effector = mechanism.end_effector
+    every = tuple(PointRef(body.name, point) for body in mechanism.bodies for point in body.points)
+
+    def solve(options: IntegrationOptions, on_progress: Progress | None) -> Solution:
+        run = partial(
+            simulate_motion, mechanism, duration, samples=samples, torques=torques, start=start,
+            options=options, on_progress=on_progress,
+        )  # fmt: skip
+        return _solution(run)
+
+    points = every if effector is None else (effector.point,)
+    return Case("its own motion", build_system(mechanism), duration, samples, points, solve)
+
+
+def _solution(run: Callable[[], TrackingRun | MotionRun]) -> Solution:
+    """Of a run; an error carries what was computed of it."""
+    try:
+        return run().solution
+    except IntegrationError as error:
+        error.partial = error.partial.solution
+        raise

@@ -1,0 +1,295 @@
+"""Work and precision of every method on one motion: runs one after the other, each against a converged one."""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError, IntegrationError, NumericalError
+from paraflex.integrators import METHODS, IntegrationOptions, Solution
+from paraflex.integrators.methods import Family, Method, find_method
+from paraflex.studies.cases import Case
+from paraflex.studies.comparison import Measurement, MethodComparison, Reference
+
+Report = Callable[[str, int, int], None]
+
+# The reference is asked for this part of the tightest tolerance, its check for twice that; both may take this
+# many times the limit of a run.
+_FINER, _PATIENCE = 10.0, 20.0
+# Repetitions are for short runs: none is begun after so long [s].
+_LONG_ENOUGH = 3.0
+_FIGURES = (
+    "wall_time",
+    "steps",
+    "rejected",
+    "newton_iterations",
+    "factorisations",
+    "evaluations",
+    "constraint_position_max",
+    "constraint_velocity_max",
+    "energy_balance_max",
+)
+
+
+@dataclass(frozen=True)
+class ComparisonOptions:
+    """How methods are compared.
+
+    Attributes
+    ----------
+    tolerances : tuple of float
+        Of methods that choose their steps [m].
+    steps : tuple of float
+        Of methods that take one, besides [s].
+    limit : float
+        Wall time at which a run is stopped [s].
+    repetitions : int
+        Of each run, at most; the fastest counts.
+    """
+
+    tolerances: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6)
+    steps: tuple[float, ...] = ()
+    limit: float = 60.0
+    repetitions: int = 3
+
+    def __post_init__(self) -> None:
+        named = [("tolerances", x) for x in self.tolerances] + [("steps", x) for x in self.steps]
+        for field, value in [*named, ("limit", self.limit), ("repetitions", self.repetitions)]:
+            if not (math.isfinite(value) and value > 0):
+                raise InputError("must be positive", field=field, value=value, remedy="leave it out for the default")
+        if not (self.tolerances or self.steps):
+            raise InputError("nothing to compare", field="tolerances", remedy="give a tolerance or a step")
+
+    @property
+    def tightest(self) -> float:
+        """The tightest tolerance, or that of the defaults [m]."""
+        return min(self.tolerances or ComparisonOptions.tolerances)
+
+
+class _TooSlowError(Exception):
+    """A run beyond the limit of time."""
+
+
+def compare_methods(
+    case: Case,
+    methods: Sequence[str] | None = None,
+    *,
+    options: ComparisonOptions | None = None,
+    on_progress: Report | None = None,
+) -> MethodComparison:
+    """Run a motion by every method at every tolerance, and tell time, work and error of each.
+
+    Parameters
+    ----------
+    case : Case
+        From `studies.tracking_case` or `studies.motion_case`.
+    methods : sequence of str, optional
+        From `METHODS`; all by default. One that cannot run is told with its reason and the others go on.
+    options : ComparisonOptions, optional
+    on_progress : callable, optional
+        Told what begins, its number and how many runs there are at most.
+
+    Raises
+    ------
+    InputError
+        An unknown method, before anything runs.
+    IntegrationError
+        No converged run to compare with.
+    """
+    options = options or ComparisonOptions()
+    chosen = [find_method(name) for name in dict.fromkeys(METHODS if methods is None else methods)]
+    plans = {method.name: _plan(method, options) for method in chosen}
+    total = sum(map(len, plans.values()))
+    found: list[Measurement] = []
+    reference, interrupted = None, False
+
+    def tell(what: str) -> None:
+        if on_progress is not None:
+            on_progress(what, len(found), total)
+
+    try:
+        tell("reference")
+        reference, places = _reference(case, options)
+        for method in chosen:
+            for measurement in _measurements(case, method, plans[method.name], places, options, tell):
+                found.append(measurement)
+    except KeyboardInterrupt:
+        interrupted = True
+    return MethodComparison(
+        case=case.name,
+        mechanism=case.system.mechanism.name,
+        duration=case.duration,
+        samples=case.samples,
+        coordinates=case.system.n,
+        rows=case.system.m,
+        reference=reference,
+        measurements=tuple(found),
+        interrupted=interrupted,
+    )
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """A tolerance, or a step with the tolerance that Newton's iteration works to."""
+
+    tolerance: float
+    step: float | None = None
+
+    def options(self, method: str) -> IntegrationOptions:
+        return IntegrationOptions(method=method, tolerance=self.tolerance, step=self.step)
+
+    def row(self, method: str, status: str, reason: str, warned: tuple[str, ...] = ()) -> Measurement:
+        """A run that has nothing else to tell."""
+        tolerance = self.tolerance if self.step is None else None
+        return Measurement(method, tolerance, self.step, status, reason, warnings=warned)
+
+    def __str__(self) -> str:
+        return f"tolerance {self.tolerance:g} m" if self.step is None else f"step {self.step:g} s"
+
+
+def _plan(method: Method, options: ComparisonOptions) -> list[_Setting]:
+    """What a method is run with, loosest first; at least one, of which the method may say that it cannot."""
+    tolerances = [_Setting(value) for value in sorted(set(options.tolerances), reverse=True)]
+    steps = [_Setting(options.tightest, value) for value in sorted(set(options.steps), reverse=True)]
+    fitting = (tolerances if method.error_control else []) + (steps if method.fixed_step else [])
+    return fitting or (tolerances + steps)[:1]
+
+
+def _measurements(
+    case: Case,
+    method: Method,
+    plan: Sequence[_Setting],
+    places: NDArray[np.float64],
+    options: ComparisonOptions,
+    tell: Callable[[str], None],
+) -> Iterator[Measurement]:
+    slow: dict[bool, str] = {}
+    for number, setting in enumerate(plan):
+        by_step = setting.step is not None
+        if by_step in slow:
+            yield setting.row(method.name, "skipped", f"too slow at {slow[by_step]} already")
+            continue
+        tell(f"{method.title}, {setting}")
+        try:
+            if number == 0:
+                _warm_up(case, setting.options(method.name))
+            measured = _measure(case, method.name, setting, places, options)
+        except (InputError, NotImplementedError, ImportError) as error:
+            # Not this run but the method: what it takes, or a package that is not installed.
+            yield Measurement(method.name, status="unavailable", reason=_said(error))
+            return
+        if measured.status == "too slow":
+            slow[by_step] = str(setting)
+        yield measured
+
+
+def _warm_up(case: Case, options: IntegrationOptions) -> None:
+    """The first slice of a run: what is compiled or loaded when it is first called is there afterwards."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            _solve(case, options, 0.0)
+        except (_TooSlowError, NumericalError):
+            # A run that cannot go on says so when it is measured.
+            return
+
+
+def _measure(
+    case: Case, method: str, setting: _Setting, places: NDArray[np.float64], options: ComparisonOptions
+) -> Measurement:
+    """A run, repeated while that is quick."""
+    chosen, solutions = setting.options(method), list[Solution]()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            while len(solutions) < options.repetitions and sum(x.wall_time for x in solutions) < _LONG_ENOUGH:
+                solutions.append(_solve(case, chosen, options.limit))
+        except _TooSlowError:
+            if not solutions:
+                reason = f"stopped after {options.limit:g} s"
+                return setting.row(method, "too slow", reason, _texts(caught))
+        except NumericalError as error:
+            return setting.row(method, "failed", str(error), _texts(caught))
+    best = min(solutions, key=lambda solution: solution.wall_time)
+    return Measurement(
+        method=method,
+        tolerance=setting.tolerance if setting.step is None else None,
+        step=setting.step,
+        error=_distance(case.places(best), places),
+        repetitions=len(solutions),
+        warnings=_texts(caught),
+        **{name: getattr(best, name) for name in _FIGURES},
+    )
+
+
+def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
+    """A run to its end.
+
+    Raises
+    ------
+    _TooSlowError
+        It took longer than the limit.
+    KeyboardInterrupt
+        The user stopped it.
+    """
+    began, over = time.perf_counter(), False
+
+    def watch(reached: float) -> None:
+        nonlocal over
+        over = time.perf_counter() - began > limit
+        if over:
+            raise KeyboardInterrupt
+
+    solution = case.solve(options, watch)
+    if solution.status == "interrupted":
+        raise _TooSlowError if over else KeyboardInterrupt
+    return solution
+
+
+def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArray[np.float64]]:
+    """Two tight runs, by the two methods of highest order that can do it; the first is what errors are taken from."""
+    ours = sorted((x for x in METHODS.values() if x.family is Family.ESDIRK), key=lambda x: -x.order)
+    tolerance = options.tightest / _FINER
+    runs: list[tuple[Method, float, Solution]] = []
+    reasons = []
+    # Where one method only can do it, that one is held against itself at another tolerance.
+    for method, times in [(x, y) for y in (1.0, 4.0) for x in ours]:
+        asked = tolerance * (2.0 if runs and times == 1.0 else times)
+        try:
+            solved = _solve(case, IntegrationOptions(method=method.name, tolerance=asked), _PATIENCE * options.limit)
+        except NotImplementedError:
+            continue
+        except _TooSlowError:
+            reasons.append(f"{method.title} takes longer than {_PATIENCE * options.limit:g} s at {asked:g} m")
+            continue
+        except NumericalError as error:
+            reasons.append(f"{method.title} at {asked:g} m: {error}")
+            continue
+        runs.append((method, asked, solved))
+        if len(runs) == 2:
+            break
+    if len(runs) < 2:
+        raise IntegrationError(f"no converged run to compare with ({'; '.join(reasons)})")
+    (method, own, solution), (other, loose, check) = runs
+    places = case.places(solution)
+    uncertainty = _distance(places, case.places(check))
+    return Reference(method.name, own, other.name, loose, uncertainty, solution.wall_time), places
+
+
+def _distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Largest over points and samples [m]."""
+    return float(np.max(np.linalg.norm(one - other, axis=-1)))
+
+
+def _texts(caught: Sequence[warnings.WarningMessage]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(str(warning.message) for warning in caught))
+
+
+def _said(error: Exception) -> str:
+    return "not implemented" if isinstance(error, NotImplementedError) else str(error)
