@@ -230,7 +230,6 @@ def compare_methods(
         mechanism=mechanism,
         path=path,
         modes=[] if mode is None else [mode],
-        tolerance=None,
         duration=duration,
         samples=samples,
         assembly=assembly,
