@@ -222,6 +222,10 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
         if controls.fixed_step > 0.0:
             # Stretches between stops are divided evenly.
             h = left / max(1.0, ceil(left / controls.fixed_step - 1e-6))
+            # But for rounding the same step: its factor still serves.
+            if abs(h - m.clock[STEP]) <= 1e-9 * h:
+                h = m.clock[STEP]
+            m.clock[STEP] = h
         if left <= h * (1.0 + 1e-9):
             h, landing = left, True
         elif left < 2.0 * h and controls.fixed_step == 0.0:

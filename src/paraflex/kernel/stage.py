@@ -102,13 +102,14 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
             return DIVERGED, iteration, rate
         if iteration > 1:
             rate = change / previous
-            if rate > WORST_RATE and change > tolerance:
+            # From a good guess the second change may be no smaller than the first; from then on each has to be.
+            if change > tolerance and rate > (1.0 / WORST_RATE if iteration == 2 else WORST_RATE):
                 return DIVERGED, iteration, rate
         else:
             rate = min(WORST_RATE, AGEING * rate)
         if change * rate <= tolerance * (1.0 - min(rate, WORST_RATE)):
             place(qs, vs, g, b, a, shift, ws)
-            return CONVERGED, iteration, rate
+            return CONVERGED, iteration, min(rate, WORST_RATE)
         previous = change
     return DIVERGED, MAX_ITERATIONS, rate
 
