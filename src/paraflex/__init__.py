@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from paraflex import plots
-    from paraflex.errors import InputError, NumericalError, ParaflexError
+    from paraflex.errors import InputError, NumericalError, ParaflexError, StiffnessWarning
     from paraflex.files import Model, library_names, load, load_path
     from paraflex.integrators import METHODS, IntegrationOptions
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
@@ -31,6 +31,7 @@ _HOME = {
     "ParaflexError": "errors",
     "PointPath": "kinematics",
     "Polygon": "kinematics",
+    "StiffnessWarning": "errors",
     "chain_of_segments": "mechanism",
     "four_bars_in_a_row": "mechanism",
     "library_names": "files",
@@ -57,6 +58,7 @@ __all__ = [
     "ParaflexError",
     "PointPath",
     "Polygon",
+    "StiffnessWarning",
     "chain_of_segments",
     "four_bars_in_a_row",
     "library_names",

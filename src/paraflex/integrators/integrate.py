@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import ConstraintDriftError, IntegrationError, Moment
-from paraflex.integrators import native
+from paraflex.integrators import native, outside
 from paraflex.integrators.methods import Family
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Problem, Run, make_problem
@@ -110,7 +110,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     family = options.description.family
     if family in (Family.ESDIRK, Family.NEWMARK):
         return native.prepare(problem, options)
-    raise NotImplementedError(family)
+    return outside.prepare(problem, options)
 
 
 def _solution(run: Run, options: IntegrationOptions, wall_time: float, status: str, message: str) -> Solution:
