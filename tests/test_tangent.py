@@ -13,7 +13,6 @@ from paraflex.dynamics import build_system, constant_signals, pack_signals
 from paraflex.files import load
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.ode import (
-    accelerations,
     descriptor_jacobian,
     descriptor_residual,
     rates,

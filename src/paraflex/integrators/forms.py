@@ -23,7 +23,7 @@ from paraflex.kernel.ode import (
     stabilised_jacobian,
     stabilised_residual,
 )
-from paraflex.kernel.packed import CONSTRAINT, OMEGA2, Signals
+from paraflex.kernel.packed import OMEGA2
 from paraflex.kernel.tangent import make_tangent
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ class OdeForm:
         return Solved(a, lam, dependent)
 
     def rates(self, t: float, y: Array) -> Array:
-        """y' at (t, y), new."""
+        """Y' at (t, y), new."""
         dy = np.empty(y.size)
         rates(
             self.system.packed, self.signals, t, *self._gains, np.array(y), self._a, self._lam, self._torques,

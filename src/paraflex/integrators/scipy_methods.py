@@ -11,16 +11,29 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from paraflex.integrators.forms import OdeForm
-from paraflex.integrators.stepper import Effort, attempts
+from paraflex.integrators.stepper import Effort, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
 
 Array = NDArray[np.float64]
+
+
+class _Ndf(scipy.integrate.BDF):
+    """SciPy's NDF, its order held down: differences of lower orders stay as they are where the highest are dropped."""
+
+    highest = 5
+
+    def _step_impl(self) -> tuple[bool, str | None]:
+        done = super()._step_impl()
+        if self.order > self.highest:
+            self.order = self.highest
+        return done
+
 
 # Of each method: the solver, at how many times of a step it evaluates, and evaluations of an iteration, none if explicit.
 _SOLVERS = {
     "rk45": (scipy.integrate.RK45, 5, 0),
     "radau": (scipy.integrate.Radau, 3, 3),
-    "ndf": (scipy.integrate.BDF, 1, 1),
+    "ndf": (_Ndf, 1, 1),
 }
 # The least relative tolerance that SciPy takes without a warning.
 _RELATIVE = 1e-13
@@ -29,9 +42,9 @@ _RELATIVE = 1e-13
 class ScipyStepper:
     """Steps by one of SciPy's solvers, the absolute tolerances given: see `Stepper`."""
 
-    def __init__(self, method: str, form: OdeForm, tolerances: Array, first_step: float, max_step: float) -> None:
+    def __init__(self, method: str, form: OdeForm, tolerances: Array, steps: Steps) -> None:
         self._class, self._places, self._stages = _SOLVERS[method]
-        self.form, self._tolerances, self._first, self._max_step = form, tolerances, first_step, max_step
+        self.form, self._tolerances, self._steps = form, tolerances, steps
         self._seen: list[float] = []
         self._past, self._rejected, self._dense = Effort(0, 0, 0, 0), 0, None
 
@@ -41,9 +54,10 @@ class ScipyStepper:
         self._rejected, self._dense = 0, None
         options = {"jac": self.form.jacobian} if self._stages else {}
         self._solver = self._class(
-            self._evaluate, t, y, stop, rtol=_RELATIVE, atol=self._tolerances, max_step=self._max_step,
-            first_step=min(self._first, stop - t), **options,
+            self._evaluate, t, y, stop, rtol=_RELATIVE, atol=self._tolerances, max_step=self._steps.longest,
+            first_step=min(self._steps.first, stop - t), **options,
         )  # fmt: skip
+        self._solver.highest = self._steps.order
 
     def step(self, stop: float) -> int:
         """See `Stepper`."""

@@ -29,6 +29,14 @@ class Effort(NamedTuple):
         return Effort(*(a + b for a, b in zip(self, other, strict=True)))
 
 
+class Steps(NamedTuple):
+    """What steps a solver may take: the first and the longest [s], the highest order of a multistep method."""
+
+    first: float
+    longest: float
+    order: int
+
+
 class Stepper(Protocol):
     """A solver between steps."""
 

@@ -13,8 +13,8 @@ from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.run import Problem
 
 # How far on the imaginary axis a method is stable, |omega h|. Runge-Kutta: the root of |R(iy)| = 1 of Dormand and
-# Prince's polynomial. Adams: measured, see docs/theory.md.
-LIMITS = {"rk45": 0.997, "adams": 1.0}
+# Prince's polynomial. Adams: what steps of orders up to 12 come to on RAParM-I; the order follows the frequencies.
+LIMITS = {"rk45": 0.997, "adams": 0.75}
 # Steps that are worth a warning.
 MANY_STEPS = 20_000
 # Unknowns up to which all eigenvalues are found; beyond, the largest by Arnoldi's method.

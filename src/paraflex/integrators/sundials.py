@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 from types import ModuleType
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.integrators.forms import DescriptorForm, OdeForm
-from paraflex.integrators.stepper import Effort, attempts
+from paraflex.integrators.stepper import Effort, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PAUSED
 
 Array = NDArray[np.float64]
@@ -48,10 +49,9 @@ class SundialsStepper:
 
     form: OdeForm
 
-    def __init__(self, tolerances: Array, first_step: float, max_step: float) -> None:
+    def __init__(self, tolerances: Array, steps: Steps) -> None:
         self._package = load_sundials()
-        self._tolerances, self._first = tolerances, first_step
-        self._max_step = max_step if np.isfinite(max_step) else 0.0
+        self._tolerances, self._steps = tolerances, steps
         self._seen: list[float] = []
         self._effort, self._here, self._matrices, self._last = Effort(0, 0, 0, 0), None, 0, np.zeros(1)
         self.t, self.y = 0.0, np.zeros(0)
@@ -62,8 +62,10 @@ class SundialsStepper:
         options = {
             "rtol": _RELATIVE,
             "atol": self._tolerances,
-            "first_step": min(self._first, stop - t),
-            "max_step": self._max_step,
+            "first_step": min(self._steps.first, stop - t),
+            # Zero is no limit.
+            "max_step": self._steps.longest if math.isfinite(self._steps.longest) else 0.0,
+            "max_order": self._steps.order,
             "linsolver": "lapackdense" if y.size > _LAPACK else "dense",
         }
         self._solver = self._create(options)
