@@ -163,7 +163,8 @@ def platform(rods):
 def test_rows_that_follow_from_others_do_no_harm(kind):
     system = build_system(platform(3))
     found, exact = run(system, kind), run(system, "tr-bdf2", tolerance=1e-7)
-    assert distance(found, exact) < 1e-5
+    # The platform is told by one of its points, the tolerance is a mean over mass.
+    assert distance(found, exact) < 3e-5
     assert np.abs(found.multipliers - exact.multipliers).max() < 1e-3 * np.abs(exact.multipliers).max()
 
 

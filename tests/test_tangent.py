@@ -1,4 +1,4 @@
-"""The hand-made Jacobians of the residuals, of the accelerations and of the DAEs against differences of what they are of."""
+"""The hand-made Jacobians of residuals, accelerations and DAEs against differences of what they are of."""
 
 from __future__ import annotations
 

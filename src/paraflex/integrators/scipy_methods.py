@@ -29,7 +29,7 @@ class _Ndf(scipy.integrate.BDF):
         return done
 
 
-# Of each method: the solver, at how many times of a step it evaluates, and evaluations of an iteration, none if explicit.
+# Of each method: the solver, at how many times of a step it evaluates, evaluations of an iteration (none: explicit).
 _SOLVERS = {
     "rk45": (scipy.integrate.RK45, 5, 0),
     "radau": (scipy.integrate.Radau, 3, 3),

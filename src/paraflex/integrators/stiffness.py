@@ -31,7 +31,7 @@ def largest_rate(form: OdeForm, problem: Problem) -> float:
     if jacobian.shape[0] <= _DENSE:
         return float(np.max(np.abs(np.linalg.eigvals(jacobian))))
     start = np.ones(jacobian.shape[0])
-    values = scipy.sparse.linalg.eigs(jacobian, k=1, which="LM", v0=start, tol=1e-3, return_eigenvectors=False)
+    values = scipy.sparse.linalg.eigs(jacobian, k=1, which="LM", v0=start, return_eigenvectors=False)
     return float(np.max(np.abs(values)))
 
 

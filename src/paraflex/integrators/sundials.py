@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -35,13 +36,14 @@ def load_sundials() -> ModuleType:
         It is not installed.
     """
     try:
-        import sksundae.cvode
-        import sksundae.ida
+        package = import_module("sksundae")
+        import_module("sksundae.cvode")
+        import_module("sksundae.ida")
     except ImportError as error:
         raise InputError(
             "needs SUNDIALS, which is not installed", field="method", remedy="pip install 'paraflex[sundials]'"
         ) from error
-    return sksundae
+    return package
 
 
 class SundialsStepper:
@@ -136,21 +138,21 @@ class IdaStepper(SundialsStepper):
 
     def __init__(self, form: DescriptorForm, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.form: DescriptorForm = form
+        self.form = self._implicit = form
 
     def _create(self, options: dict[str, Any]) -> Any:
-        algebraic = self.form.algebraic.tolist() or None
+        algebraic = self._implicit.algebraic.tolist() or None
         return self._package.ida.IDA(self._residual, algebraic_idx=algebraic, jacfn=self._matrix, **options)
 
     def _start(self, t: float, y: Array) -> None:
-        self._solver.init_step(t, y, self.form.slopes(t, y))
+        self._solver.init_step(t, y, self._implicit.slopes(t, y))
 
     def _residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
         self._seen.append(t)
         self._last = np.empty(y.size)
-        self.form.residual(t, y, dy, self._last)
+        self._implicit.residual(t, y, dy, self._last)
         out[:] = self._last
 
     def _matrix(self, t: float, y: Array, dy: Array, residual: Array, c: float, out: Array) -> None:
         self._matrices += 1
-        out[:] = self.form.matrix(t, y, dy, c)
+        out[:] = self._implicit.matrix(t, y, dy, c)

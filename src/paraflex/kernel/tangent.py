@@ -58,7 +58,8 @@ def make_tangent(p: PackedSystem) -> Tangent:
     n, m = int(sum(3 + body["nf"] for body in p.bodies)), p.rows.size
     width = int((p.bodies["mass_end"] - p.bodies["mass"]).max(initial=0))
     points = None if p.bending is None else np.zeros((8, width))
-    return Tangent(*(np.zeros(k) for k in (n, n, n, m, n, m, m)), points)
+    q, v, a, f = (np.zeros(n) for _ in range(4))
+    return Tangent(q, v, a, np.zeros(m), f, np.zeros(m), np.zeros(m), points)
 
 
 @inlined
