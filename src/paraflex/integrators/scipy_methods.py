@@ -22,7 +22,7 @@ class _Ndf(scipy.integrate.BDF):
 
     highest = 5
 
-    def _step_impl(self) -> tuple[bool, str | None]:
+    def _step_impl(self):  # pyright: ignore[reportIncompatibleMethodOverride]
         done = super()._step_impl()
         if self.order > self.highest:
             self.order = self.highest

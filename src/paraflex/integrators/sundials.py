@@ -138,7 +138,8 @@ class IdaStepper(SundialsStepper):
 
     def __init__(self, form: DescriptorForm, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.form = self._implicit = form
+        self.form: OdeForm = form
+        self._implicit = form
 
     def _create(self, options: dict[str, Any]) -> Any:
         algebraic = self._implicit.algebraic.tolist() or None
