@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from paraflex import plots
-    from paraflex.errors import InputError, NumericalError, ParaflexError
+    from paraflex.errors import InputError, NumericalError, ParaflexError, StiffnessWarning
     from paraflex.files import Model, library_names, load, load_path
     from paraflex.integrators import METHODS, DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
@@ -34,6 +34,7 @@ _HOME = {
     "PointPath": "kinematics",
     "Polygon": "kinematics",
     "SingularDistance": "integrators",
+    "StiffnessWarning": "errors",
     "chain_of_segments": "mechanism",
     "four_bars_in_a_row": "mechanism",
     "library_names": "files",
@@ -63,6 +64,7 @@ __all__ = [
     "PointPath",
     "Polygon",
     "SingularDistance",
+    "StiffnessWarning",
     "chain_of_segments",
     "four_bars_in_a_row",
     "library_names",

@@ -23,6 +23,7 @@ __all__ = [
     "OutputError",
     "ParaflexError",
     "SingularActuationError",
+    "StiffnessWarning",
     "UnreachablePathError",
     "suggestion",
 ]
@@ -156,3 +157,7 @@ class IntegrationError(NumericalError):
 
 class ConstraintDriftError(IntegrationError):
     """Joints came apart, or a prescribed motion was left, further than errors of integration explain."""
+
+
+class StiffnessWarning(UserWarning):
+    """An explicit method will take very many steps, by stability alone."""

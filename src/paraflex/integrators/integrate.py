@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import ConstraintDriftError, IntegrationError, Moment
-from paraflex.integrators import native
+from paraflex.integrators import native, outside
 from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.gauges import make_gauges
 from paraflex.integrators.methods import Family
@@ -118,7 +118,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     family = options.description.family
     if family in (Family.ESDIRK, Family.NEWMARK):
         return native.prepare(problem, options)
-    raise NotImplementedError(family)
+    return outside.prepare(problem, options)
 
 
 def _solution(

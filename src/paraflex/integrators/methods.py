@@ -109,9 +109,20 @@ def _newmark(name: str, title: str, order: int, source: str, treatment: Treatmen
     )
 
 
-def _scipy(name: str, title: str, order: int, source: str, *, explicit: bool = False) -> Method:
-    return Method(name, title, Family.SCIPY, _ODE_FORM, order, _ODE, explicit=explicit, source=source)
+def _scipy(
+    name: str, title: str, order: int, source: str, *, explicit: bool = False, **parameters: Parameter
+) -> Method:
+    return Method(
+        name, title, Family.SCIPY, _ODE_FORM, order, _ODE, parameters=parameters, explicit=explicit, source=source
+    )
 
+
+def _max_order(default: float, most: float, meaning: str) -> Parameter:
+    return Parameter(default, 1.0, most, meaning)
+
+
+# Of the backward difference formulas only those of orders 1 and 2 are stable for undamped vibrations of any frequency.
+_A_STABLE = _max_order(2.0, 5.0, "highest order; above 2 vibrations that hardly decay dictate the step")
 
 _ALL = (
     _esdirk("tr-bdf2", "TR-BDF2", 2, "Hosea and Shampine (1996), Appl. Numer. Math. 20, 21-37"),
@@ -138,17 +149,22 @@ _ALL = (
     ),
     _scipy("rk45", "Runge-Kutta 4(5)", 5, "Dormand and Prince (1980), through SciPy", explicit=True),
     _scipy("radau", "Radau IIA", 5, "Hairer and Wanner (1996), IV.8, through SciPy"),
-    _scipy("ndf", "NDF", 5, "Shampine and Reichelt (1997), SIAM J. Sci. Comput. 18, 1-22, through SciPy"),
+    _scipy(
+        "ndf", "NDF", 2, "Shampine and Reichelt (1997), SIAM J. Sci. Comput. 18, 1-22, through SciPy",
+        max_order=_A_STABLE,
+    ),
     Method(
         "adams", "Adams", Family.SUNDIALS, _ODE_FORM, 12, _ODE, explicit=True,
+        parameters={"max_order": _max_order(12.0, 12.0, "highest order; up to 2 stiffness limits no step")},
         source="CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396",
     ),
     Method(
-        "bdf", "BDF (Gear)", Family.SUNDIALS, _ODE_FORM, 5, _ODE,
+        "bdf", "BDF (Gear)", Family.SUNDIALS, _ODE_FORM, 2, _ODE, parameters={"max_order": _A_STABLE},
         source="CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396",
     ),
     Method(
-        "ida", "IDA", Family.SUNDIALS, _INDEX_1, 5, (Treatment.BAUMGARTE, Treatment.GGL),
+        "ida", "IDA", Family.SUNDIALS, _INDEX_1, 2, (Treatment.BAUMGARTE, Treatment.GGL),
+        parameters={"max_order": _A_STABLE},
         source="IDA, Hindmarsh et al. (2005), ACM TOMS 31, 363-396",
     ),
 )  # fmt: skip

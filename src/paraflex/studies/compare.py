@@ -180,9 +180,9 @@ def _measurements(
             if number == 0:
                 _warm_up(case, setting.options(method.name))
             measured = _measure(case, method.name, setting, places, options)
-        except (InputError, NotImplementedError, ImportError) as error:
+        except (InputError, ImportError) as error:
             # Not this run but the method: what it takes, or a package that is not installed.
-            yield Measurement(method.name, status="unavailable", reason=_said(error))
+            yield Measurement(method.name, status="unavailable", reason=str(error))
             return
         if measured.status == "too slow":
             slow[by_step] = str(setting)
@@ -263,8 +263,6 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
         asked = tolerance * (2.0 if runs and times == 1.0 else times)
         try:
             solved = _solve(case, IntegrationOptions(method=method.name, tolerance=asked), _PATIENCE * options.limit)
-        except NotImplementedError:
-            continue
         except _TooSlowError:
             reasons.append(f"{method.title} takes longer than {_PATIENCE * options.limit:g} s at {asked:g} m")
             continue
@@ -289,7 +287,3 @@ def _distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 def _texts(caught: Sequence[warnings.WarningMessage]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(str(warning.message) for warning in caught))
-
-
-def _said(error: Exception) -> str:
-    return "not implemented" if isinstance(error, NotImplementedError) else str(error)

@@ -26,5 +26,5 @@ ESDIRK4 = make_tableau(
         "3295468053953/15064441987965",
     ],
     error_order=3,
-    nodes=[0, 2, 1, 3, 5],
+    nodes=[0, 2, 3, 5],
 )  # fmt: skip

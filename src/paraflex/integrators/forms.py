@@ -1,0 +1,207 @@
+"""The equations as solvers of others ask for them: functions of time and one vector, with Jacobian and tolerances.
+
+An `OdeForm` has y = (q, v, work), multipliers eliminated; the two forms for DAE solvers add them as unknowns. The work
+done is integrated beside the motion, without a say in the steps.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System, dependence
+from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.run import Problem
+from paraflex.kernel.ode import (
+    accelerations,
+    descriptor_jacobian,
+    descriptor_residual,
+    rates,
+    rates_jacobian,
+    stabilised_jacobian,
+    stabilised_residual,
+)
+from paraflex.kernel.packed import OMEGA2
+from paraflex.kernel.tangent import make_tangent
+
+Array = NDArray[np.float64]
+
+# Constraint rows with less than this of their squares left depend on the others for the moment.
+DEPENDENT_PART = 1e-7
+# A velocity error that no stiffness turns round moves the mechanism for a quarter of the run, as in our own schemes.
+_MEMORY = 0.25
+# An error that does not count [any unit].
+_IGNORED = 1e20
+
+
+class Solved(NamedTuple):
+    """Accelerations (n,) and multipliers (m,) at an instant, and how many rows depend on others there."""
+
+    a: Array
+    multipliers: Array
+    dependent: int
+
+
+class OdeForm:
+    """q' = v, v' = a(t, q, v), work' = power (Eqs. 59-60).
+
+    Attributes
+    ----------
+    signals : Signals
+        What acts, as steps may see it: exchanged at jumps.
+    evaluations : int
+        Of the equations until now.
+    """
+
+    def __init__(self, problem: Problem, options: IntegrationOptions) -> None:
+        system = problem.system
+        self.system, self.signals, self.evaluations = system, problem.signals, 0
+        self._gains = (options.alpha, options.beta)
+        self._weights = (1.0, 2.0 * options.alpha, options.beta**2)
+        self._torques, self._ws = np.zeros(len(system.mechanism.motors)), system.workspace()
+        self._a, self._lam, self._tangent = np.zeros(system.n), np.zeros(system.m), make_tangent(system.packed)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return 2 * self.system.n + 1
+
+    def solve(self, t: float, q: Array, v: Array) -> Solved:
+        """Accelerations and multipliers."""
+        a, lam = np.zeros(self.system.n), np.zeros(self.system.m)
+        dependent = accelerations(
+            self.system.packed, self.signals, t, *self._gains, np.ascontiguousarray(q), np.ascontiguousarray(v),
+            a, lam, self._torques, self._ws, DEPENDENT_PART,
+        )  # fmt: skip
+        return Solved(a, lam, dependent)
+
+    def rates(self, t: float, y: Array) -> Array:
+        """Y' at (t, y), new."""
+        dy = np.empty(y.size)
+        rates(
+            self.system.packed, self.signals, t, *self._gains, np.array(y), self._a, self._lam, self._torques,
+            self._ws, DEPENDENT_PART, dy,
+        )  # fmt: skip
+        self.evaluations += 1
+        return dy
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """Derivative of `rates` by y, new."""
+        out = np.empty((y.size, y.size))
+        self.rates(t, y)
+        arguments = (self._a, self._lam, self._torques, self._ws, self._tangent, out)
+        rates_jacobian(self.system.packed, self._weights, np.array(y), *arguments)
+        return out
+
+    def pack(self, t: float, q: Array, v: Array, work: float) -> Array:
+        """The vector y of a motion."""
+        return np.concatenate([q, v, [work]])
+
+    def unpack(self, y: Array) -> tuple[Array, Array, float]:
+        """The motion of a vector y: q, v, work."""
+        n = self.system.n
+        return y[:n].copy(), y[n : 2 * n].copy(), float(y[-1])
+
+    def tolerances(self, error: float, span: float) -> Array:
+        """Absolute tolerances (size,) of a norm that is the root mean square of errors over tolerances.
+
+        With these it is at most one where, in the mass norm, the position error is at most `error` [m] and so is what
+        the velocity error makes of it until it turns round: after 1 / omega in a flexible coordinate, else after a
+        quarter of the run. Off-diagonal terms of the mass matrix are left out.
+        """
+        system = self.system
+        q = error * np.sqrt(system.total_mass / (self.size * diagonal_mass(system)))
+        rate = np.full(system.n, 1.0 / (_MEMORY * span))
+        for body, packed in zip(system.bodies, system.packed.bodies, strict=True):
+            omega2 = system.packed.modal[OMEGA2, packed["flex"] : packed["flex"] + body.nf]
+            rate[body.flexible] = np.maximum(rate[body.flexible], np.sqrt(np.maximum(omega2, 0.0)))
+        out = np.full(self.size, _IGNORED)
+        out[: 2 * system.n] = np.concatenate([q, rate * q])
+        return out
+
+
+class DescriptorForm(OdeForm):
+    """The DAE of index 1 in y = (q, v, lambda, work), with Baumgarte's terms (Eqs. 56-57).
+
+    Constraint rows that follow from others at the start are left out, their multipliers zero.
+    """
+
+    multipliers = 1
+
+    def __init__(self, problem: Problem, options: IntegrationOptions) -> None:
+        super().__init__(problem, options)
+        self._dropped = np.zeros(self.system.m, dtype=bool)
+        self._dropped[dependence(self.system, problem.initial.q).dropped] = True
+
+    @property
+    def size(self) -> int:
+        """See `OdeForm`."""
+        return 2 * self.system.n + self.multipliers * self.system.m + 1
+
+    @property
+    def algebraic(self) -> NDArray[np.int64]:
+        """Which unknowns have no derivative."""
+        return np.arange(2 * self.system.n, self.size - 1)
+
+    def residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
+        """Residual into out (size,)."""
+        arguments = (np.array(y), np.array(dy), self._dropped, self._torques, self._ws, out)
+        descriptor_residual(self.system.packed, self.signals, t, *self._gains, *arguments)
+        self.evaluations += 1
+
+    def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
+        """Derivative of the residual by y, plus c times that by dy, new."""
+        out = np.empty((self.size, self.size))
+        self.residual(t, y, dy, np.empty(self.size))
+        arguments = (c, self._dropped, self._torques, self._ws, self._tangent, out)
+        descriptor_jacobian(self.system.packed, self._weights, np.array(y), np.array(dy), *arguments)
+        return out
+
+    def pack(self, t: float, q: Array, v: Array, work: float) -> Array:
+        """See `OdeForm`; multipliers are those of the instant."""
+        lam = self.solve(t, q, v).multipliers
+        return np.concatenate([q, v, lam, np.zeros((self.multipliers - 1) * self.system.m), [work]])
+
+    def slopes(self, t: float, y: Array) -> Array:
+        """Derivative of a packed y, those of algebraic unknowns zero."""
+        n, dy = self.system.n, np.zeros(self.size)
+        found = self.rates(t, np.concatenate([y[: 2 * n], y[-1:]]))
+        dy[: 2 * n], dy[-1] = found[:-1], found[-1]
+        return dy
+
+
+class StabilisedForm(DescriptorForm):
+    """The stabilised form of index 2 in y = (q, v, lambda, mu, work): Gear, Gupta and Leimkuhler (1985)."""
+
+    multipliers = 2
+
+    def __init__(self, problem: Problem, options: IntegrationOptions) -> None:
+        super().__init__(problem, options)
+        system = self.system
+        self._weight, self._idle = diagonal_mass(system), np.zeros(system.n + self._torques.size)
+        self._phi, self._dphi = np.zeros(system.m), np.zeros(system.m)
+
+    def residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
+        """See `DescriptorForm`."""
+        arguments = (self._weight, self._torques, self._idle, self._ws, self._tangent, self._phi, self._dphi, out)
+        packed, signals = self.system.packed, self.signals
+        stabilised_residual(packed, signals, t, np.array(y), np.array(dy), self._dropped, *arguments)
+        self.evaluations += 1
+
+    def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
+        """See `DescriptorForm`."""
+        out = np.empty((self.size, self.size))
+        self.residual(t, y, dy, np.empty(self.size))
+        arguments = (self._weight, self._torques, self._idle, self._ws, self._tangent, out)
+        stabilised_jacobian(self.system.packed, np.array(y), np.array(dy), c, self._dropped, *arguments)
+        return out
+
+
+def diagonal_mass(system: System) -> Array:
+    """Mass (n,) that each coordinate moves: the body's, its moment of inertia, one for modes of unit mass."""
+    mass = np.ones(system.n)
+    for body, packed in zip(system.bodies, system.packed.bodies, strict=True):
+        mass[body.offset : body.offset + 3] = packed["m"], packed["m"], packed["I0"]
+    return mass

@@ -1,0 +1,194 @@
+"""Runs by solvers of others: stops, samples, energies and figures around a `Stepper`."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
+from paraflex.integrators.methods import Family, Treatment
+from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.run import Figures, Instant, Problem, empty_samples
+from paraflex.integrators.scipy_methods import ScipyStepper
+from paraflex.integrators.stepper import Stepper, Steps
+from paraflex.integrators.stiffness import warn_if_stiff
+from paraflex.integrators.stretches import hidden_from
+from paraflex.integrators.sundials import CvodeStepper, IdaStepper
+from paraflex.kernel.linear import factor_system
+from paraflex.kernel.ode import stored_energy
+from paraflex.kernel.run_state import FINISHED, PAUSED
+
+Array = NDArray[np.float64]
+
+# Where the first step starts from, as a fraction of the run; error control takes over at once.
+_FIRST_STEP = 1e-6
+# What the estimated error of a step may be, of the tolerance: estimates say how far a solver errs in a step, not how
+# errors add up. Measured on RAParM-I, a soft arm and a falling platform, whose ends err by 0.01 to 2 tolerances.
+_PER_STEP = {"rk45": 0.1, "radau": 5.0, "ndf": 0.1, "adams": 0.5, "bdf": 0.1, "ida": 0.1}
+# With order p errors add up to h^p where a step's is h^(p + 1): multistep methods are held to the tolerance at this
+# one, and to a power (p + 1) / p of it elsewhere [m].
+_REFERENCE = 1e-4
+# How long a slice of steps may take before someone looks [s].
+_PATIENCE = 0.1
+
+
+class OutsideRun:
+    """A run by a solver of others: a `Run`."""
+
+    def __init__(self, problem: Problem, options: IntegrationOptions, stepper: Stepper) -> None:
+        self.problem, self.samples, self._stepper = problem, empty_samples(problem.times, problem.system), stepper
+        self._options, self._points = options, problem.system.workspace().points
+        packed, initial = problem.system.packed, problem.initial
+        self.dependent_rows = int(factor_system(packed, 0.0, initial.q, problem.system.workspace()))
+        self.reached, self._steps = 0, 0
+        self._violation, self._balance, self._energy = np.zeros(2), 0.0, np.zeros(3)
+        self._passages: list[tuple[float, float]] = []
+        self._instant = Instant(
+            initial.time, initial.q, initial.v, np.zeros(problem.system.n), np.zeros(problem.system.m), 0.0
+        )
+
+    @property
+    def attempts(self) -> int:
+        """See `Run`."""
+        return self._steps + self._stepper.effort().rejected if self._steps else 0
+
+    def start(self) -> None:
+        """See `Run`."""
+        initial = self.problem.initial
+        self._begin(initial.time, initial.q, initial.v, 0.0)
+        self._energy = self._energies(self._instant)
+        self._note(self._instant)
+        if self.samples.times[0] <= initial.time:
+            self._sample(initial.time, initial.q, initial.v, 0.0)
+        # Adams formulas up to order 2 are solved by Newton's iteration and stable for any step.
+        if self._options.description.explicit and _max_order(self._options) > 2:
+            warn_if_stiff(self._stepper.form, self.problem, self._options.method)
+
+    def march(self, attempts: int) -> int:
+        """See `Run`; fewer steps where they take long."""
+        until, began = self.attempts + attempts, time.perf_counter()
+        while self.attempts < until and time.perf_counter() - began < _PATIENCE:
+            code = self._advance()
+            if code != PAUSED:
+                return code
+        return PAUSED
+
+    def now(self) -> Instant:
+        """See `Run`."""
+        return self._instant
+
+    def figures(self) -> Figures:
+        """See `Run`."""
+        effort = self._stepper.effort()
+        return Figures(
+            steps=self._steps,
+            rejected=effort.rejected,
+            newton_iterations=effort.iterations,
+            factorisations=effort.factorisations,
+            evaluations=effort.evaluations,
+            constraint_position_max=float(self._violation[0]),
+            constraint_velocity_max=float(self._violation[1]),
+            energy_balance_max=float(self._balance),
+            passages=np.array(self._passages).reshape(-1, 2).T,
+        )
+
+    def _begin(self, t: float, q: Array, v: Array, work: float) -> None:
+        """Start anew, with what acts from t on as far as the next jump."""
+        problem, form = self.problem, self._stepper.form
+        ahead = problem.jumps[problem.jumps > t]
+        form.signals = hidden_from(problem.signals, ahead[0]) if ahead.size else problem.signals
+        solved = form.solve(t, q, v)
+        self._instant = Instant(t, q.copy(), v.copy(), solved.a, solved.multipliers, work)
+        self._stepper.begin(t, form.pack(t, q, v, work), float(problem.stops[problem.stops > t][0]))
+
+    def _advance(self) -> int:
+        """One accepted step."""
+        problem, stepper, before = self.problem, self._stepper, self._instant.t
+        ahead = problem.stops[problem.stops > before]
+        if ahead.size == 0:
+            return FINISHED
+        code = stepper.step(float(ahead[0]))
+        if code != PAUSED:
+            return code
+        self._steps += 1
+        q, v, work = stepper.form.unpack(stepper.y)
+        solved = stepper.form.solve(stepper.t, q, v)
+        if solved.dependent > self.dependent_rows:
+            self._note_passage(before, stepper.t)
+        self._instant = Instant(stepper.t, q, v, solved.a, solved.multipliers, work)
+        self._note(self._instant)
+        times = self.samples.times
+        while self.reached < times.size and times[self.reached] <= stepper.t:
+            at = float(times[self.reached])
+            self._sample(at, *stepper.form.unpack(stepper.at(at) if at < stepper.t else stepper.y))
+        if stepper.t in problem.jumps:
+            self._begin(stepper.t, q, v, work)
+        return PAUSED
+
+    def _energies(self, instant: Instant) -> Array:
+        packed = self.problem.system.packed
+        return np.array(stored_energy(packed, instant.q, instant.v, instant.multipliers, self._points))
+
+    def _note(self, instant: Instant) -> None:
+        """Keep the largest violations of constraints and of the energy balance."""
+        values = self.problem.system.constraints(self._stepper.form.signals, instant.t, instant.q, instant.v)
+        largest = [np.max(np.abs(x), initial=0.0) for x in values]
+        self._violation = np.maximum(self._violation, largest)
+        change = self._energies(instant) - self._energy
+        self._balance = max(self._balance, abs(change[0] + change[1] - change[2] - instant.work))
+
+    def _note_passage(self, t0: float, t1: float) -> None:
+        """Keep from when to when a run is at a singular position; steps that touch are of one."""
+        if self._passages and t0 <= self._passages[-1][1]:
+            t0 = self._passages.pop()[0]
+        self._passages.append((t0, t1))
+
+    def _sample(self, t: float, q: Array, v: Array, work: float) -> None:
+        out, i, solved = self.samples, self.reached, self._stepper.form.solve(t, q, v)
+        out.q[i], out.v[i], out.a[i], out.lam[i] = q, v, solved.a, solved.multipliers
+        energies = self._energies(Instant(t, q, v, solved.a, solved.multipliers, work))
+        out.energy[i] = energies[0], energies[1], work + energies[2] - self._energy[2]
+        self.reached = i + 1
+
+
+def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
+    """Set up a run.
+
+    Raises
+    ------
+    InputError
+        SUNDIALS is not installed; or gains that follow the step, which only our own schemes know.
+    """
+    if options.automatic_gains:
+        raise InputError(
+            f"{options.method} does not show its steps", field="automatic_gains", value=True,
+            remedy="give alpha and beta, or choose another method",
+        )  # fmt: skip
+    return OutsideRun(problem, options, _stepper(problem, options))
+
+
+def _stepper(problem: Problem, options: IntegrationOptions) -> Stepper:
+    method, order, error = options.method, _max_order(options), _PER_STEP[options.method] * options.tolerance
+    if "max_order" in options.description.parameters:
+        error *= (options.tolerance / _REFERENCE) ** (1.0 / order)
+    steps = Steps(min(_FIRST_STEP * problem.span, options.max_step), options.max_step, order)
+    if method == "ida":
+        kind = StabilisedForm if options.treatment == Treatment.GGL else DescriptorForm
+        form = kind(problem, options)
+        return IdaStepper(form, form.tolerances(error, problem.span), steps)
+    form = OdeForm(problem, options)
+    kind = ScipyStepper if options.description.family == Family.SCIPY else CvodeStepper
+    return kind(method, form, form.tolerances(error, problem.span), steps)
+
+
+def _max_order(options: IntegrationOptions) -> int:
+    """The highest order of a multistep method; any of the others have one order."""
+    order = options.all_parameters.get("max_order", options.description.order)
+    if order != int(order):
+        raise InputError(
+            "must be a whole number", field="parameters.max_order", value=order, remedy="give the order, say 2"
+        )
+    return int(order)

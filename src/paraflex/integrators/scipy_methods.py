@@ -1,0 +1,108 @@
+"""SciPy's solvers of ordinary differential equations, one step at a time: a `Stepper`."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import scipy.integrate
+import scipy.linalg
+from numpy.typing import NDArray
+
+from paraflex.integrators.forms import OdeForm
+from paraflex.integrators.stepper import Effort, Steps, attempts
+from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
+
+Array = NDArray[np.float64]
+
+
+class _Ndf(scipy.integrate.BDF):
+    """SciPy's NDF, its order held down: differences of lower orders stay as they are where the highest are dropped."""
+
+    highest = 5
+
+    def _step_impl(self):  # pyright: ignore[reportIncompatibleMethodOverride]
+        done = super()._step_impl()
+        if self.order > self.highest:
+            self.order = self.highest
+        return done
+
+
+# Of each method: the solver, at how many times of a step it evaluates, evaluations of an iteration (none: explicit).
+_SOLVERS = {
+    "rk45": (scipy.integrate.RK45, 5, 0),
+    "radau": (scipy.integrate.Radau, 3, 3),
+    "ndf": (_Ndf, 1, 1),
+}
+# The least relative tolerance that SciPy takes without a warning.
+_RELATIVE = 1e-13
+
+
+class ScipyStepper:
+    """Steps by one of SciPy's solvers, the absolute tolerances given: see `Stepper`."""
+
+    def __init__(self, method: str, form: OdeForm, tolerances: Array, steps: Steps) -> None:
+        self._class, self._places, self._stages = _SOLVERS[method]
+        self.form, self._tolerances, self._steps = form, tolerances, steps
+        self._seen: list[float] = []
+        self._past, self._rejected, self._dense = Effort(0, 0, 0, 0), 0, None
+
+    def begin(self, t: float, y: Array, stop: float) -> None:
+        """See `Stepper`."""
+        self._past = self.effort() if hasattr(self, "_solver") else self._past
+        self._rejected, self._dense = 0, None
+        options = {"jac": self.form.jacobian} if self._stages else {}
+        self._solver = self._class(
+            self._evaluate, t, y, stop, rtol=_RELATIVE, atol=self._tolerances, max_step=self._steps.longest,
+            first_step=min(self._steps.first, stop - t), **options,
+        )  # fmt: skip
+        self._solver.highest = self._steps.order
+
+    def step(self, stop: float) -> int:
+        """See `Stepper`."""
+        solver, before = self._solver, self._solver.t
+        solver.t_bound, solver.status = stop, "running"
+        self._seen.clear()
+        self._dense = None
+        try:
+            # A solution that overflows is reported as that, not number by number.
+            with np.errstate(all="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
+                solver.step()
+        except (ValueError, np.linalg.LinAlgError):
+            # What factors the matrices refuses numbers that are not finite.
+            return NOT_FINITE
+        tried = attempts(self._seen, before, self._places)
+        if solver.status == "failed":
+            self._rejected += tried
+            return ERROR_TEST if np.all(np.isfinite(self._last)) else NOT_FINITE
+        self._rejected += max(tried - 1, 0)
+        return PAUSED if np.all(np.isfinite(solver.y)) else NOT_FINITE
+
+    @property
+    def t(self) -> float:
+        """See `Stepper`."""
+        return float(self._solver.t)
+
+    @property
+    def y(self) -> Array:
+        """See `Stepper`."""
+        return self._solver.y
+
+    def at(self, time: float) -> Array:
+        """See `Stepper`."""
+        if self._dense is None:
+            self._dense = self._solver.dense_output()
+        return self._dense(time)
+
+    def effort(self) -> Effort:
+        """See `Stepper`. SciPy counts evaluations; iterations follow from them."""
+        solver = self._solver
+        iterations = int(solver.nfev) // self._stages if self._stages else 0
+        return self._past + Effort(int(solver.nfev), self._rejected, iterations, int(solver.nlu))
+
+    def _evaluate(self, t: float, y: Array) -> Array:
+        self._seen.append(t)
+        self._last = self.form.rates(t, y) if math.isfinite(t) else np.full(y.size, np.nan)
+        return self._last

@@ -1,0 +1,49 @@
+"""What an explicit method has to expect of a stiff mechanism."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import scipy.sparse.linalg
+
+from paraflex.errors import StiffnessWarning
+from paraflex.integrators.forms import OdeForm
+from paraflex.integrators.run import Problem
+
+# How far on the imaginary axis a method is stable, |omega h|. Runge-Kutta: the root of |R(iy)| = 1 of Dormand and
+# Prince's polynomial. Adams: what steps of orders up to 12 come to on RAParM-I; the order follows the frequencies.
+LIMITS = {"rk45": 0.997, "adams": 0.75}
+# Steps that are worth a warning.
+MANY_STEPS = 20_000
+# Unknowns up to which all eigenvalues are found; beyond, the largest by Arnoldi's method.
+_DENSE = 600
+
+
+def largest_rate(form: OdeForm, problem: Problem) -> float:
+    """The largest eigenvalue of the ODE form's Jacobian at the start, in magnitude [1/s].
+
+    Of the constrained mechanism, with springs, damping and Baumgarte's terms.
+    """
+    initial = problem.initial
+    jacobian = form.jacobian(initial.time, form.pack(initial.time, initial.q, initial.v, 0.0))
+    if jacobian.shape[0] <= _DENSE:
+        return float(np.max(np.abs(np.linalg.eigvals(jacobian))))
+    start = np.ones(jacobian.shape[0])
+    values = scipy.sparse.linalg.eigs(jacobian, k=1, which="LM", v0=start, return_eigenvectors=False)
+    return float(np.max(np.abs(values)))
+
+
+def warn_if_stiff(form: OdeForm, problem: Problem, method: str) -> None:
+    """Say once how many steps stability alone will take, where these are many."""
+    rate = largest_rate(form, problem)
+    step = LIMITS[method] / rate if rate > 0.0 else math.inf
+    steps = problem.span / step
+    if steps > MANY_STEPS:
+        warnings.warn(
+            f"{method} is explicit and this mechanism stiff: no step can be longer than about {step:.2g} s, "
+            f"{steps:,.0f} steps for this run; an implicit method, such as tr-bdf2, takes steps by accuracy alone",
+            StiffnessWarning,
+            stacklevel=2,
+        )

@@ -1,0 +1,159 @@
+"""CVODE and IDA of SUNDIALS through scikit-sundae, one step at a time: each a `Stepper`."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.integrators.forms import DescriptorForm, OdeForm
+from paraflex.integrators.stepper import Effort, Steps, attempts
+from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PAUSED
+
+Array = NDArray[np.float64]
+
+# The least relative tolerance that SUNDIALS recommends.
+_RELATIVE = 1e-15
+# Return codes of both solvers: too much accuracy is asked for, error tests fail. Others are of Newton's iteration.
+_ACCURACY, _ERROR_TESTS = -2, -3
+# Unknowns from which on LAPACK's factorisation is faster than SUNDIALS' own.
+_LAPACK = 60
+
+
+def load_sundials() -> ModuleType:
+    """The package that runs SUNDIALS.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    try:
+        package = import_module("sksundae")
+        import_module("sksundae.cvode")
+        import_module("sksundae.ida")
+    except ImportError as error:
+        raise InputError(
+            "needs SUNDIALS, which is not installed", field="method", remedy="pip install 'paraflex[sundials]'"
+        ) from error
+    return package
+
+
+class SundialsStepper:
+    """What CVODE and IDA have in common: see `Stepper`."""
+
+    form: OdeForm
+
+    def __init__(self, tolerances: Array, steps: Steps) -> None:
+        self._package = load_sundials()
+        self._tolerances, self._steps = tolerances, steps
+        self._seen: list[float] = []
+        self._effort, self._here, self._matrices, self._last = Effort(0, 0, 0, 0), None, 0, np.zeros(1)
+        self.t, self.y = 0.0, np.zeros(0)
+
+    def begin(self, t: float, y: Array, stop: float) -> None:
+        """See `Stepper`."""
+        self.t, self.y, self._stop = t, y, stop
+        options = {
+            "rtol": _RELATIVE,
+            "atol": self._tolerances,
+            "first_step": min(self._steps.first, stop - t),
+            # Zero is no limit.
+            "max_step": self._steps.longest if math.isfinite(self._steps.longest) else 0.0,
+            "max_order": self._steps.order,
+            "linsolver": "lapackdense" if y.size > _LAPACK else "dense",
+        }
+        self._solver = self._create(options)
+        self._start(t, y)
+
+    def step(self, stop: float) -> int:
+        """See `Stepper`."""
+        self._stop, before = stop, self.t
+        self._seen.clear()
+        result = self._call(stop, "onestep")
+        # After a look back the first call only returns to where the last step ended.
+        while result.status >= 0 and result.t <= before:
+            result = self._call(stop, "onestep")
+        tried = attempts(self._seen, before, 1)
+        self._effort += Effort(len(self._seen), max(tried - 1, 0), len(self._seen), self._matrices)
+        self._matrices = 0
+        if not (np.all(np.isfinite(result.y)) and np.all(np.isfinite(self._last))):
+            return NOT_FINITE
+        if result.status < 0:
+            return ERROR_TEST if result.status in (_ACCURACY, _ERROR_TESTS) else NO_CONVERGENCE
+        self.t, self.y = float(result.t), result.y
+        return PAUSED
+
+    def at(self, time: float) -> Array:
+        """See `Stepper`."""
+        return self._call(time, "normal").y
+
+    def effort(self) -> Effort:
+        """See `Stepper`. Every evaluation is of an iteration; factorisations are those with a new Jacobian."""
+        return self._effort
+
+    def _call(self, time: float, method: str) -> Any:
+        # Failures are printed as well as returned.
+        with contextlib.redirect_stdout(io.StringIO()):
+            return self._solver.step(time, method=method, tstop=self._stop)
+
+    def _create(self, options: dict[str, Any]) -> Any:
+        raise NotImplementedError
+
+    def _start(self, t: float, y: Array) -> None:
+        raise NotImplementedError
+
+
+class CvodeStepper(SundialsStepper):
+    """CVODE on the ODE form."""
+
+    def __init__(self, method: str, form: OdeForm, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.form, self._method = form, {"adams": "Adams", "bdf": "BDF"}[method]
+
+    def _create(self, options: dict[str, Any]) -> Any:
+        return self._package.cvode.CVODE(self._rates, method=self._method, jacfn=self._jacobian, **options)
+
+    def _start(self, t: float, y: Array) -> None:
+        self._solver.init_step(t, y)
+
+    def _rates(self, t: float, y: Array, dy: Array) -> None:
+        self._seen.append(t)
+        dy[:] = self._last = self.form.rates(t, y)
+
+    def _jacobian(self, t: float, y: Array, dy: Array, out: Array) -> None:
+        self._matrices += 1
+        out[:] = self.form.jacobian(t, y)
+
+
+class IdaStepper(SundialsStepper):
+    """IDA on a form with multipliers."""
+
+    def __init__(self, form: DescriptorForm, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.form: OdeForm = form
+        self._implicit = form
+
+    def _create(self, options: dict[str, Any]) -> Any:
+        algebraic = self._implicit.algebraic.tolist() or None
+        return self._package.ida.IDA(self._residual, algebraic_idx=algebraic, jacfn=self._matrix, **options)
+
+    def _start(self, t: float, y: Array) -> None:
+        self._solver.init_step(t, y, self._implicit.slopes(t, y))
+
+    def _residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
+        self._seen.append(t)
+        self._last = np.empty(y.size)
+        self._implicit.residual(t, y, dy, self._last)
+        out[:] = self._last
+
+    def _matrix(self, t: float, y: Array, dy: Array, residual: Array, c: float, out: Array) -> None:
+        self._matrices += 1
+        out[:] = self._implicit.matrix(t, y, dy, c)
