@@ -23,6 +23,7 @@ from paraflex.kernel.run_state import (
     FACTOR_B,
     FAILURES,
     FINISHED,
+    LAST_ERROR,
     LAST_STEP,
     PAUSED,
     PHI_MAX,
@@ -40,6 +41,9 @@ from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
+# Errors of vibrations rise and fall within a period: the error before has a say as well (Gustafsson 1994). None counts
+# as smaller than this part of what is allowed.
+BY_ERROR, BY_LAST_ERROR, SMALLEST_ERROR = 0.7, 0.4, 1e-3
 # A new step this close to the old one is not worth a new factorisation.
 KEEP_ABOVE, KEEP_BELOW = 0.92, 1.2
 # The smallest step, as a fraction of the time span.
@@ -141,7 +145,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     copy(m.v, m.stage_v[0])
     copy(m.v, m.stage_d[0])
     copy(a, m.algorithmic[0])
-    m.clock[LAST_STEP] = 0.0
+    m.clock[LAST_STEP], m.clock[LAST_ERROR] = 0.0, 1.0
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques, ws)
     kinetic, strain = system_energy(p, m.q, m.v, ws.points)
     strain += spring_energy(p, lam) + line_energy(p, m.q, m.v)[0]
@@ -237,7 +241,10 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
             m.clock[TIME] = stops[m.counts[STOP]] if landing else t + h
             if controls.fixed_step > 0.0:
                 continue
-            factor = min(MAX_FACTOR, SAFETY * (1.0 / max(error, 1e-12)) ** exponent)
+            error = max(error, SMALLEST_ERROR) / SAFETY**tableau.order
+            factor = error ** (-BY_ERROR * exponent) * m.clock[LAST_ERROR] ** (BY_LAST_ERROR * exponent)
+            factor = min(MAX_FACTOR, factor)
+            m.clock[LAST_ERROR] = error
             # Keep the step, and with it the factor, unless the change is worth it; a step cut short to land on a stop
             # says nothing about longer ones.
             if factor < KEEP_ABOVE or (factor > KEEP_BELOW and h >= m.clock[STEP] and not after_failure):

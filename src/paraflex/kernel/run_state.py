@@ -12,7 +12,7 @@ MOST_PASSAGES = 1000
 # Why `march` returned.
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # March.clock
-TIME, STEP, WORK, FACTOR_B, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP = range(11)
+TIME, STEP, WORK, FACTOR_B, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(12)
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES, PASSAGES = range(9)
 
@@ -102,7 +102,7 @@ def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGA
     """Allocate the state of a run with n coordinates and m constraint rows."""
     stage_v = np.zeros((stages, n))
     return March(
-        clock=np.zeros(11),
+        clock=np.zeros(12),
         counts=np.zeros(9, dtype=np.int64),
         q=np.zeros(n),
         v=np.zeros(n),

@@ -37,8 +37,9 @@ MAX_ITERATIONS = 8
 CONVERGED, DIVERGED = 0, 1
 # The slowest contraction worth going on with, assumed of a new factor until one is measured.
 WORST_RATE = 0.5
-# A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it.
-AGEING = 1.05
+# A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it. It is not
+# taken to be better than this: motion that sets in makes it worse at once.
+AGEING, BEST_RATE = 1.05, 0.02
 
 
 @kernel
@@ -106,7 +107,7 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
             if change > tolerance and rate > (1.0 / WORST_RATE if iteration == 2 else WORST_RATE):
                 return DIVERGED, iteration, rate
         else:
-            rate = min(WORST_RATE, AGEING * rate)
+            rate = min(WORST_RATE, max(BEST_RATE, AGEING * rate))
         if change * rate <= tolerance * (1.0 - min(rate, WORST_RATE)):
             place(qs, vs, g, b, a, shift, ws)
             return CONVERGED, iteration, min(rate, WORST_RATE)
