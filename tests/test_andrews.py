@@ -147,10 +147,10 @@ def test_the_library_has_it():
     assert model.study.duration == 0.03
 
 
-def run(tolerance):
+def run(tolerance, **more):
     system = build_system(squeezer())
     start = State(0.0, place(system, START), np.zeros(system.n))
-    options = IntegrationOptions(tolerance=tolerance)
+    options = IntegrationOptions(tolerance=tolerance, **more)
     run = simulate_motion(squeezer(), 0.03, samples=2, start=start, options=options)
     return run.solution
 
@@ -171,3 +171,10 @@ def test_seven_angles_at_the_end_as_published():
     np.testing.assert_allclose(rates, END_RATES, rtol=1e-5)
     assert fine.energy_balance_max < 1e-5 * fine.kinetic_energy[-1]
     assert fine.work[-1] == pytest.approx(moment * (END[0] - START[0]), rel=1e-6)
+
+
+@pytest.mark.parametrize("method", ["esdirk4", "esdirk5"])
+def test_seven_angles_to_1e_8_by_methods_of_high_order(method):
+    solution = run(1e-10, method=method)
+    assert published(solution.q[-1]) == pytest.approx(END, rel=0, abs=1e-8)
+    assert solution.steps < 10000

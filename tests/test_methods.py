@@ -1,86 +1,264 @@
 """Our own methods on a stiff flexible mechanism with a loop: orders, treatments of constraints, steps, bad input."""
 
-from functools import cache
+import importlib.util
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import InputError, IntegrationError
+from paraflex.files import load
 from paraflex.integrators import METHODS, IntegrationOptions, integrate
 from paraflex.integrators.methods import Family
-from paraflex.kernel.packed import Signals
-from paraflex.mechanism import (
-    Assembly,
-    FlexibleBeam,
-    Geometry,
-    Material,
-    Mechanism,
-    ModalDamping,
-    Motor,
-    PointRef,
-    RevoluteJoint,
-    Section,
-)
+from paraflex.integrators.newmark import newmark_numbers
+from paraflex.mechanism import Geometry
+from paraflex.simulate import plan_tracking
 
-END, TORQUE = 0.05, 3.0
+_SPEC = importlib.util.spec_from_file_location("orders", Path(__file__).parents[1] / "benchmarks" / "orders.py")
+assert _SPEC is not None
+assert _SPEC.loader is not None
+study = importlib.util.module_from_spec(_SPEC)
+sys.modules["orders"] = study
+_SPEC.loader.exec_module(study)
+
 NATIVE = [name for name, method in METHODS.items() if method.family in (Family.ESDIRK, Family.NEWMARK)]
+ESDIRK = [name for name in NATIVE if METHODS[name].family is Family.ESDIRK]
 
 
-def four_bar(modes=None, ratio=0.05, geometry=Geometry.LINEAR) -> Mechanism:
-    """Three strips of steel; frequencies from 130 to 290,000 rad/s, or to 3,200 with two modes a link."""
-
-    def link(name, length, a, b):
-        return FlexibleBeam(
-            name, length, Section.rectangle(0.02, 0.003), Material(210e9, 7850.0), points={a: 0.0, b: length},
-            elements=2, modes=modes, damping=ModalDamping((ratio,)) if ratio else None,
-        )  # fmt: skip
-
-    ends = {"O": ("ground", "crank"), "A": ("crank", "coupler"), "B": ("coupler", "rocker"), "Q": ("ground", "rocker")}
-    return Mechanism(
-        name="four-bar",
-        ground={"O": (0.0, 0.0), "Q": (0.4, 0.0)},
-        bodies=(link("crank", 0.1, "O", "A"), link("coupler", 0.35, "A", "B"), link("rocker", 0.25, "Q", "B")),
-        joints=tuple(RevoluteJoint(k, PointRef(a, k), PointRef(b, k)) for k, (a, b) in ends.items()),
-        motors=(Motor("drive", "O"),),
-        assemblies=(Assembly("open", {"crank": 1.0, "coupler": 0.4, "rocker": 1.6}),),
-        geometry=geometry,
-    )
+# --- Orders --------------------------------------------------------------------------------------------------------
 
 
-@cache
-def started(modes=None, ratio=0.05, geometry=Geometry.LINEAR):
-    system = build_system(four_bar(modes, ratio, geometry))
-    return system, consistent_state(system, system.mechanism.assembly())
+@pytest.mark.parametrize("method", ["tr-bdf2", "trapezoidal", "hht-alpha", "generalised-alpha", "wilson-theta"])
+def test_order_2_in_positions_velocities_and_multipliers(method):
+    """Of all modes, up to 290,000 rad/s: hω is 290 at the coarsest step."""
+    steps = (50, 100, 200)
+    assert study.orders(steps, study.errors(method, steps)) == pytest.approx(2.0, abs=0.06)
 
 
-def smooth_torque() -> Signals:
-    """Grows with the fourth power of time: nothing rings, all is as smooth as theory asks."""
-    pieces = np.zeros((2, 6))
-    pieces[0, 4], pieces[0, 5] = TORQUE / END**4, -0.5 * TORQUE / END**5
-    return Signals(np.array([0, 2]), np.array([0.0, END]), pieces)
+@pytest.mark.parametrize(("gamma", "order"), [(0.6, 1.0), (0.5, 2.0)])
+def test_newmark_is_of_order_1_where_it_damps(gamma, order):
+    steps = (50, 100, 200)
+    found = study.orders(steps, study.errors("newmark", steps, parameters={"gamma": gamma}))
+    # Without damping multipliers of index 3 keep the error of the first step.
+    assert found[:, :2] == pytest.approx(order, abs=0.12)
+    assert newmark_numbers("newmark", {"gamma": gamma, "beta": 0.3025}).order == order
 
 
-def run(system, state, method, *, steps=None, times=(END,), tolerance=1e-3, newton=1e-7, **options):
-    step = None if steps is None else END / steps
-    chosen = IntegrationOptions(method=method, step=step, tolerance=tolerance, newton_fraction=newton, **options)
-    return integrate(system, smooth_torque(), state, np.array(times), options=chosen)
+def test_order_3_in_positions_velocities_and_multipliers():
+    steps = (60, 90, 135)
+    assert study.orders(steps, study.errors("esdirk3", steps, modes=1)) == pytest.approx(3.0, abs=0.25)
 
 
-def ends(solution):
-    return solution.q[-1], solution.v[-1], solution.multipliers[-1]
+def test_order_4_in_positions_velocities_and_multipliers():
+    coarse, fine = (24, 36, 54), (90, 135, 200)
+    assert study.orders(coarse, study.errors("esdirk4", coarse, modes=2))[:, 0] == pytest.approx(4.0, abs=0.4)
+    found = study.orders(fine[:2], study.errors("esdirk4", fine[:2], modes=1))
+    assert found[:, 1:] == pytest.approx(4.0, abs=0.5)
 
 
-@cache
-def exact(modes=None, ratio=0.05):
-    return ends(run(*started(modes, ratio), "esdirk5", steps=6000))
+def test_stiff_modes_cost_velocities_and_multipliers_their_order():
+    """Documented: stages are of order 2, which shows while modes are stiffer than the step."""
+    steps = (100, 225)
+    assert np.all(study.orders(steps, study.errors("esdirk4", steps))[:, 1:] < 3.5)
 
 
-def errors(method, steps, modes=None, ratio=0.05, **options):
-    """Largest of positions, velocities and multipliers for each number of steps: (steps, 3)."""
-    found = [ends(run(*started(modes, ratio), method, steps=n, **options)) for n in steps]
-    return np.array([[np.max(np.abs(a - b)) for a, b in zip(one, exact(modes, ratio), strict=True)] for one in found])
+def test_stabilised_index_2_has_multipliers_of_second_order():
+    steps = (60, 90, 135)
+    found = study.orders(steps, study.errors("tr-bdf2", steps, modes=1, constraints="ggl"))
+    assert found[:, 0] == pytest.approx(2.0, abs=0.1)
+    assert np.all(found[:, 1:] > 1.2)
 
 
-def orders(errors):
-    return np.log2(errors[:-1] / errors[1:])
+# --- Constraints ---------------------------------------------------------------------------------------------------
+
+
+def violations(method, **options):
+    solution = study.run(study.started(), method, 200, **options)
+    return solution.constraint_position_max, solution.constraint_velocity_max
+
+
+@pytest.mark.parametrize("method", ESDIRK)
+def test_projection_and_stabilised_index_2_keep_positions_and_velocities(method):
+    phi, dphi = violations(method)
+    for treatment in ("projection", "ggl"):
+        position, velocity = violations(method, constraints=treatment)
+        assert position < 1e-13
+        assert velocity < 1e-10
+    # What there is to keep: index 1 alone drifts.
+    bare = violations(method, alpha=0.0, beta=0.0)
+    assert bare[1] > 1e-11
+    assert phi < 1e-4
+    assert dphi < 1e-2
+
+
+@pytest.mark.parametrize("method", ["newmark", "hht-alpha", "generalised-alpha", "wilson-theta"])
+def test_index_3_keeps_positions_at_every_step(method):
+    position, velocity = violations(method)
+    assert position < 1e-13
+    # Velocities are left to themselves where steps are fixed, but by Wilson's method.
+    assert velocity < 1e-12 if method == "wilson-theta" else velocity > 1e-9
+
+
+@pytest.mark.parametrize("method", ["hht-alpha", "generalised-alpha", "wilson-theta"])
+def test_index_3_keeps_velocities_too_where_steps_vary(method):
+    problem = study.started()
+    options = IntegrationOptions(method=method, tolerance=1e-4)
+    solution = integrate(problem[0], study.smooth_torque(), problem[1], np.array([study.END]), options=options)
+    assert solution.constraint_position_max < 1e-12
+    assert solution.constraint_velocity_max < 1e-9
+
+
+def test_automatic_gains_hold_constraints_better_the_smaller_the_step():
+    parts = []
+    for steps in (100, 400, 1600):
+        fixed = study.run(study.started(), "tr-bdf2", steps)
+        automatic = study.run(study.started(), "tr-bdf2", steps, automatic_gains=True)
+        parts.append(automatic.constraint_position_max / fixed.constraint_position_max)
+    assert parts[0] < 0.6
+    assert parts[1] < 0.4 * parts[0]
+    assert parts[2] < 0.4 * parts[1]
+
+
+@pytest.mark.parametrize("step", [1e-4, 1e-5, 1e-6])
+def test_small_steps_do_not_ruin_index_3(step):
+    """Multipliers are found to the digits that positions leave, eps / h^2 of an acceleration; no system is singular."""
+    system, state = study.started(1)
+    times = np.array([20 * step])
+    options = IntegrationOptions(method="generalised-alpha", step=step)
+    found = integrate(system, study.smooth_torque(), state, times, options=options)
+    exact = integrate(system, study.smooth_torque(), state, times, options=IntegrationOptions(tolerance=1e-9))
+    assert found.newton_iterations < 4 * found.steps
+    assert found.q == pytest.approx(exact.q, rel=0, abs=0.2 * step**2 + 1e-12)
+    assert found.multipliers == pytest.approx(exact.multipliers, abs=1e-14 / step**2 + 1e-6)
+
+
+# --- Steps ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", NATIVE)
+def test_fixed_steps_are_as_many_as_asked_for(method):
+    solution = study.run(study.started(), method, 40)
+    assert (solution.steps, solution.rejected, solution.method) == (40, 0, method)
+    assert solution.factorisations < 0.6 * solution.steps
+
+
+@pytest.mark.parametrize("method", NATIVE)
+def test_errors_fall_with_the_tolerance(method):
+    problem, times = study.started(), np.linspace(0.0, study.END, 11)
+
+    def path(tolerance, name):
+        options = IntegrationOptions(method=name, tolerance=tolerance)
+        return integrate(problem[0], study.smooth_torque(), problem[1], times, options=options).q[:, :3]
+
+    exact = path(1e-9, "esdirk5")
+    off = [np.max(np.abs(path(tolerance, method) - exact)) for tolerance in (1e-3, 1e-5)]
+    assert off[1] < 0.15 * off[0] + 1e-7
+    # Of the crank's angle: a tolerance of 1e-5 m, and it is 0.1 m long.
+    assert off[1] < 1e-3
+
+
+@pytest.mark.parametrize("method", NATIVE)
+def test_second_order_geometry_runs_by_every_method(method):
+    problem, times = study.started(None, Geometry.SECOND_ORDER), np.array([study.END])
+    found = [
+        integrate(
+            problem[0], study.smooth_torque(), problem[1], times,
+            options=IntegrationOptions(method=name, tolerance=tolerance),
+        ).q[-1, :3]
+        for name, tolerance in ((method, 1e-5), ("esdirk4", 1e-7))
+    ]  # fmt: skip
+    # A tolerance of 1e-5 m, of a crank 0.1 m long.
+    assert found[0] == pytest.approx(found[1], abs=1e-3)
+
+
+# --- The study of the paper ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def raparm():
+    model = load("raparm_i")
+    return plan_tracking(model.mechanism, model.path(), duration=0.7, samples=141)
+
+
+def paths(task, **options):
+    """Places of the end-effector (samples, 2)."""
+    solution = task.simulate("++++", options=IntegrationOptions(**options)).solution
+    marker = task.system.marker(task.mechanism.end_effector.point)
+    body = task.system.bodies[marker.body]
+    local = np.array([marker.place(u) for u in solution.q[:, body.flexible]])
+    c, s = np.cos(solution.q[:, body.angle]), np.sin(solution.q[:, body.angle])
+    turned = np.stack([c * local[:, 0] - s * local[:, 1], s * local[:, 0] + c * local[:, 1]], axis=1)
+    return solution.q[:, body.position] + turned, solution
+
+
+@pytest.fixture(scope="module")
+def converged_path(raparm):
+    return paths(raparm, method="esdirk5", tolerance=1e-7)[0]
+
+
+@pytest.mark.parametrize(
+    ("method", "tolerance"),
+    [("tr-bdf2", 1e-5), ("trapezoidal", 1e-5), ("esdirk3", 3e-6), ("esdirk4", 2e-5), ("wilson-theta", 3e-6),
+     ("hht-alpha", 5e-6), ("generalised-alpha", 5e-6)],
+)  # fmt: skip
+def test_methods_agree_on_the_path_of_the_end_effector(raparm, converged_path, method, tolerance):
+    """To 1e-6 m; where the test takes a coarser tolerance for its time, to that much more (docs/integrators.md)."""
+    found, _ = paths(raparm, method=method, tolerance=tolerance)
+    assert np.max(np.linalg.norm(found - converged_path, axis=1)) < 3e-6
+
+
+def test_newton_needs_few_iterations_and_few_factors(raparm):
+    """TR-BDF2 on the study: guesses are extrapolated, factors reused while they serve."""
+    _, solution = paths(raparm, tolerance=1e-4)
+    attempts = solution.steps + solution.rejected
+    assert solution.newton_iterations < 2.5 * 2 * attempts
+    assert solution.factorisations < 0.6 * attempts
+
+
+# --- Bad input and trouble -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "field", "words"),
+    [
+        ({"method": "trbdf"}, "method", "tr-bdf2"),
+        ({"method": "newmark", "parameters": {"gamma": 0.4}}, "parameters.gamma", "0.5"),
+        ({"method": "newmark", "parameters": {"gamma": 0.7, "beta": 0.3}}, "parameters.beta", "0.36"),
+        ({"method": "wilson-theta", "parameters": {"theta": 1.2}}, "parameters.theta", "1.36"),
+        ({"method": "hht-alpha", "parameters": {"alpha": -0.5}}, "parameters.alpha", "-0.333"),
+        ({"method": "generalised-alpha", "parameters": {"spectral_radius": 1.5}}, "parameters.spectral_radius", "1"),
+        ({"method": "generalised-alpha", "parameters": {"rho": 0.5}}, "parameters", "spectral_radius"),
+        ({"method": "generalised-alpha", "parameters": {"spectral_radius": np.nan}}, "parameters.spectral_radius", "1"),
+        ({"method": "radau", "step": 1e-4}, "step", "tolerance"),
+        ({"step": -1.0}, "step", "seconds"),
+        ({"constraints": "ggl", "method": "newmark"}, "constraints", "position"),
+        ({"constraints": "projektion"}, "constraints", "projection"),
+        ({"constraints": "projection", "automatic_gains": True}, "automatic_gains", "baumgarte"),
+    ],
+)
+def test_bad_options_are_told(options, field, words):
+    with pytest.raises(InputError) as caught:
+        IntegrationOptions(**options)
+    assert caught.value.field == field
+    assert words in caught.value.remedy
+
+
+def test_an_unknown_method_lists_the_known():
+    with pytest.raises(InputError) as caught:
+        IntegrationOptions(method="esdirk6")
+    assert all(name in str(caught.value) for name in METHODS)
+
+
+@pytest.mark.parametrize("method", ["newmark", "esdirk4"])
+def test_newtons_failure_at_a_fixed_step_is_typed_and_keeps_what_was_computed(method):
+    """A step in which the crank would turn several times."""
+    problem = study.started()
+    options = IntegrationOptions(method=method, step=0.5)
+    torque = study.smooth_torque()._replace(coefficients=200.0 * study.smooth_torque().coefficients)
+    with pytest.raises(IntegrationError) as caught:
+        integrate(problem[0], torque, problem[1], np.array([0.0, 1.0]), options=options)
+    assert "Newton" in caught.value.cause
+    assert caught.value.moment.time < 1.0
+    assert caught.value.partial.status == "failed"
+    assert caught.value.partial.t.size == 1

@@ -87,6 +87,16 @@ def test_two_four_bars_meet_the_benchmark_through_all_singular_positions(capsys)
     assert np.abs(couplers).max() < 1e-6
 
 
+def test_two_four_bars_to_1e_7_by_the_method_of_order_4():
+    """The same numbers, through ten singular positions."""
+    system, start = started(four_bars_in_a_row(2))
+    run = simulate_motion(
+        system.mechanism, 10.0, samples=2, start=start, method="esdirk4", options=IntegrationOptions(tolerance=1e-9)
+    ).solution
+    phi = run.q[-1, system.body("crank0").angle]
+    np.testing.assert_allclose([np.cos(phi), np.sin(phi)], [0.328458111539, 0.944518538179], rtol=0, atol=1e-7)
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5])
 def test_singular_positions_are_passed_at_any_tolerance(tolerance):
     system, start = started(four_bars_in_a_row(7))

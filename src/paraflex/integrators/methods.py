@@ -65,7 +65,7 @@ class Method:
         Whether stiffness limits its steps.
     newton_fraction : float
         The part of the error allowed in a step that Newton's iteration may leave by default. An estimate of high order
-        takes for error what Newton leaves in its stages: a smaller part means fewer steps.
+        takes for error what Newton leaves in its stages: there a smaller part means far fewer steps.
     source : str
     """
 
@@ -89,7 +89,7 @@ _INDEX_1, _ODE_FORM, _INDEX_3 = "index 1 (Eqs. 56-57)", "ODE (Eqs. 59-60)", "ind
 
 
 def _esdirk(name: str, title: str, order: int, source: str) -> Method:
-    newton = 0.03 if order == 2 else 0.01
+    newton = 0.03 if order == 2 else 3e-4
     return Method(
         name, title, Family.ESDIRK, _INDEX_1, order, _NATIVE, fixed_step=True, newton_fraction=newton, source=source
     )

@@ -47,7 +47,7 @@ from paraflex.kernel.run_state import (
 _FIRST_STEP = 1e-6
 # How long a velocity error that Newton leaves is taken to last, as a fraction of the run: it must count for more
 # than its share of one step, since it is of one sign while a factor is in use.
-_NEWTON_MEMORY = 0.002
+_NEWTON_MEMORY = 0.02
 # A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average.
 _MEMORY = 0.25
 # Constraint rows with less than this of their squares left depend on the others for the moment and keep their

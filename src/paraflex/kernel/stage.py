@@ -40,6 +40,9 @@ WORST_RATE = 0.5
 # A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it. It is not
 # taken to be better than this: motion that sets in makes it worse at once.
 AGEING, BEST_RATE = 1.05, 0.02
+# Changes that fall no more are rounding where they are smaller than this part of the accelerations, or where they
+# move nothing further than this [m]: there are no more digits to be had.
+ROUNDING, FINEST = 1e-8, 1e-15
 
 
 @kernel
@@ -92,7 +95,8 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
         solve_system(p, ws, ws.x, ws.mu)
         add(ws.x, a)
         add(ws.mu, lam)
-        change = mass_norm(p, ws, ws.x) * max(b, g * time_scale)
+        size = mass_norm(p, ws, ws.x)
+        change = size * max(b, g * time_scale)
         if shift.size > 0:
             place(qs, vs, g, b, a, shift, ws)
             constraint_values(p, signals, t, ws.q, ws.v, ws.rows, ws.mu)
@@ -105,7 +109,9 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
             rate = change / previous
             # From a good guess the second change may be no smaller than the first; from then on each has to be.
             if change > tolerance and rate > (1.0 / WORST_RATE if iteration == 2 else WORST_RATE):
-                return DIVERGED, iteration, rate
+                if b * size > FINEST and size > ROUNDING * mass_norm(p, ws, a):
+                    return DIVERGED, iteration, rate
+                rate = 0.0
         else:
             rate = min(WORST_RATE, max(BEST_RATE, AGEING * rate))
         if change * rate <= tolerance * (1.0 - min(rate, WORST_RATE)):

@@ -40,8 +40,6 @@ from paraflex.kernel.stage import CONVERGED, WORST_RATE, solve_stage
 ENOUGH_ITERATIONS, SERVED = 2, 5
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
-# Of a constraint's value where places are metres apart [m].
-ROUNDING = 1e-15
 
 
 @routine
@@ -161,9 +159,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     # Rows that depend on others here keep their multipliers: so a singular position is passed.
     if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
         note_passage(t, h, m)
-    # Positions have no more digits; where they decide, divided by b, accelerations have fewer.
-    digits = controls.newton_memory * g / b if controls.treatment == POSITION else 0.0
-    tolerance = max(controls.newton_fraction * controls.rate * h, ROUNDING * (1.0 + digits))
+    tolerance = controls.newton_fraction * controls.rate * h
     slowest = 0
     i = 1
     while i < stages:
