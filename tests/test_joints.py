@@ -20,9 +20,9 @@ LAW = 1e-8
 def rows_and_forces(system, t, q, v, a, lam, weight_v, weight_q):
     """Phi'' + weight_v Phi' + weight_q Phi and Phi_q^T lambda, from the kernels of the time loop."""
     rows, f = np.zeros(system.m), np.zeros(system.n)
-    start_rows(system.packed, twins.still_signals(system), t, weight_v, weight_q, rows)
+    start_rows(system.packed, twins.still_signals(system), t, (1.0, weight_v, weight_q), rows)
     for i in range(len(system.bodies)):
-        body_joints(system.packed, i, q, v, a, lam, weight_v, weight_q, f, rows)
+        body_joints(system.packed, i, q, v, a, lam, (1.0, weight_v, weight_q), f, rows)
     return rows, f
 
 

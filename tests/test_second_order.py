@@ -15,7 +15,7 @@ from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import body_terms, system_energy
 from paraflex.kernel.joints import body_joints, start_rows
 from paraflex.kernel.linear import factor_system, mass_norm, solve_system
-from paraflex.kernel.packed import OMEGA2
+from paraflex.kernel.packed import INDEX_1, OMEGA2
 from paraflex.mechanism import (
     Assembly,
     FlexibleBeam,
@@ -185,9 +185,9 @@ def test_joints_follow_the_shortened_points():
     np.testing.assert_allclose((at(h)[0] - at(-h)[0]) / (2 * h), rate, rtol=0, atol=1e-7)
     np.testing.assert_allclose(system.jacobian(q) @ v, rate, rtol=0, atol=1e-12)
     ws = system.workspace()
-    start_rows(system.packed, signals, 0.0, 0.0, 0.0, ws.rows)
+    start_rows(system.packed, signals, 0.0, INDEX_1, ws.rows)
     for i in range(len(system.bodies)):
-        body_joints(system.packed, i, q, v, a, np.zeros(system.m), 0.0, 0.0, ws.f, ws.rows)
+        body_joints(system.packed, i, q, v, a, np.zeros(system.m), INDEX_1, ws.f, ws.rows)
     np.testing.assert_allclose((at(h)[1] - at(-h)[1]) / (2 * h), ws.rows, rtol=0, atol=1e-7)
     elbow = [
         point_motion(system, ref, q[None], v[None], a[None]) for ref in (PointRef("two", "B"), PointRef("one", "C"))
@@ -268,7 +268,7 @@ def test_the_iteration_matrix_has_the_geometric_stiffness(source):
         f, rows = np.zeros(system.n), np.zeros(system.m)
         for i in range(len(system.bodies)):
             body_terms(system.packed, i, q, v, pushed, f, ws.points)
-            body_joints(system.packed, i, q, v, pushed, lam, 0.0, 0.0, f, rows)
+            body_joints(system.packed, i, q, v, pushed, lam, INDEX_1, f, rows)
         return f
 
     matrix, _ = dense_system(system, q, 0.0)
