@@ -63,11 +63,11 @@ def time_until(angle):
 def test_a_pendulum_stops_at_its_limit_when_the_elliptic_integral_says():
     limit = JointLimit("pin", low=-np.pi / 2 + 1.0)
     errors = []
-    for tolerance in (1e-5, 1e-7):
+    for tolerance in (1e-3, 1e-6):
         solution = stopped(let_go(), 2.0, limit, tolerance=tolerance)
         errors.append(abs(solution.t[-1] - time_until(1.0)))
         assert solution.q[-1, 2] == pytest.approx(-np.pi / 2 + 1.0, abs=1e-12)
-    assert errors[0] < 2e-7
+    assert errors[0] < 2e-6
     assert errors[1] < 0.02 * errors[0]
 
 

@@ -306,7 +306,8 @@ def test_dense_output_agrees_with_steps_that_end_there():
     options = IntegrationOptions(tolerance=1e-6)
     between = integrate(system, signals, state, times, options=options)
     landed = integrate(system, signals, state, times, knots=times, options=options)
-    assert between.q == pytest.approx(landed.q, abs=1e-6)
+    # Each of both may err by the tolerance.
+    assert between.q == pytest.approx(landed.q, abs=2e-6)
     # A velocity error of a vibration is omega times that of its position; bending modes here reach some 2000 rad/s.
     assert between.v == pytest.approx(landed.v, abs=2000.0 * 2e-6)
 
