@@ -89,7 +89,7 @@ _INDEX_1, _ODE_FORM, _INDEX_3 = "index 1 (Eqs. 56-57)", "ODE (Eqs. 59-60)", "ind
 
 
 def _esdirk(name: str, title: str, order: int, source: str) -> Method:
-    newton = 0.03 if order == 2 else 3e-4
+    newton = 0.03 if order == 2 else 1e-3
     return Method(
         name, title, Family.ESDIRK, _INDEX_1, order, _NATIVE, fixed_step=True, newton_fraction=newton, source=source
     )
