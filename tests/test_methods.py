@@ -14,6 +14,7 @@ from paraflex.integrators.methods import Family
 from paraflex.integrators.newmark import newmark_numbers
 from paraflex.mechanism import Geometry
 from paraflex.simulate import plan_tracking
+from paraflex.studies import tracking_case
 
 _SPEC = importlib.util.spec_from_file_location("orders", Path(__file__).parents[1] / "benchmarks" / "orders.py")
 assert _SPEC is not None
@@ -182,14 +183,10 @@ def raparm():
 
 
 def paths(task, **options):
-    """Places of the end-effector (samples, 2)."""
-    solution = task.simulate("++++", options=IntegrationOptions(**options)).solution
-    marker = task.system.marker(task.mechanism.end_effector.point)
-    body = task.system.bodies[marker.body]
-    local = np.array([marker.place(u) for u in solution.q[:, body.flexible]])
-    c, s = np.cos(solution.q[:, body.angle]), np.sin(solution.q[:, body.angle])
-    turned = np.stack([c * local[:, 0] - s * local[:, 1], s * local[:, 0] + c * local[:, 1]], axis=1)
-    return solution.q[:, body.position] + turned, solution
+    """Places of the end-effector (samples, 1, 2), and the solution."""
+    case = tracking_case(task, "++++")
+    solution = case.solve(IntegrationOptions(**options), None)
+    return case.places(solution), solution
 
 
 @pytest.fixture(scope="module")
@@ -205,7 +202,7 @@ def converged_path(raparm):
 def test_methods_agree_on_the_path_of_the_end_effector(raparm, converged_path, method, tolerance):
     """To 1e-6 m; where the test takes a coarser tolerance for its time, to that much more (docs/integrators.md)."""
     found, _ = paths(raparm, method=method, tolerance=tolerance)
-    assert np.max(np.linalg.norm(found - converged_path, axis=1)) < 3e-6
+    assert np.max(np.linalg.norm(found - converged_path, axis=-1)) < 3e-6
 
 
 def test_newton_needs_few_iterations_and_few_factors(raparm):

@@ -61,6 +61,12 @@ def compile_kernels(geometry: Geometry = Geometry.LINEAR, announce: Callable[[st
             process.terminate()
 
 
+def compile_kernels_for(mechanism: Mechanism, announce: Callable[[str], None] = print) -> None:
+    """Compile the kernels that a mechanism needs: see `compile_kernels`. Rigid bodies have no geometry of beams."""
+    bent = any(getattr(body, "flexible", False) for body in mechanism.bodies)
+    compile_kernels(mechanism.geometry if bent else Geometry.LINEAR, announce)
+
+
 def _folder() -> Path:
     return Path(str(march.stats.cache_path))
 

@@ -26,13 +26,12 @@ from paraflex.cli.request import (
     write_json,
 )
 from paraflex.cli.tables import plain_console
-from paraflex.compilation import compile_kernels
+from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import AssemblyError, InputError
 from paraflex.files import Model, load
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
-from paraflex.mechanism import Geometry
 from paraflex.studies import Case, ComparisonOptions, MethodComparison, compare_methods, motion_case, tracking_case
 
 
@@ -54,8 +53,7 @@ def compare_command(request: CompareRequest) -> int:
     # Every check that needs no computing comes before the first minute is spent.
     modes = _modes(model, request)
     folder = results_folder(request.out)
-    bent = any(getattr(body, "flexible", False) for body in model.mechanism.bodies)
-    compile_kernels(model.mechanism.geometry if bent else Geometry.LINEAR, console.print)
+    compile_kernels_for(model.mechanism, console.print)
     began = time.perf_counter()
     case = _motion(model, request) if modes is None else _tracking(model, request, modes)
     comparison = _run(console, case, methods, options)

@@ -13,12 +13,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, StudyRequest, at_fault, results_folder, write_json
 from paraflex.cli.tables import FINISHED, plain_console
-from paraflex.compilation import compile_kernels
+from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, consistent_state, start_state, static_equilibrium
 from paraflex.errors import AssemblyError, InputError, IntegrationError
 from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import Geometry, Mechanism
+from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary, save_results
 
@@ -49,8 +49,7 @@ def run_motion(
         )  # fmt: skip
     samples = model.study.samples if request.samples is None else request.samples
     folder = results_folder(request.out)
-    bent = any(getattr(body, "flexible", False) for body in mechanism.bodies)
-    compile_kernels(mechanism.geometry if bent else Geometry.LINEAR, console.print)
+    compile_kernels_for(mechanism, console.print)
     began = time.perf_counter()
     run = _simulate(console, model, mechanism, duration, samples, request, options)
     parameters = {
@@ -65,10 +64,9 @@ def run_motion(
     else:
         _report(figures, data)
         console.print(f"{time.perf_counter() - began:.1f} s; results and figures in {folder}")
-    if run.solution.status not in FINISHED:
-        console.print(f"error: {run.solution.message}", soft_wrap=True)
     if run.solution.status in FINISHED:
         return COMPLETE
+    console.print(f"error: {run.solution.message}", soft_wrap=True)
     return INTERRUPTED if run.solution.status == "interrupted" else TROUBLE
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System, dependence
 from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import Problem
+from paraflex.integrators.run import DEPENDENT_PART, MEMORY, Problem
 from paraflex.kernel.ode import (
     accelerations,
     descriptor_jacobian,
@@ -28,10 +28,6 @@ from paraflex.kernel.tangent import make_tangent
 
 Array = NDArray[np.float64]
 
-# Constraint rows with less than this of their squares left depend on the others for the moment.
-DEPENDENT_PART = 1e-7
-# A velocity error that no stiffness turns round moves the mechanism for a quarter of the run, as in our own schemes.
-_MEMORY = 0.25
 # An error that does not count [any unit].
 _IGNORED = 1e20
 
@@ -113,7 +109,7 @@ class OdeForm:
         """
         system = self.system
         q = error * np.sqrt(system.total_mass / (self.size * diagonal_mass(system)))
-        rate = np.full(system.n, 1.0 / (_MEMORY * span))
+        rate = np.full(system.n, 1.0 / (MEMORY * span))
         for body, packed in zip(system.bodies, system.packed.bodies, strict=True):
             omega2 = system.packed.modal[OMEGA2, packed["flex"] : packed["flex"] + body.nf]
             rate[body.flexible] = np.maximum(rate[body.flexible], np.sqrt(np.maximum(omega2, 0.0)))

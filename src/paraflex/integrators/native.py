@@ -9,7 +9,7 @@ import numpy as np
 from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.newmark import newmark_numbers, newmark_scheme
 from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import Figures, Instant, Problem, empty_samples
+from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, MEMORY, Figures, Instant, Problem, empty_samples
 from paraflex.integrators.stretches import hidden_from
 from paraflex.integrators.tableaux import TABLEAUX
 from paraflex.kernel.linear import factor_system
@@ -43,16 +43,9 @@ from paraflex.kernel.run_state import (
     make_march,
 )
 
-# Where the first step starts from, as a fraction of the run; error control takes over at once.
-_FIRST_STEP = 1e-6
 # How long a velocity error that Newton leaves is taken to last, as a fraction of the run: it must count for more
 # than its share of one step, since it is of one sign while a factor is in use.
 _NEWTON_MEMORY = 0.02
-# A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average.
-_MEMORY = 0.25
-# Constraint rows with less than this of their squares left depend on the others for the moment and keep their
-# multipliers: small enough that this lasts a thousandth of a radian, large enough for good conditioning elsewhere.
-_DEPENDENT_PART = 1e-7
 
 
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
@@ -158,20 +151,20 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     scheme, treatment = _scheme(options), POSITION if newmark else _TREATMENTS[options.treatment]
     state = make_march(system.n, system.m, scheme.c.size, len(system.mechanism.motors), treatment)
     state.q[:], state.v[:] = initial.q, initial.v
-    state.clock[TIME], state.clock[STEP] = initial.time, min(_FIRST_STEP * span, options.max_step)
+    state.clock[TIME], state.clock[STEP] = initial.time, min(FIRST_STEP * span, options.max_step)
     workspace = system.workspace()
     controls = Controls(
         rate=options.tolerance / span,
         newton_fraction=options.newton_fraction or options.description.newton_fraction,
         newton_memory=_NEWTON_MEMORY * span,
-        memory=_MEMORY * span,
+        memory=MEMORY * span,
         alpha=options.alpha,
         beta=options.beta,
         gain=_GAIN if options.automatic_gains else 0.0,
         treatment=treatment,
         fixed_step=options.step or 0.0,
         max_step=options.max_step,
-        dependent_part=_DEPENDENT_PART,
+        dependent_part=DEPENDENT_PART,
         dependent_rows=int(factor_system(system.packed, 0.0, initial.q, workspace)),
     )
     return NativeRun(

@@ -11,7 +11,7 @@ from paraflex.errors import InputError
 from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
 from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import Figures, Instant, Problem, empty_samples
+from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
 from paraflex.integrators.scipy_methods import ScipyStepper
 from paraflex.integrators.stepper import Stepper, Steps
 from paraflex.integrators.stiffness import warn_if_stiff
@@ -23,8 +23,6 @@ from paraflex.kernel.run_state import FINISHED, PAUSED
 
 Array = NDArray[np.float64]
 
-# Where the first step starts from, as a fraction of the run; error control takes over at once.
-_FIRST_STEP = 1e-6
 # What the estimated error of a step may be, of the tolerance: estimates say how far a solver errs in a step, not how
 # errors add up. Measured on RAParM-I, a soft arm and a falling platform, whose ends err by 0.01 to 2 tolerances.
 _PER_STEP = {"rk45": 0.1, "radau": 5.0, "ndf": 0.1, "adams": 0.5, "bdf": 0.1, "ida": 0.1}
@@ -174,7 +172,7 @@ def _stepper(problem: Problem, options: IntegrationOptions) -> Stepper:
     method, order, error = options.method, _max_order(options), _PER_STEP[options.method] * options.tolerance
     if "max_order" in options.description.parameters:
         error *= (options.tolerance / _REFERENCE) ** (1.0 / order)
-    steps = Steps(min(_FIRST_STEP * problem.span, options.max_step), options.max_step, order)
+    steps = Steps(min(FIRST_STEP * problem.span, options.max_step), options.max_step, order)
     if method == "ida":
         kind = StabilisedForm if options.treatment == Treatment.GGL else DescriptorForm
         form = kind(problem, options)

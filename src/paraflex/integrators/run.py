@@ -16,6 +16,15 @@ from paraflex.kernel.run_state import Samples
 
 Array = NDArray[np.float64]
 
+# Where the first step starts from, as a fraction of the run; error control takes over at once.
+FIRST_STEP = 1e-6
+# A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average: by the error
+# times this fraction of the run.
+MEMORY = 0.25
+# Constraint rows with less than this of their squares left depend on the others for the moment and keep their
+# multipliers: small enough that this lasts a thousandth of a radian, large enough for good conditioning elsewhere.
+DEPENDENT_PART = 1e-7
+
 
 @dataclass(frozen=True)
 class Problem:
