@@ -288,3 +288,10 @@ def test_attempts_are_told_by_their_times():
     first, second = 0.1 * np.array([0.2, 0.3, 0.8, 8 / 9, 1.0]), 0.037 * np.array([0.2, 0.3, 0.8, 8 / 9, 1.0])
     assert attempts([3.0, *(3.0 + first), *(3.0 + second), 3.037], 3.0, 5) == 2
     assert attempts([3.1, 3.1, 3.1], 3.0, 1) == 1
+
+
+def test_ndf_chooses_its_steps_by_the_order_it_may_have():
+    """Held at order 2 it still takes the step that suits that order: few are rejected."""
+    system = build_system(arm())
+    found = run(system, "ndf", tolerance=1e-4)
+    assert found.rejected < 0.1 * found.steps

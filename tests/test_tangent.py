@@ -87,7 +87,7 @@ class Case:
 
     def rates(self, y):
         dy, a, lam = np.zeros(y.size), np.zeros(self.system.n), np.zeros(self.system.m)
-        arguments = (self.packed, self.signals, TIME, ALPHA, BETA, y, a, lam, self.torques, self.ws, PART, dy)
+        arguments = (self.packed, self.signals, TIME, WEIGHTS, y, a, lam, self.torques, self.ws, PART, dy)
         assert rates(*arguments) == 0
         return dy, a, lam
 
@@ -181,7 +181,7 @@ def test_jacobian_of_the_dae(case, form):
     def residual(x):
         out, p, dz = np.zeros(size), case.packed, dy + c * (x - y)
         if form == "index 1":
-            arguments = (p, case.signals, TIME, ALPHA, BETA, x, dz, dropped, case.torques, case.ws, out)
+            arguments = (p, case.signals, TIME, WEIGHTS, x, dz, dropped, case.torques, case.ws, out)
             descriptor_residual(*arguments)
         else:
             arguments = (p, case.signals, TIME, x, dz, dropped, weight, case.torques, idle, case.ws, d, phi, dphi, out)

@@ -54,7 +54,6 @@ class OdeForm:
     def __init__(self, problem: Problem, options: IntegrationOptions) -> None:
         system = problem.system
         self.system, self.signals, self.evaluations = system, problem.signals, 0
-        self._gains = (options.alpha, options.beta)
         self._weights = (1.0, 2.0 * options.alpha, options.beta**2)
         self._torques, self._ws = np.zeros(len(system.mechanism.motors)), system.workspace()
         self._a, self._lam, self._tangent = np.zeros(system.n), np.zeros(system.m), make_tangent(system.packed)
@@ -68,7 +67,7 @@ class OdeForm:
         """Accelerations and multipliers."""
         a, lam = np.zeros(self.system.n), np.zeros(self.system.m)
         dependent = accelerations(
-            self.system.packed, self.signals, t, *self._gains, np.ascontiguousarray(q), np.ascontiguousarray(v),
+            self.system.packed, self.signals, t, self._weights, np.ascontiguousarray(q), np.ascontiguousarray(v),
             a, lam, self._torques, self._ws, DEPENDENT_PART,
         )  # fmt: skip
         return Solved(a, lam, dependent)
@@ -77,7 +76,7 @@ class OdeForm:
         """Y' at (t, y), new."""
         dy = np.empty(y.size)
         rates(
-            self.system.packed, self.signals, t, *self._gains, np.array(y), self._a, self._lam, self._torques,
+            self.system.packed, self.signals, t, self._weights, np.array(y), self._a, self._lam, self._torques,
             self._ws, DEPENDENT_PART, dy,
         )  # fmt: skip
         self.evaluations += 1
@@ -144,7 +143,7 @@ class DescriptorForm(OdeForm):
     def residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
         """Residual into out (size,)."""
         arguments = (np.array(y), np.array(dy), self._dropped, self._torques, self._ws, out)
-        descriptor_residual(self.system.packed, self.signals, t, *self._gains, *arguments)
+        descriptor_residual(self.system.packed, self.signals, t, self._weights, *arguments)
         self.evaluations += 1
 
     def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:

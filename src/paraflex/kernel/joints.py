@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import cos, sin, sqrt, tanh
 
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, DAMPING, FRICTION, NX, NY, SLOPE, SPRING
+from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPING, FRICTION, NX, NY, SLOPE, SPRING
 from paraflex.kernel.signals import evaluate_signal
 
 
@@ -264,6 +264,18 @@ def load_power(p, q, v):
 
 
 @inlined
+def angle_row(p, marker, kind, weights, q, v, a):
+    """What a marker's angle and its rates give to a row of that kind; linear in q, v and a."""
+    if kind == CONSTRAINT:
+        return (
+            weights[0] * marker_angle(p, marker, a)
+            + weights[1] * marker_angle(p, marker, v)
+            + weights[2] * marker_angle(p, marker, q)
+        )
+    return marker_angle(p, marker, q if kind == SPRING else v)
+
+
+@inlined
 def body_joints(p, i, q, v, a, lam, weights, f, rows):
     """Add body i's part of the weighted sum of Phi'', Phi' and Phi to rows, and Phi_q^T lambda to f."""
     weight_a, weight_v, weight_q = weights
@@ -273,16 +285,7 @@ def body_joints(p, i, q, v, a, lam, weights, f, rows):
         marker = p.markers[port.marker]
         r, sign = port.row, port.sign
         if port.kind == ANGLE:
-            if p.rows[r].kind == SPRING:
-                rows[r] += sign * marker_angle(p, marker, q)
-            elif p.rows[r].kind == DAMPER or p.rows[r].kind == FRICTION:
-                rows[r] += sign * marker_angle(p, marker, v)
-            else:
-                rows[r] += sign * (
-                    weight_a * marker_angle(p, marker, a)
-                    + weight_v * marker_angle(p, marker, v)
-                    + weight_q * marker_angle(p, marker, q)
-                )
+            rows[r] += sign * angle_row(p, marker, p.rows[r].kind, weights, q, v, a)
             apply_torque(p, marker, sign * lam[r], f)
         elif port.kind != AXIS:
             px, py, vx, vy, ax, ay, rx, ry = marker_motion(p, marker, q, v, a)

@@ -5,13 +5,13 @@ A third part is added to (q, v), the work done so far: whoever integrates the mo
 
 from __future__ import annotations
 
-from paraflex.kernel.arrays import fill
+from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
 from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import factor_bodies, orient, right_hand_side, solve_system
-from paraflex.kernel.packed import CONSTRAINT
+from paraflex.kernel.packed import CONSTRAINT, INDEX_1
 from paraflex.kernel.stage import equations
 from paraflex.kernel.step import input_power
 from paraflex.kernel.tangent import note_slopes, reaction_tangent, residual_tangent
@@ -21,14 +21,8 @@ from paraflex.kernel.tangent import note_slopes, reaction_tangent, residual_tang
 INSTANT_B = 1e-36
 
 
-@routine
-def residuals(p, signals, t, alpha, beta, q, v, a, lam, torques, ws):
-    """Residuals of index 1 with Baumgarte's terms, into ws.f and ws.rows."""
-    equations(p, signals, t, (1.0, 2.0 * alpha, beta * beta), q, v, a, lam, torques, ws)
-
-
 @kernel
-def accelerations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws, dependent_part):
+def accelerations(p, signals, t, weights, q, v, a, lam, torques, ws, dependent_part):
     """Accelerations (n,) and multipliers (m,) at (t, q, v), into a and lam; the factor stays in ws.
 
     Returns
@@ -44,22 +38,20 @@ def accelerations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws, depende
     dependent = orient(p, q, ws, dependent_part)
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
     for _ in range(2):
-        residuals(p, signals, t, alpha, beta, q, v, a, lam, torques, ws)
+        equations(p, signals, t, weights, q, v, a, lam, torques, ws)
         right_hand_side(p, ws, 1.0)
         solve_system(p, ws, ws.x, ws.mu)
-        for j in range(a.size):
-            a[j] += ws.x[j]
-        for r in range(lam.size):
-            lam[r] += ws.mu[r]
+        add(ws.x, a)
+        add(ws.mu, lam)
     return dependent
 
 
 @kernel
-def rates(p, signals, t, alpha, beta, y, a, lam, torques, ws, dependent_part, dy):
+def rates(p, signals, t, weights, y, a, lam, torques, ws, dependent_part, dy):
     """Derivative of y = (q, v, work) into dy; a and lam are left as `accelerations` has them. Dependent rows."""
     n = a.size
     q, v = y[:n], y[n : 2 * n]
-    dependent = accelerations(p, signals, t, alpha, beta, q, v, a, lam, torques, ws, dependent_part)
+    dependent = accelerations(p, signals, t, weights, q, v, a, lam, torques, ws, dependent_part)
     for j in range(n):
         dy[j] = v[j]
         dy[n + j] = a[j]
@@ -94,10 +86,8 @@ def rates_jacobian(p, weights, y, a, lam, torques, ws, d, out):
                 direction[j] = 1.0
                 residual_tangent(p, weights, q, v, a, lam, torques, ws.compliance, i, i + 1, d)
                 direction[j] = 0.0
-                for k in range(n):
-                    ws.f[k] = d.f[k]
-                for r in range(lam.size):
-                    ws.rows[r] = d.rows[r]
+                copy(d.f, ws.f)
+                copy(d.rows, ws.rows)
                 right_hand_side(p, ws, 1.0)
                 solve_system(p, ws, ws.x, ws.mu)
                 column = part * n + j
@@ -107,7 +97,7 @@ def rates_jacobian(p, weights, y, a, lam, torques, ws, d, out):
 
 
 @kernel
-def descriptor_residual(p, signals, t, alpha, beta, y, dy, dropped, torques, ws, out):
+def descriptor_residual(p, signals, t, weights, y, dy, dropped, torques, ws, out):
     """Residual of the equations as a DAE of index 1 in y = (q, v, lambda, work), into out.
 
     q' - v, then those of `equations` with v' as the acceleration, then work' less the power. `dropped` (m,) says which
@@ -116,7 +106,7 @@ def descriptor_residual(p, signals, t, alpha, beta, y, dy, dropped, torques, ws,
     n, m = ws.f.size, ws.rows.size
     q, v, a, lam = y[:n], y[n : 2 * n], dy[n : 2 * n], y[2 * n : 2 * n + m]
     note_friction(p, q, v, ws.mu, ws.compliance)
-    residuals(p, signals, t, alpha, beta, q, v, a, lam, torques, ws)
+    equations(p, signals, t, weights, q, v, a, lam, torques, ws)
     for j in range(n):
         out[j] = dy[j] - v[j]
         out[n + j] = ws.f[j]
@@ -183,7 +173,7 @@ def stabilised_residual(p, signals, t, y, dy, dropped, weight, torques, idle, ws
     q, v, a = y[:n], y[n : 2 * n], dy[n : 2 * n]
     lam, mu = y[2 * n : 2 * n + m], y[2 * n + m : 2 * n + 2 * m]
     note_friction(p, q, v, ws.mu, ws.compliance)
-    residuals(p, signals, t, 0.0, 0.0, q, v, a, lam, torques, ws)
+    equations(p, signals, t, INDEX_1, q, v, a, lam, torques, ws)
     constraint_values(p, signals, t, q, v, phi, dphi)
     for r in range(m):
         free = dropped[r] or p.rows[r].kind != CONSTRAINT

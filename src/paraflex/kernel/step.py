@@ -163,9 +163,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     slowest = 0
     i = 1
     while i < stages:
-        if one_stage:
-            x, g, b = newmark_start(tableau.newmark, t, h, m)
-        else:
+        if not one_stage:
             x, g, b = stage_start(tableau, i, t, h, m)
         m.stage_t[1, i] = t + tableau.c[i] * h
         predict(i, x, h, m)

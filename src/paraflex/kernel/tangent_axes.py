@@ -1,0 +1,142 @@
+"""Changes of joints along a line and of their forces along a direction: see `kernel.tangent`."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from paraflex.kernel.axes import axis_frame, component, track_piece
+from paraflex.kernel.compiling import inlined, routine
+from paraflex.kernel.joints import apply_torque, marker_angle
+from paraflex.kernel.packed import CONSTRAINT, SPRING
+from paraflex.kernel.tangent_points import end_tangent, force_tangent
+
+
+@inlined
+def component_tangent(ex, ey, at, change, w, dw, turn, d_w, d_dw):
+    """Changes of what `axes.component` returns: `at` is d with its derivatives, `change` that of it, e turns by turn.
+
+    e changes by turn E e, so that e . x changes by turn e x x + e . dx, and e x x by e x dx - turn e . x.
+    """
+    dx, dy, ux, uy, bx, by = at
+    d_dx, d_dy, d_ux, d_uy, d_bx, d_by = change
+    value, lever = ex * dx + ey * dy, ex * dy - ey * dx
+    speed, cross = ex * ux + ey * uy, ex * uy - ey * ux
+    d_value = turn * lever + ex * d_dx + ey * d_dy
+    d_lever = ex * d_dy - ey * d_dx - turn * value
+    d_speed = turn * cross + ex * d_ux + ey * d_uy
+    d_cross = ex * d_uy - ey * d_ux - turn * speed
+    d_rate = d_speed + d_w * lever + w * d_lever
+    d_acceleration = turn * (ex * by - ey * bx) + ex * d_bx + ey * d_by
+    d_acceleration += 2.0 * (d_w * cross + w * d_cross) + d_dw * lever + dw * d_lever
+    d_acceleration -= 2.0 * w * d_w * value + w * w * d_value
+    return d_value, d_rate, d_acceleration, d_lever
+
+
+@routine
+def track_sums(p, axis, x, vector):
+    """W, W', W'' and W''' of a track at x, times the flexible part of a system vector."""
+    track = p.tracks[axis.track]
+    body = p.bodies[p.markers[axis.a].body]
+    n = body.nf
+    piece, z = track_piece(p, track, x)
+    at = track.coefficients + piece * 6 * n
+    sums = (0.0, 0.0, 0.0, 0.0)
+    for j in range(n):
+        value, slope, bend, third = 0.0, 0.0, 0.0, 0.0
+        for power in range(5, -1, -1):
+            third = third * z + 3.0 * bend
+            bend = bend * z + 2.0 * slope
+            slope = slope * z + value
+            value = value * z + p.track_coefficients[at + j + power * n]
+        u = vector[body.offset + 3 + j]
+        sums = (sums[0] + value * u, sums[1] + slope * u, sums[2] + bend * u, sums[3] + third * u)
+    return sums
+
+
+@routine
+def add_track_tangent(p, axis, x, d_x, force, d_force, d):
+    """Subtract from d.f the change of force W(x) along a track."""
+    track = p.tracks[axis.track]
+    body = p.bodies[p.markers[axis.a].body]
+    n = body.nf
+    piece, z = track_piece(p, track, x)
+    at = track.coefficients + piece * 6 * n
+    for j in range(n):
+        value, slope = 0.0, 0.0
+        for power in range(5, -1, -1):
+            slope = slope * z + value
+            value = value * z + p.track_coefficients[at + j + power * n]
+        d.f[body.offset + 3 + j] -= d_force * value + force * slope * d_x
+
+
+@routine
+def axis_tangent(p, k, q, v, a, d):
+    """Of axis k: changes of value, rate and acceleration; e, its change; the lever, its change; x, its change.
+
+    Then R s of both ends and its changes, four numbers each. On a track as in `axes.axis_motion`: e and lever are
+    those of the normal to the deflected beam.
+    """
+    axis = p.axes[k]
+    at, theta, w, dw, rax, ray, rbx, rby = axis_frame(p, axis, q, v, a)
+    pax, pay, vax, vay, aax, aay, d_rax, d_ray = end_tangent(p, axis.a, q, v, a, d)
+    pbx, pby, vbx, vby, abx, aby, d_rbx, d_rby = end_tangent(p, axis.b, q, v, a, d)
+    change = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
+    turn, d_w, d_dw = 0.0, 0.0, 0.0
+    if axis.a >= 0:
+        marker = p.markers[axis.a]
+        turn, d_w, d_dw = marker_angle(p, marker, d.q), marker_angle(p, marker, d.v), marker_angle(p, marker, d.a)
+    ex, ey = cos(theta), sin(theta)
+    d_ex, d_ey = -turn * ey, turn * ex
+    _, _, _, lever = component(ex, ey, at, w, dw)
+    value_, rate_, acceleration_, d_lever = component_tangent(ex, ey, at, change, w, dw, turn, d_w, d_dw)
+    x, d_x = 0.0, 0.0
+    if axis.track >= 0:
+        x, dx, ddx, across = component(ey, -ex, at, w, dw)
+        d_x, d_dx, d_ddx, d_across = component_tangent(ey, -ex, at, change, w, dw, turn, d_w, d_dw)
+        _, slope, bend, third = track_sums(p, axis, x, q)
+        _, slope_v, bend_v, _ = track_sums(p, axis, x, v)
+        _, slope_a, _, _ = track_sums(p, axis, x, a)
+        W_dq, slope_dq, bend_dq, _ = track_sums(p, axis, x, d.q)
+        W_dv, slope_dv, _, _ = track_sums(p, axis, x, d.v)
+        W_da, _, _, _ = track_sums(p, axis, x, d.a)
+        d_slope, d_bend = bend * d_x + slope_dq, third * d_x + bend_dq
+        value_ -= slope * d_x + W_dq
+        rate_ -= d_slope * dx + slope * d_dx + slope_v * d_x + W_dv
+        acceleration_ -= d_slope * ddx + slope * d_ddx + d_bend * dx * dx + 2.0 * bend * dx * d_dx
+        acceleration_ -= 2.0 * ((bend_v * d_x + slope_dv) * dx + slope_v * d_dx) + slope_a * d_x + W_da
+        d_ex, d_ey = d_ex - d_slope * ey - slope * d_ey, d_ey + d_slope * ex + slope * d_ex
+        ex, ey = ex - slope * ey, ey + slope * ex
+        d_lever -= d_slope * across + slope * d_across
+        lever -= slope * across
+    ends, d_ends = (rax, ray, rbx, rby), (d_rax, d_ray, d_rbx, d_rby)
+    return value_, rate_, acceleration_, ex, ey, d_ex, d_ey, lever, d_lever, x, d_x, ends, d_ends
+
+
+@routine
+def axes_tangent(p, weights, q, v, a, lam, torques, d):
+    """Add the changes of the rows of all axes and of their forces, those of motors among them, to d.rows and d.f."""
+    for k in range(p.axes.size):
+        axis = p.axes[k]
+        value, rate, acceleration, ex, ey, d_ex, d_ey, lever, d_lever, x, d_x, ends, d_ends = axis_tangent(
+            p, k, q, v, a, d
+        )
+        d_force = 0.0
+        if axis.row < 0:
+            force = -torques[axis.signal]
+        else:
+            force, d_force = lam[axis.row], d.lam[axis.row]
+            kind = p.rows[axis.row].kind
+            if kind == CONSTRAINT:
+                d.rows[axis.row] += weights[0] * acceleration + weights[1] * rate + weights[2] * value
+            else:
+                d.rows[axis.row] += value if kind == SPRING else rate
+        fx, fy = force * ex, force * ey
+        d_fx, d_fy = d_force * ex + force * d_ex, d_force * ey + force * d_ey
+        if axis.b >= 0:
+            force_tangent(p, p.markers[axis.b], q, (fx, fy), (d_fx, d_fy), ends[2:], d_ends[2:], d)
+        if axis.a >= 0:
+            marker = p.markers[axis.a]
+            force_tangent(p, marker, q, (-fx, -fy), (-d_fx, -d_fy), ends[:2], d_ends[:2], d)
+            apply_torque(p, marker, d_force * lever + force * d_lever, d.f)
+            if axis.track >= 0:
+                add_track_tangent(p, axis, x, d_x, force, d_force, d)
