@@ -8,9 +8,9 @@ import pytest
 import twins
 from conftest import make_linkage
 from paraflex.dynamics import build_system
-from paraflex.kernel.bodies import body_energy, body_equations, system_energy
+from paraflex.kernel.bodies import body_energy, body_terms, system_energy
 from paraflex.kernel.linear import factor_bodies, factor_system, mass_norm, orient, solve_system
-from paraflex.kernel.packed import OMEGA2
+from paraflex.kernel.packed import OMEGA2, make_scratch
 from paraflex.kernel.stage import equations
 from paraflex.mechanism import (
     FlexibleBeam,
@@ -40,14 +40,14 @@ def without_stiffness(system):
 
 
 def kernel_forces(packed, system, q, v, a):
-    f = np.zeros(system.n)
+    f, scratch = np.zeros(system.n), make_scratch(packed)
     for i in range(len(system.bodies)):
-        body_equations(packed, i, q, v, a, f)
+        body_terms(packed, i, q, v, a, f, scratch)
     return f
 
 
 def energy(system, q, v):
-    return system_energy(system.packed, q, v, system.workspace().points)
+    return system_energy(system.packed, q, v, make_scratch(system.packed))
 
 
 # --- M, h, K, T and V of a body ------------------------------------------------------------------------------------
@@ -83,7 +83,7 @@ def test_energies_are_those_of_the_formulation(system, seed):
     q, v, _ = twins.random_state(system, seed)
     total = np.zeros(2)
     for i, body in enumerate(system.bodies):
-        kinetic, strain = body_energy(system.packed, i, q, v)
+        kinetic, strain = body_energy(system.packed, i, q, v, make_scratch(system.packed))
         np.testing.assert_allclose(kinetic, twins.kinetic_energy(body.integrals, q[body.all], v[body.all]), rtol=1e-12)
         # The twin's K is V^T K V, see above.
         np.testing.assert_allclose(strain, twins.strain_energy(body.integrals, q[body.all]), rtol=1e-9)

@@ -9,6 +9,7 @@ import twins
 from conftest import make_linkage
 from paraflex.dynamics import build_system
 from paraflex.kernel.joints import body_efforts, body_joints, start_rows
+from paraflex.kernel.packed import make_scratch
 
 SEEDS = (31, 32)
 TIME = 0.37
@@ -19,10 +20,10 @@ LAW = 1e-8
 
 def rows_and_forces(system, t, q, v, a, lam, weight_v, weight_q):
     """Phi'' + weight_v Phi' + weight_q Phi and Phi_q^T lambda, from the kernels of the time loop."""
-    rows, f = np.zeros(system.m), np.zeros(system.n)
+    rows, f, scratch = np.zeros(system.m), np.zeros(system.n), make_scratch(system.packed)
     start_rows(system.packed, twins.still_signals(system), t, (1.0, weight_v, weight_q), rows)
     for i in range(len(system.bodies)):
-        body_joints(system.packed, i, q, v, a, lam, (1.0, weight_v, weight_q), f, rows)
+        body_joints(system.packed, i, q, v, a, lam, (1.0, weight_v, weight_q), scratch, f, rows)
     return rows, f
 
 
@@ -135,7 +136,7 @@ def test_power_of_a_motor_is_torque_times_the_relative_turning_rate_of_the_mater
     torques, f = np.zeros(4), np.zeros(linkage.n)
     torques[motor] = 1.7
     for i in range(len(linkage.bodies)):
-        body_efforts(linkage.packed, i, torques, f)
+        body_efforts(linkage.packed, i, torques, make_scratch(linkage.packed), f)
     joint = linkage.mechanism.joint(linkage.mechanism.motors[motor].joint)
     rate = turning_rate(linkage, joint.b, q, v) - turning_rate(linkage, joint.a, q, v)
     assert abs(rate) > 0.1
@@ -167,7 +168,7 @@ def test_torque_and_reaction_cancel_in_a_turn_of_everything(linkage):
         torques, f = np.zeros(4), np.zeros(linkage.n)
         torques[k] = 1.0
         for i in range(len(linkage.bodies)):
-            body_efforts(linkage.packed, i, torques, f)
+            body_efforts(linkage.packed, i, torques, make_scratch(linkage.packed), f)
         assert -f @ together == pytest.approx(expected[motor.name], abs=1e-15)
 
 

@@ -14,6 +14,7 @@ from paraflex.fem.element import TRANSVERSE
 from paraflex.files import library_file, load
 from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.kernel.bodies import body_terms, motion_forces, weight_work
+from paraflex.kernel.packed import make_scratch
 from paraflex.kinematics import Line
 from paraflex.mechanism import (
     AppliedTorque,
@@ -99,7 +100,7 @@ def test_a_clamped_beam_sags_as_the_textbook_says():
     ):
         system = build_system(Mechanism("clamped", {}, (beam,), (), **acting))
         forces, still = np.zeros((1, system.n)), np.zeros((1, system.n))
-        motion_forces(system.packed, still, still, still, forces, None)
+        motion_forces(system.packed, still, still, still, forces, make_scratch(system.packed))
         body = system.bodies[0]
         u = -forces[0, body.flexible] / body.modes.omega**2
         found = body.integrals.D[body.mesh.column(-1, TRANSVERSE)] @ u
@@ -124,11 +125,11 @@ def test_generalised_weights_and_loads_are_derivatives_of_their_work(geometry):
     plain = build_system(dataclasses.replace(mechanism, gravity=(0.0, 0.0), loads=(), linear_springs=()))
     system = build_system(mechanism)
     q, _, _ = random_state(system, 5)
-    points, still = system.workspace().points, np.zeros((1, system.n))
+    scratch, still = make_scratch(system.packed), np.zeros((1, system.n))
 
     def forces(built):
         out = np.zeros((1, built.n))
-        motion_forces(built.packed, q[None], still, still, out, points)
+        motion_forces(built.packed, q[None], still, still, out, scratch)
         return out[0]
 
     slope = system.marker(PointRef("one", "B")).slope
@@ -141,7 +142,7 @@ def test_generalised_weights_and_loads_are_derivatives_of_their_work(geometry):
         turn = q[one.angle] + slope @ q[one.flexible]
         rope = np.linalg.norm(at(q, "two", "C") - at(q, "one", "B")) - 0.2
         stay = np.linalg.norm(at(q, "block", "P") - [0.1, -0.2]) - 0.1
-        done = weight_work(system.packed, q, points) + force @ at(q, "two", "C") + torque * turn
+        done = weight_work(system.packed, q, scratch) + force @ at(q, "two", "C") + torque * turn
         return done - 0.5 * 130.0 * rope**2 - 0.5 * 70.0 * stay**2
 
     h = 1e-6
@@ -153,8 +154,8 @@ def test_generalised_weights_and_loads_are_derivatives_of_their_work(geometry):
         base, lifted = np.zeros((2, system.n))
         unit = np.zeros(system.n)
         unit[body.position] = 1.0, 0.0
-        body_terms(plain.packed, i, q, still[0], still[0], base, points)
-        body_terms(plain.packed, i, q, still[0], unit, lifted, points)
+        body_terms(plain.packed, i, q, still[0], still[0], base, scratch)
+        body_terms(plain.packed, i, q, still[0], unit, lifted, scratch)
         total += (lifted - base)[body.offset]
     assert total == pytest.approx(system.total_mass, rel=1e-12)
 
@@ -330,5 +331,5 @@ def test_lumps_weigh_too():
     system = build_system(Mechanism("lump", {}, (beam,), (), gravity=(0.0, -G)))
     forces = np.zeros((1, system.n))
     still = np.zeros_like(forces)
-    motion_forces(system.packed, still, still, still, forces, None)
+    motion_forces(system.packed, still, still, still, forces, make_scratch(system.packed))
     np.testing.assert_allclose(forces[0, :3], [0.0, 2.0 * G, 0.5 * G], rtol=1e-6, atol=1e-12)

@@ -15,7 +15,7 @@ from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import body_terms, system_energy
 from paraflex.kernel.joints import body_joints, start_rows
 from paraflex.kernel.linear import factor_system, mass_norm, solve_system
-from paraflex.kernel.packed import INDEX_1, OMEGA2
+from paraflex.kernel.packed import INDEX_1, OMEGA2, make_scratch
 from paraflex.mechanism import (
     Assembly,
     FlexibleBeam,
@@ -131,7 +131,7 @@ def test_forces_are_those_of_a_numerical_lagrangian(reference):
     points = twins.masses_of(system, "one")
     q, v, a = random_state(system, 3)
     f = np.zeros(system.n)
-    body_terms(system.packed, 0, q, v, a, f, system.workspace().points)
+    body_terms(system.packed, 0, q, v, a, f, make_scratch(system.packed))
     found = f[body.all] - np.concatenate([np.zeros(3), body.modes.omega**2 * q[body.flexible]])
     q, v, a = q[body.all], v[body.all], a[body.all]
 
@@ -150,7 +150,7 @@ def test_forces_are_those_of_a_numerical_lagrangian(reference):
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * np.max(np.abs(expected)))
     linear = np.zeros(system.n)
     plain = build_system(chain(reference, Geometry.LINEAR))
-    body_terms(plain.packed, 0, *random_state(system, 3), linear, None)
+    body_terms(plain.packed, 0, *random_state(system, 3), linear, make_scratch(plain.packed))
     # What is tested is not small.
     shape = linear[body.all] - f[body.all]
     assert np.max(np.abs(shape)) > 0.02 * np.max(np.abs(expected))
@@ -159,7 +159,7 @@ def test_forces_are_those_of_a_numerical_lagrangian(reference):
 def test_energy_is_that_of_the_points():
     system = build_system(chain())
     q, v, _ = random_state(system, 5)
-    kinetic, strain = system_energy(system.packed, q, v, system.workspace().points)
+    kinetic, strain = system_energy(system.packed, q, v, make_scratch(system.packed))
     total = 0.0
     for name in ("one", "two"):
         body = system.body(name)
@@ -187,7 +187,7 @@ def test_joints_follow_the_shortened_points():
     ws = system.workspace()
     start_rows(system.packed, signals, 0.0, INDEX_1, ws.rows)
     for i in range(len(system.bodies)):
-        body_joints(system.packed, i, q, v, a, np.zeros(system.m), INDEX_1, ws.f, ws.rows)
+        body_joints(system.packed, i, q, v, a, np.zeros(system.m), INDEX_1, ws.scratch, ws.f, ws.rows)
     np.testing.assert_allclose((at(h)[1] - at(-h)[1]) / (2 * h), ws.rows, rtol=0, atol=1e-7)
     elbow = [
         point_motion(system, ref, q[None], v[None], a[None]) for ref in (PointRef("two", "B"), PointRef("one", "C"))
@@ -209,18 +209,18 @@ def dense_system(system, q, b):
     matrix = np.zeros((system.n + system.m, system.n + system.m))
     matrix[system.n :, : system.n] = system.jacobian(q)
     matrix[: system.n, system.n :] = system.jacobian(q).T
-    still, points = np.zeros(system.n), system.workspace().points
+    still, scratch = np.zeros(system.n), make_scratch(system.packed)
     modal = system.packed.modal.copy()
     modal[OMEGA2] = 0.0
     inert = system.packed._replace(modal=modal)
     base, column = np.zeros((2, system.n))
     for i in range(len(system.bodies)):
-        body_terms(inert, i, q, still, still, base, points)
+        body_terms(inert, i, q, still, still, base, scratch)
     for j in range(system.n):
         unit = np.zeros(system.n)
         unit[j] = 1.0
         for i in range(len(system.bodies)):
-            body_terms(inert, i, q, still, unit, column, points)
+            body_terms(inert, i, q, still, unit, column, scratch)
         matrix[: system.n, j] = column - base
     mass = matrix[: system.n, : system.n].copy()
     for body in system.bodies:
@@ -267,8 +267,8 @@ def test_the_iteration_matrix_has_the_geometric_stiffness(source):
     def forces(q):
         f, rows = np.zeros(system.n), np.zeros(system.m)
         for i in range(len(system.bodies)):
-            body_terms(system.packed, i, q, v, pushed, f, ws.points)
-            body_joints(system.packed, i, q, v, pushed, lam, INDEX_1, f, rows)
+            body_terms(system.packed, i, q, v, pushed, f, ws.scratch)
+            body_joints(system.packed, i, q, v, pushed, lam, INDEX_1, ws.scratch, f, rows)
         return f
 
     matrix, _ = dense_system(system, q, 0.0)
@@ -302,8 +302,8 @@ def test_small_deflections_are_the_linear_ones():
     for size in (1e-3, 1e-4):
         state = random_state(bent, 21, size)
         forces = np.zeros((2, bent.n))
-        body_terms(bent.packed, 1, *state, forces[0], bent.workspace().points)
-        body_terms(linear.packed, 1, *state, forces[1], None)
+        body_terms(bent.packed, 1, *state, forces[0], make_scratch(bent.packed))
+        body_terms(linear.packed, 1, *state, forces[1], make_scratch(linear.packed))
         differences.append(np.max(np.abs(forces[0] - forces[1])))
     # Of first order: products of the deflection with the accelerations of the undeformed body.
     assert 1e-5 < differences[0] < 1e-2

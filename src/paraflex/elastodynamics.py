@@ -31,7 +31,7 @@ from paraflex.integrators import Solution
 from paraflex.integrators.linear_structure import Block, Response, march
 from paraflex.integrators.newmark import NewmarkNumbers
 from paraflex.kernel.bodies import motion_forces, system_energy
-from paraflex.kernel.packed import make_point_scratch
+from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode, Geometry
 from paraflex.simulate import TrackingRun, TrackingTask
 
@@ -171,7 +171,7 @@ class _Motion:
         Both in the body frames.
         """
         forces, packed = np.zeros_like(self.q), self.system.packed
-        motion_forces(packed, self.q, self.v, self.a, forces, make_point_scratch(packed))
+        motion_forces(packed, self.q, self.v, self.a, forces, make_scratch(packed))
         joints = np.array([self.system.jacobian(q) for q in self.q])
         motors = [joint_coordinate(self.system, name, self.q).rows[:, None] for name in held]
         return self.to_bodies(np.concatenate([joints, *motors], axis=1)), -self.to_bodies(forces)
@@ -252,8 +252,8 @@ def _figures(task: TrackingTask, torques: FeedForward, nominal: _Motion, kept: l
     system, t = task.system, task.motion.t[: len(kept)]
     xi, dxi, ddxi, mu = (np.array(values) for values in zip(*kept, strict=True))
     q, v, a = nominal[: len(kept)].displaced(xi, dxi, ddxi)
-    points = make_point_scratch(system.packed)
-    energy = np.array([system_energy(system.packed, *state, points) for state in zip(q, v, strict=True)])
+    scratch = make_scratch(system.packed)
+    energy = np.array([system_energy(system.packed, *state, scratch) for state in zip(q, v, strict=True)])
     signals, _ = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))
     violation = np.array([system.constraints(signals, *state) for state in zip(t, q, v, strict=True)])
     position, velocity = np.max(np.abs(violation), axis=(0, 2))

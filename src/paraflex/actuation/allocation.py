@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import ActuationError, Moment, SingularActuationError
 from paraflex.kernel.bodies import motion_forces
-from paraflex.kernel.packed import make_point_scratch
+from paraflex.kernel.packed import make_scratch
 from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode
 
@@ -49,7 +49,7 @@ def required_effort(motion: RigidMotion) -> Effort:
     """Effort and actuation matrix of a rigid motion, under gravity, loads, springs, dampers and friction."""
     system = motion.system
     forces = np.zeros_like(motion.q)
-    motion_forces(system.packed, motion.q, motion.v, motion.a, forces, make_point_scratch(system.packed))
+    motion_forces(system.packed, motion.q, motion.v, motion.a, forces, make_scratch(system.packed))
     _add_springs_and_dampers(motion, forces)
     transposed = np.swapaxes(motion.basis, 1, 2)
     rows = [joint_coordinate(system, motor.joint, motion.q).rows for motor in system.mechanism.motors]

@@ -30,6 +30,8 @@ from paraflex.kernel.packed import (
     TRACK,
     PackedSystem,
 )
+from paraflex.kernel.sums import FIRST_MARKER
+from paraflex.kernel.vectors import padded
 from paraflex.mechanism import (
     AxisJoint,
     Joint,
@@ -170,13 +172,13 @@ def pack_system(
         for spring in mechanism.linear_springs
     ]
     loads = [_load_record(load) | {"marker": packer.add_marker(load.point)} for load in mechanism.loads]
-    markers = packer.markers
+    markers, columns = packer.markers, _columns(bodies, packer.markers)
     tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
 
     packed = PackedSystem(
-        bodies=_body_records(bodies, packer.ports, packer.efforts),
+        bodies=_body_records(bodies, packer.ports, packer.efforts, columns),
         markers=_marker_records(markers),
-        ports=_port_records(bodies, packer.ports),
+        ports=_port_records(packer.ports),
         efforts=_records(EFFORT, [effort for group in packer.efforts for effort in group]),
         loads=_records(LOAD, loads),
         lines=_records(LINE, lines),
@@ -189,6 +191,8 @@ def pack_system(
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
         G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
         shape=np.concatenate([np.zeros((3, 0)), *(np.vstack([m.N, m.slope]) for m in markers)], axis=1),
+        columns=np.concatenate([matrix.ravel() for matrix in columns]),
+        products=np.concatenate([_products(body).ravel() for body in bodies]),
         bending=_bending(bodies, markers),
         masses=_mass_records(bodies),
         mass_shape=np.concatenate([np.zeros((3, 0)), *(_mass_rows(body) for body in bodies)], axis=1),
@@ -317,6 +321,24 @@ def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
     return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2, body.damping])
 
 
+def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The matrix with columns of zeros up to whole vectors."""
+    return np.pad(matrix, ((0, 0), (0, padded(matrix.shape[1]) - matrix.shape[1])))
+
+
+def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[NDArray[np.float64]]:
+    """What coordinates give to the sums of each body, (nf, width): see `kernel.sums`."""
+    rows = [[_modal_rows(body)[:FIRST_MARKER]] for body in bodies]
+    for marker in markers:
+        rows[marker.body].append(np.vstack([marker.N, marker.slope]))
+    return [_padded(np.vstack(parts).T) for parts in rows]
+
+
+def _products(body: BodyCoordinates) -> NDArray[np.float64]:
+    """Columns of G2 and I2 of a body, one after the other, padded: (nf, 2 stride)."""
+    return np.hstack([_padded(body.integrals.G2.T), _padded(body.integrals.I2.T)])
+
+
 def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> NDArray[np.float64] | None:
     if all(body.points is None for body in bodies):
         return None
@@ -367,12 +389,14 @@ def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
     return out
 
 
-def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
+def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
     values = []
-    flex = square = port = effort = block = mass = dense = 0
-    for body, body_ports, body_efforts in zip(bodies, ports, efforts, strict=True):
+    flex = square = port = effort = block = mass = dense = inverse = first = products = jac = 0
+    for body, body_ports, body_efforts, matrix in zip(bodies, ports, efforts, columns, strict=True):
         s = body.integrals
         parts = sum(port["parts"] for port in body_ports)
+        # Three lanes more for the rigid coordinates.
+        lanes, size, stride = padded(parts + 3), 3 + body.nf, padded(body.nf)
         masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
         values.append(
             {
@@ -384,12 +408,19 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
                 "port_end": port + len(body_ports),
                 "effort": effort,
                 "effort_end": effort + len(body_efforts),
+                "columns": first,
+                "width": matrix.shape[1],
+                "products": products,
+                "stride": stride,
                 "block": block,
                 "parts": parts,
+                "lanes": lanes,
+                "jac": jac,
                 "mass": mass,
                 "mass_end": mass + masses,
                 "slopes": slopes,
                 "dense": dense,
+                "inverse": inverse,
                 "m": s.m,
                 "S1x": s.S1[0],
                 "S1y": s.S1[1],
@@ -400,20 +431,27 @@ def _body_records(bodies, ports, efforts) -> NDArray[np.void]:
         square += body.nf**2
         port += len(body_ports)
         effort += len(body_efforts)
-        block += parts**2
+        first += matrix.size
+        products += 2 * body.nf * stride
+        block += parts * lanes
+        jac += size * lanes
         mass += masses
-        dense += (3 + body.nf) ** 2 if slopes else 0
+        dense += size**2 if slopes else 0
+        inverse += size * padded(size) if slopes else 0
     return _records(BODY, values)
 
 
 def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
     values, shape, bending = [], 0, 0
+    column: dict[int, int] = {}
     for marker in markers:
+        column[marker.body] = column.get(marker.body, FIRST_MARKER - 3) + 3
         bends = marker.bending is not None
         values.append(
             {
                 "body": marker.body,
                 "shape": shape,
+                "column": column[marker.body],
                 "bending": bending if bends else -1,
                 "x": marker.x0[0],
                 "y": marker.x0[1],
@@ -424,14 +462,13 @@ def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
     return _records(MARKER, values)
 
 
-def _port_records(bodies, ports) -> NDArray[np.void]:
-    values, jac = [], 0
-    for body, body_ports in zip(bodies, ports, strict=True):
+def _port_records(ports) -> NDArray[np.void]:
+    values = []
+    for body_ports in ports:
         local = 0
         for port in body_ports:
-            values.append(port | {"jac": jac, "local": local})
+            values.append(port | {"local": local})
             local += port["parts"]
-            jac += port["parts"] * (3 + body.nf)
     return _records(PORT, values)
 
 

@@ -15,7 +15,7 @@ from paraflex.dynamics.signals import no_signals
 from paraflex.dynamics.system import System
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.constraints import constraint_values
-from paraflex.kernel.packed import OMEGA2, PackedSystem, make_point_scratch
+from paraflex.kernel.packed import OMEGA2, PackedSystem, make_scratch
 
 # What stands in for zero on the diagonal of a dependent row, as a fraction of entries of size one, so that the factor
 # exists; iterative refinement takes its effect out again.
@@ -50,7 +50,7 @@ def body_masses(system: System, q: NDArray[np.float64]) -> list[NDArray[np.float
     for body in system.bodies:
         a[np.arange(3 + body.nf), np.arange(body.all.start, body.all.stop)] = 1.0
     poses = np.repeat(np.asarray(q, dtype=float)[None], columns, axis=0)
-    motion_forces(bare, poses, np.zeros_like(poses), a, forces, make_point_scratch(bare))
+    motion_forces(bare, poses, np.zeros_like(poses), a, forces, make_scratch(bare))
     return [forces[: 3 + body.nf, body.all].T for body in system.bodies]
 
 

@@ -23,6 +23,7 @@ from paraflex.engines.tree import Tree, body_motion, joint_state, place, spannin
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
+from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import GROUND, ActuationMode, Joint, Mechanism, proportional_segments
 from paraflex.results.record import Record, record
 from paraflex.simulate import TrackingRun, TrackingTask
@@ -230,7 +231,8 @@ def _solution(
     signals, _ = pack_signals(task.mechanism, still, float(times[-1]))
     gaps = [system.constraints(signals, t, *state) for t, *state in zip(times, q, v, strict=False)]
     # MuJoCo counts weight as potential energy; here it does work.
-    weight = np.array([weight_work(system.packed, state, None) for state in q])
+    scratch = make_scratch(system.packed)
+    weight = np.array([weight_work(system.packed, state, scratch) for state in q])
     kinetic, strain = motion.energy[:, 1], motion.energy[:, 0] + weight
     work = motion.work + weight - weight[:1]
     balance = kinetic + strain - kinetic[:1] - strain[:1] - work

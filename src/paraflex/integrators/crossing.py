@@ -15,7 +15,7 @@ from paraflex.integrators.gauges import Gauge
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Instant, Problem, Run
 from paraflex.kernel.bodies import weight_work
-from paraflex.kernel.packed import make_point_scratch
+from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import PAUSED, Samples
 
 Array = NDArray[np.float64]
@@ -118,8 +118,8 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     width = crossing.t - before.t
     work = before.work + width / 6.0 * (powers[0] + 4.0 * powers[1] + powers[2])
     packed = problem.system.packed
-    points, end = make_point_scratch(packed), last.samples
-    work += weight_work(packed, end.q[0], points) - weight_work(packed, problem.initial.q, points)
+    scratch, end = make_scratch(packed), last.samples
+    work += weight_work(packed, end.q[0], scratch) - weight_work(packed, problem.initial.q, scratch)
     end.energy[0, 2] = work
     return Samples(*(np.concatenate([old[kept], new]) for old, new in zip(run.samples, end, strict=True)))
 

@@ -19,6 +19,7 @@ from paraflex.integrators.stretches import hidden_from
 from paraflex.integrators.sundials import CvodeStepper, IdaStepper
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.ode import stored_energy
+from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import FINISHED, PAUSED
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ class OutsideRun:
 
     def __init__(self, problem: Problem, options: IntegrationOptions, stepper: Stepper) -> None:
         self.problem, self.samples, self._stepper = problem, empty_samples(problem.times, problem.system), stepper
-        self._options, self._points = options, problem.system.workspace().points
+        self._options, self._scratch = options, make_scratch(problem.system.packed)
         packed, initial = problem.system.packed, problem.initial
         self.dependent_rows = int(factor_system(packed, 0.0, initial.q, problem.system.workspace()))
         self.reached, self._steps = 0, 0
@@ -128,7 +129,7 @@ class OutsideRun:
 
     def _energies(self, instant: Instant) -> Array:
         packed = self.problem.system.packed
-        return np.array(stored_energy(packed, instant.q, instant.v, instant.multipliers, self._points))
+        return np.array(stored_energy(packed, instant.q, instant.v, instant.multipliers, self._scratch))
 
     def _note(self, instant: Instant) -> None:
         """Keep the largest violations of constraints and of the energy balance."""

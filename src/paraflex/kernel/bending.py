@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from paraflex.kernel.compiling import kernel, routine
+from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, NX, NY, OMEGA2, SLOPE
+from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
 
 # Rows of Workspace.points: slopes at the Gauss points, their two derivatives, and the axial force carried there.
 W0, W1, W2, AXIAL = range(4)
@@ -149,11 +150,11 @@ def bent_mass(p, i, q, ws):
         s0 = 0.0
         for l in range(n):
             s0 += p.mass_shape[SLOPE, h + l] * q[e + l]
-        ws.points[W0, j] = s0
+        ws.scratch.points[W0, j] = s0
     for j in range(width * width):
         ws.mass[at + j] = 0.0
     # Row x of a point's J; row y is (0, 1, sx, Ny).
-    row = ws.nf
+    row = ws.scratch.rigid
     for k in range(body.mass, body.mass_end):
         point = p.masses[k]
         h = point.shape
@@ -164,8 +165,8 @@ def bent_mass(p, i, q, ws):
             sx += Nx * q[e + l]
             sy += p.mass_shape[NY, h + l] * q[e + l]
         for j in range(point.reach):
-            force = p.mass_weights[point.weights + j] * ws.points[W0, j]
-            sx -= 0.5 * force * ws.points[W0, j]
+            force = p.mass_weights[point.weights + j] * ws.scratch.points[W0, j]
+            sx -= 0.5 * force * ws.scratch.points[W0, j]
             g = p.masses[body.mass + j].shape
             for l in range(n):
                 row[3 + l] -= force * p.mass_shape[SLOPE, g + l]
@@ -196,12 +197,12 @@ def note_axial_forces(p, i, q, v, a, lam, ws):
     body = p.bodies[i]
     n, at = body.nf, body.square
     # Only the axial forces at the Gauss points are wanted.
-    bent_equations(p, i, q, v, a, ws.f, ws.points)
+    bent_equations(p, i, q, v, a, ws.f, ws.scratch.points)
     for j in range(n * n):
         ws.geometric[at + j] = 0.0
     for j in range(body.slopes):
         h = p.masses[body.mass + j].shape
-        force = ws.points[AXIAL, j]
+        force = ws.scratch.points[AXIAL, j]
         for l in range(n):
             for d in range(n):
                 ws.geometric[at + l * n + d] -= force * p.mass_shape[SLOPE, h + l] * p.mass_shape[SLOPE, h + d]
@@ -285,18 +286,61 @@ def factor_bent(p, i, b, q, ws, dense):
 
 
 @routine
-def solve_bent(p, i, dense, y, x, start):
-    """X = (M + b (K + K_g))^-1 y of body i in its body frame; y and x may be one."""
-    width, at = 3 + p.bodies[i].nf, p.bodies[i].dense
+def solve_bent(p, i, dense, source, target, at, pitch):
+    """(M + b (K + K_g))^-1 times eight columns of a matrix with rows `pitch` apart, from `at` on."""
+    width, first = 3 + p.bodies[i].nf, p.bodies[i].dense
     for r in range(width):
-        total = y[start + r]
+        total = load(source, at + r * pitch)
         for k in range(r):
-            total -= dense[at + r * width + k] * x[start + k]
-        x[start + r] = total * dense[at + r * width + r]
+            total = add_scaled(total, load(target, at + k * pitch), -dense[first + r * width + k])
+        store(target, at + r * pitch, add_scaled(zeros(), total, dense[first + r * width + r]))
     for r in range(width - 1, -1, -1):
-        x[start + r] *= dense[at + r * width + r]
-        for k in range(r):
-            x[start + k] -= dense[at + r * width + k] * x[start + r]
+        total = load(target, at + r * pitch)
+        for k in range(r + 1, width):
+            total = add_scaled(total, load(target, at + k * pitch), -dense[first + k * width + r])
+        store(target, at + r * pitch, add_scaled(zeros(), total, dense[first + r * width + r]))
+
+
+@routine
+def respond_bent(p, i, ws, dense, inverse):
+    """Response of body i to its constraint rows into ws.response, and the inverse of its iteration matrix.
+
+    `dense` and `inverse` are those of ws, None for linear geometry.
+    """
+    if inverse is None:
+        return
+    body = p.bodies[i]
+    for block in range(0, body.lanes, LANES):
+        solve_bent(p, i, dense, ws.jac, ws.response, body.jac + block, body.lanes)
+    width = 3 + body.nf
+    pitch = -(-width // LANES) * LANES
+    for r in range(width):
+        for l in range(pitch):
+            inverse[body.inverse + r * pitch + l] = 1.0 if r == l else 0.0
+    for block in range(0, pitch, LANES):
+        solve_bent(p, i, dense, inverse, inverse, body.inverse + block, pitch)
+
+
+@inlined
+def inverse_times(p, i, inverse, y, x):
+    """(M + b (K + K_g))^-1 x of body i in place, in its body frame; y is scratch.
+
+    `inverse` is ws.inverse, None for linear geometry.
+    """
+    if inverse is None:
+        return
+    body = p.bodies[i]
+    width, o = 3 + body.nf, body.offset
+    pitch = -(-width // LANES) * LANES
+    for j in range(pitch):
+        y[j] = x[o + j] if j < width else 0.0
+    at = body.inverse
+    for r in range(width):
+        total = zeros()
+        for block in range(0, pitch, LANES):
+            total = add_product(total, load(inverse, at + block), load(y, block))
+        x[o + r] = summed(total)
+        at += pitch
 
 
 @routine

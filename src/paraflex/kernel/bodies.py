@@ -11,90 +11,91 @@ from math import cos, sin
 from paraflex.kernel.bending import bent_energy, bent_equations, bent_shortening
 from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.joints import apply_lines, apply_loads
-from paraflex.kernel.packed import DAMPING, GJ, I1, OMEGA2, S2X, S2Y
+from paraflex.kernel.packed import DAMPING, OMEGA2, S2X, S2Y
+from paraflex.kernel.sums import GJ_SUM, I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums, clear_shares, hand_on
 
 
 @inlined
-def body_equations(p, i, q, v, a, f):
-    """M q'' + h + D u' + K u of body i, less its weight, into f; the translational part in the ground frame."""
+def linear_terms(p, i, q, v, a, f, scratch):
+    """M q'' + h + D u' + K u of body i by its sums, but for the shares: see `begin_body`."""
     body = p.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
-    c, s = cos(q[o + 2]), sin(q[o + 2])
+    c, s = scratch.turn[0], scratch.turn[1]
     w, dw = v[o + 2], a[o + 2]
     # Gravity acts as a frame that is accelerated upwards.
     gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
-    # First moments s, S2 u' and S2 u''.
-    sx, sy, vx, vy, fx, fy = body.S1x, body.S1y, 0.0, 0.0, 0.0, 0.0
-    i1u, i1v = 0.0, 0.0
+    # First moments s; S2 u' and S2 u''.
+    sx, sy = body.S1x + scratch.q[S2X_SUM], body.S1y + scratch.q[S2Y_SUM]
+    vx, vy, fx, fy = scratch.v[S2X_SUM], scratch.v[S2Y_SUM], scratch.a[S2X_SUM], scratch.a[S2Y_SUM]
+    body_products(p, i, q, v, scratch)
+    uI2u, uI2v, mpf_a = 0.0, 0.0, scratch.a[GJ_SUM]
     for j in range(n):
-        u, du, ddu = q[e + j], v[e + j], a[e + j]
-        S2x, S2y, i1 = p.modal[S2X, k + j], p.modal[S2Y, k + j], p.modal[I1, k + j]
-        sx += S2x * u
-        sy += S2y * u
-        vx += S2x * du
-        vy += S2y * du
-        fx += S2x * ddu
-        fy += S2y * ddu
-        i1u += i1 * u
-        i1v += i1 * du
-    uI2u, uI2v, mpf_a = 0.0, 0.0, 0.0
-    for j in range(n):
-        g_u, g_v, i_u = 0.0, 0.0, 0.0
-        row = body.square + j * n
-        for l in range(n):
-            g_u += p.G2[row + l] * q[e + l]
-            g_v += p.G2[row + l] * v[e + l]
-            i_u += p.I2[row + l] * q[e + l]
-        uI2u += q[e + j] * i_u
-        uI2v += v[e + j] * i_u
-        mpf = p.modal[GJ, k + j] - g_u
-        mpf_a += mpf * a[e + j]
+        u, du, ddu, g_u, i_u = q[e + j], v[e + j], a[e + j], scratch.G2_q[j], scratch.I2_q[j]
+        uI2u += u * i_u
+        uI2v += du * i_u
+        mpf_a -= g_u * ddu
         f[e + j] = (
-            p.modal[S2X, k + j] * ax
-            + p.modal[S2Y, k + j] * ay
-            + mpf * dw
-            + a[e + j]
-            - w * w * (p.modal[I1, k + j] + i_u)
-            - 2.0 * w * g_v
-            + p.modal[OMEGA2, k + j] * q[e + j]
-            + p.modal[DAMPING, k + j] * v[e + j]
+            ddu
+            - g_u * dw
+            - w * w * i_u
+            - 2.0 * w * scratch.G2_v[j]
+            + p.modal[OMEGA2, k + j] * u
+            + p.modal[DAMPING, k + j] * du
         )
+    shares = scratch.shares
+    shares[S2X_SUM], shares[S2Y_SUM], shares[I1_SUM], shares[GJ_SUM] = ax, ay, -w * w, dw
     bx = body.m * ax - sy * dw + fx - w * w * sx - 2.0 * w * vy
     by = body.m * ay + sx * dw + fy - w * w * sy + 2.0 * w * vx
     f[o] = c * bx - s * by
     f[o + 1] = s * bx + c * by
-    f[o + 2] = sx * ay - sy * ax + (body.I0 + 2.0 * i1u + uI2u) * dw + mpf_a + 2.0 * w * (i1v + uI2v)
+    f[o + 2] = sx * ay - sy * ax + (body.I0 + 2.0 * scratch.q[I1_SUM] + uI2u) * dw + mpf_a
+    f[o + 2] += 2.0 * w * (scratch.v[I1_SUM] + uI2v)
 
 
 @inlined
-def body_terms(p, i, q, v, a, f, points):
-    """M q'' + h + D u' + K u of body i, less its weight, into f.
+def begin_body(p, i, q, v, a, f, scratch, points):
+    """M q'' + h + D u' + K u of body i, less its weight, into f, but for the shares in scratch.
 
-    `points` is scratch of second-order geometry (Workspace.points), or None.
+    Joints and motors add theirs, and `sums.hand_on` ends it. `points` is scratch.points, None for linear geometry.
     """
+    body_sums(p, i, q, v, a, scratch)
+    clear_shares(p, i, scratch)
     if points is None:
-        body_equations(p, i, q, v, a, f)
+        linear_terms(p, i, q, v, a, f, scratch)
     elif p.bodies[i].slopes > 0:
         bent_equations(p, i, q, v, a, f, points)
     else:
-        body_equations(p, i, q, v, a, f)
+        linear_terms(p, i, q, v, a, f, scratch)
 
 
 @kernel
-def motion_forces(p, q, v, a, f, points):
+def body_terms(p, i, q, v, a, f, scratch):
+    """M q'' + h + D u' + K u of body i, less its weight, into f; the translational part in the ground frame."""
+    begin_body(p, i, q, v, a, f, scratch, scratch.points)
+    hand_on(p, i, scratch, f)
+
+
+@kernel
+def motion_forces(p, q, v, a, f, scratch):
     """M q'' + h + K u of the whole system at every instant of a motion, less weight and loads: all (instants, n)."""
     for k in range(q.shape[0]):
         for i in range(p.bodies.size):
-            body_terms(p, i, q[k], v[k], a[k], f[k], points)
+            body_terms(p, i, q[k], v[k], a[k], f[k], scratch)
         apply_loads(p, q[k], f[k])
         apply_lines(p, q[k], v[k], f[k])
 
 
 @kernel
-def weight_work(p, q, points):
+def weight_work(p, q, scratch):
     """What gravity has done since all mass lay at the origin of the ground frame: g . sum m p."""
+    return add_weights(p, q, scratch.points)
+
+
+@inlined
+def add_weights(p, q, points):
+    """Of all bodies; `points` as for `begin_body`."""
     total = 0.0
     if p.gravity[0] == 0.0 and p.gravity[1] == 0.0:
         return total
@@ -115,29 +116,23 @@ def weight_work(p, q, points):
 
 
 @inlined
-def body_energy(p, i, q, v):
+def body_energy(p, i, q, v, scratch):
     """Kinetic and strain energy of body i."""
     body = p.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
-    c, s = cos(q[o + 2]), sin(q[o + 2])
+    body_sums(p, i, q, v, v, scratch)
+    body_products(p, i, q, v, scratch)
+    c, s = scratch.turn[0], scratch.turn[1]
     w = v[o + 2]
     rx, ry = c * v[o] + s * v[o + 1], c * v[o + 1] - s * v[o]
-    sx, sy, vx, vy = body.S1x, body.S1y, 0.0, 0.0
-    inertia, coupling, flexible, strain = body.I0, 0.0, 0.0, 0.0
+    sx, sy = body.S1x + scratch.q[S2X_SUM], body.S1y + scratch.q[S2Y_SUM]
+    vx, vy = scratch.v[S2X_SUM], scratch.v[S2Y_SUM]
+    inertia, coupling, flexible, strain = body.I0 + 2.0 * scratch.q[I1_SUM], scratch.v[GJ_SUM], 0.0, 0.0
     for j in range(n):
         u, du = q[e + j], v[e + j]
-        sx += p.modal[S2X, k + j] * u
-        sy += p.modal[S2Y, k + j] * u
-        vx += p.modal[S2X, k + j] * du
-        vy += p.modal[S2Y, k + j] * du
-        g_u, i_u = 0.0, 0.0
-        row = body.square + j * n
-        for l in range(n):
-            g_u += p.G2[row + l] * q[e + l]
-            i_u += p.I2[row + l] * q[e + l]
-        inertia += (2.0 * p.modal[I1, k + j] + i_u) * u
-        coupling += (p.modal[GJ, k + j] - g_u) * du
+        inertia += scratch.I2_q[j] * u
+        coupling -= scratch.G2_q[j] * du
         flexible += du * du
         strain += p.modal[OMEGA2, k + j] * u * u
     kinetic = 0.5 * (body.m * (rx * rx + ry * ry) + inertia * w * w + flexible)
@@ -146,16 +141,22 @@ def body_energy(p, i, q, v):
 
 
 @kernel
-def system_energy(p, q, v, points):
-    """Kinetic and strain energy of the system; `points` as for `body_terms`."""
+def system_energy(p, q, v, scratch):
+    """Kinetic and strain energy of the system."""
+    return add_energies(p, q, v, scratch, scratch.points)
+
+
+@inlined
+def add_energies(p, q, v, scratch, points):
+    """Energies of all bodies; `points` as for `begin_body`."""
     kinetic, strain = 0.0, 0.0
     for i in range(p.bodies.size):
         if points is None:
-            t, u = body_energy(p, i, q, v)
+            t, u = body_energy(p, i, q, v, scratch)
         elif p.bodies[i].slopes > 0:
             t, u = bent_energy(p, i, q, v, points)
         else:
-            t, u = body_energy(p, i, q, v)
+            t, u = body_energy(p, i, q, v, scratch)
         kinetic += t
         strain += u
     return kinetic, strain

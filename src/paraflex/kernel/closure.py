@@ -6,7 +6,7 @@ import numpy as np
 
 from paraflex.kernel.arrays import copy, fill, largest
 from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.compiling import kernel, routine
+from paraflex.kernel.compiling import allocating, routine
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.dense import solve_dense
 from paraflex.kernel.joints import (
@@ -29,7 +29,7 @@ SINGULAR_PIVOT = 1e-11
 CLOSED, NO_CONVERGENCE, TOO_COARSE, SINGULAR = range(4)
 
 
-@kernel
+@allocating
 def task_values(p, marker, coordinates, q, v, a):
     """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker: (3, tasks)."""
     out = np.empty((3, coordinates.size))
@@ -84,8 +84,8 @@ def relative_change(before, now, change):
     return norm
 
 
-@kernel
-def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, basis):
+@allocating
+def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, basis, scratch):
     """Close the loops along a path, each instant starting from the one before.
 
     Parameters
@@ -96,6 +96,7 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
         Written; q[0] holds the pose to start from.
     basis : (times, n, tasks) array
         Written: coordinates' change per change of the task coordinates, the null space of Phi_q in task terms.
+    scratch : Scratch
 
     Returns
     -------
@@ -164,7 +165,7 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
         # The part of Phi'' and of the task's acceleration that does not depend on the accelerations.
         start_rows(p, signals, t, INDEX_1, phi)
         for i in range(p.bodies.size):
-            body_joints(p, i, q[k], v[k], zero, lam, INDEX_1, unused, phi)
+            body_joints(p, i, q[k], v[k], zero, lam, INDEX_1, scratch, unused, phi)
         apply_axes(p, q[k], v[k], zero, lam, INDEX_1, idle, unused, phi)
         here = task_values(p, marker, coordinates, q[k], v[k], zero)
         for r in range(m):

@@ -1,4 +1,8 @@
-"""How kernels are compiled: cached on disk, without the GIL, free to reorder sums."""
+"""How kernels are compiled: cached on disk, without the GIL, free to reorder sums, and without counting references.
+
+Numba counts the references to every array that a local name stands for, one field of a workspace and all of its others
+with it, by atomic operations that cost more than the arithmetic. Kernels make no arrays: their caller owns them all.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,7 @@ _OPTIONS = {
     "error_model": "numpy",
     "fastmath": FAST_MATH,
     "no_cfunc_wrapper": True,
+    "_nrt": False,
 }
 
 # Without the entry from Python, which takes as long to compile as the function itself.
@@ -20,6 +25,8 @@ _INNER_OPTIONS = {**_OPTIONS, "no_cpython_wrapper": True}
 
 # Called from Python.
 kernel = njit(**_OPTIONS)
+# And makes arrays of its own: not for the time loop.
+allocating = njit(**{**_OPTIONS, "_nrt": True})
 # Called from kernels only: called from Python it would crash the process.
 routine = njit(**_INNER_OPTIONS)
 # For what is called once a body in a hot loop: passing the packed system, some seventy machine words, costs as much

@@ -13,6 +13,7 @@ from math import cos, sin, sqrt, tanh
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPING, FRICTION, NX, NY, SLOPE, SPRING
 from paraflex.kernel.signals import evaluate_signal
+from paraflex.kernel.sums import body_sums, clear_shares, hand_on
 
 
 @inlined
@@ -65,12 +66,17 @@ def marker_angle(p, marker, vector):
 @inlined
 def marker_motion(p, marker, q, v, a):
     """Position, velocity and acceleration of a marker in the ground frame, and its s there: (p, p', p'', R s)."""
+    angle = q[p.bodies[marker.body].offset + 2]
+    shapes = marker_shape(p, marker, q), marker_shape(p, marker, v), marker_shape(p, marker, a)
+    return point_motion(p, marker, cos(angle), sin(angle), shapes, q, v, a)
+
+
+@inlined
+def point_motion(p, marker, c, s, shapes, q, v, a):
+    """What `marker_motion` returns, by N u, N u' and N u'' and the cosine and sine of the body's angle."""
     o = p.bodies[marker.body].offset
-    c, s = cos(q[o + 2]), sin(q[o + 2])
     w, dw = v[o + 2], a[o + 2]
-    sx, sy = marker_shape(p, marker, q)
-    ux, uy = marker_shape(p, marker, v)
-    bx, by = marker_shape(p, marker, a)
+    (sx, sy), (ux, uy), (bx, by) = shapes
     f0, f1, f2 = marker_shortening(p, p.bending, marker, q, v, a)
     sx += marker.x - f0
     sy += marker.y
@@ -266,38 +272,80 @@ def load_power(p, q, v):
 @inlined
 def angle_row(p, marker, kind, weights, q, v, a):
     """What a marker's angle and its rates give to a row of that kind; linear in q, v and a."""
-    if kind == CONSTRAINT:
-        return (
-            weights[0] * marker_angle(p, marker, a)
-            + weights[1] * marker_angle(p, marker, v)
-            + weights[2] * marker_angle(p, marker, q)
-        )
-    return marker_angle(p, marker, q if kind == SPRING else v)
+    angles = marker_angle(p, marker, q), marker_angle(p, marker, v), marker_angle(p, marker, a)
+    return angle_part(kind, weights, angles)
 
 
 @inlined
-def body_joints(p, i, q, v, a, lam, weights, f, rows):
-    """Add body i's part of the weighted sum of Phi'', Phi' and Phi to rows, and Phi_q^T lambda to f."""
-    weight_a, weight_v, weight_q = weights
+def angle_part(kind, weights, angles):
+    """What an angle and its rates give to a row of that kind."""
+    if kind == CONSTRAINT:
+        return weights[0] * angles[2] + weights[1] * angles[1] + weights[2] * angles[0]
+    return angles[0] if kind == SPRING else angles[1]
+
+
+@inlined
+def add_joints(p, i, q, v, a, lam, weights, scratch, f, rows):
+    """Add body i's part of the weighted sum of Phi'', Phi' and Phi to rows, and Phi_q^T lambda to f and the shares."""
     body = p.bodies[i]
+    o = body.offset
+    c, s = scratch.turn[0], scratch.turn[1]
     for k in range(body.port, body.port_end):
         port = p.ports[k]
         marker = p.markers[port.marker]
-        r, sign = port.row, port.sign
+        r, sign, x = port.row, port.sign, marker.column
         if port.kind == ANGLE:
-            rows[r] += sign * angle_row(p, marker, p.rows[r].kind, weights, q, v, a)
-            apply_torque(p, marker, sign * lam[r], f)
+            z = x + SLOPE
+            angles = q[o + 2] + scratch.q[z], v[o + 2] + scratch.v[z], a[o + 2] + scratch.a[z]
+            rows[r] += sign * angle_part(p.rows[r].kind, weights, angles)
+            share_torque(p, marker, sign * lam[r], scratch, f)
         elif port.kind != AXIS:
-            px, py, vx, vy, ax, ay, rx, ry = marker_motion(p, marker, q, v, a)
-            rows[r] += sign * (weight_a * ax + weight_v * vx + weight_q * px)
-            rows[r + 1] += sign * (weight_a * ay + weight_v * vy + weight_q * py)
-            apply_force(p, marker, q, sign * lam[r], sign * lam[r + 1], rx, ry, f)
+            shapes = (
+                (scratch.q[x], scratch.q[x + 1]),
+                (scratch.v[x], scratch.v[x + 1]),
+                (scratch.a[x], scratch.a[x + 1]),
+            )
+            px, py, vx, vy, ax, ay, rx, ry = point_motion(p, marker, c, s, shapes, q, v, a)
+            rows[r] += sign * (weights[0] * ax + weights[1] * vx + weights[2] * px)
+            rows[r + 1] += sign * (weights[0] * ay + weights[1] * vy + weights[2] * py)
+            fx, fy = sign * lam[r], sign * lam[r + 1]
+            bx, by = c * fx + s * fy, c * fy - s * fx
+            f[o] += fx
+            f[o + 1] += fy
+            f[o + 2] += rx * fy - ry * fx
+            scratch.shares[x] += bx
+            scratch.shares[x + 1] += by
+            shorten(p, p.bending, marker, q, -bx, f, o + 3)
 
 
 @inlined
-def body_efforts(p, i, torques, f):
-    """Subtract the generalised force of the motors on body i from f."""
+def share_torque(p, marker, torque, scratch, f):
+    """Add a torque at a marker to f and the shares: see `apply_torque`."""
+    f[p.bodies[marker.body].offset + 2] += torque
+    scratch.shares[marker.column + SLOPE] += torque
+
+
+@inlined
+def add_efforts(p, i, torques, scratch, f):
+    """Subtract the generalised force of the motors on body i from f and the shares."""
     body = p.bodies[i]
     for k in range(body.effort, body.effort_end):
         effort = p.efforts[k]
-        apply_torque(p, p.markers[effort.marker], -effort.sign * torques[effort.signal], f)
+        share_torque(p, p.markers[effort.marker], -effort.sign * torques[effort.signal], scratch, f)
+
+
+@kernel
+def body_joints(p, i, q, v, a, lam, weights, scratch, f, rows):
+    """Add body i's part of the weighted sum of Phi'', Phi' and Phi to rows, and Phi_q^T lambda to f."""
+    body_sums(p, i, q, v, a, scratch)
+    clear_shares(p, i, scratch)
+    add_joints(p, i, q, v, a, lam, weights, scratch, f, rows)
+    hand_on(p, i, scratch, f)
+
+
+@kernel
+def body_efforts(p, i, torques, scratch, f):
+    """Subtract the generalised force of the motors on body i from f."""
+    clear_shares(p, i, scratch)
+    add_efforts(p, i, torques, scratch, f)
+    hand_on(p, i, scratch, f)

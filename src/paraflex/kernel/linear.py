@@ -14,7 +14,7 @@ from math import cos, sin, sqrt
 
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import add_track, turn_axes
-from paraflex.kernel.bending import bent_mass_square, bent_mass_times, factor_bent, solve_bent
+from paraflex.kernel.bending import bent_mass_square, bent_mass_times, factor_bent, inverse_times, respond_bent
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import marker_shape, marker_shortening, shorten
 from paraflex.kernel.packed import (
@@ -24,7 +24,6 @@ from paraflex.kernel.packed import (
     DAMPING,
     DINV,
     GJ,
-    I1,
     MPF,
     NX,
     NY,
@@ -34,10 +33,9 @@ from paraflex.kernel.packed import (
     S2Y,
     SLOPE,
     SPRING,
-    YP,
-    YX,
-    YY,
 )
+from paraflex.kernel.sums import I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums
+from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
 
 # A pivot smaller than this fraction of its diagonal entry marks a constraint row that depends on those before it.
 DEPENDENT_ROW = 1e-12
@@ -49,30 +47,21 @@ SMALLEST_B = 1e-18
 def factor_body(p, i, b, q, ws):
     """Factor M + g D + b K of body i at q, g^2 = b: the arrow with its 3 x 3 rigid block."""
     body = p.bodies[i]
-    o, n, k = body.offset, body.nf, body.flex
-    e = o + 3
-    fr = ws.frame[i]
+    n, k = body.nf, body.flex
+    fr, scratch = ws.frame[i], ws.scratch
     g = sqrt(b)
-    sx, sy, inertia = body.S1x, body.S1y, body.I0
+    body_sums(p, i, q, q, q, scratch)
+    body_products(p, i, q, q, scratch)
+    sx, sy = body.S1x + scratch.q[S2X_SUM], body.S1y + scratch.q[S2Y_SUM]
+    inertia = body.I0 + 2.0 * scratch.q[I1_SUM]
     a00, a10, a11, a20, a21, a22 = body.m, 0.0, body.m, 0.0, 0.0, 0.0
     for j in range(n):
-        u = q[e + j]
-        g_u, i_u = 0.0, 0.0
-        row = body.square + j * n
-        for l in range(n):
-            g_u += p.G2[row + l] * q[e + l]
-            i_u += p.I2[row + l] * q[e + l]
+        inertia += scratch.I2_q[j] * q[body.offset + 3 + j]
         S2x, S2y = p.modal[S2X, k + j], p.modal[S2Y, k + j]
-        sx += S2x * u
-        sy += S2y * u
-        inertia += (2.0 * p.modal[I1, k + j] + i_u) * u
-        mpf = p.modal[GJ, k + j] - g_u
+        mpf = p.modal[GJ, k + j] - scratch.G2_q[j]
         d = 1.0 / (1.0 + g * p.modal[DAMPING, k + j] + b * p.modal[OMEGA2, k + j])
         ws.flex[MPF, k + j] = mpf
         ws.flex[DINV, k + j] = d
-        ws.flex[YX, k + j] = S2x * d
-        ws.flex[YY, k + j] = S2y * d
-        ws.flex[YP, k + j] = mpf * d
         a00 -= S2x * S2x * d
         a10 -= S2y * S2x * d
         a11 -= S2y * S2y * d
@@ -93,84 +82,106 @@ def factor_body(p, i, b, q, ws):
 
 
 @inlined
-def solve_body(p, i, ws, dense, y, x, at):
-    """X = (M + b K)^-1 y of body i in its body frame; y and x hold 3 + nf entries from `at` on, and may be one.
-
-    `dense` is ws.dense, None for linear geometry.
-    """
-    body = p.bodies[i]
-    if dense is not None:
-        if body.slopes > 0:
-            solve_bent(p, i, dense, y, x, at)
-            return
-    n, k = body.nf, body.flex
-    fr = ws.frame[i]
-    e = at + 3
-    r0, r1, r2 = y[at], y[at + 1], y[at + 2]
-    for j in range(n):
-        r0 -= ws.flex[YX, k + j] * y[e + j]
-        r1 -= ws.flex[YY, k + j] * y[e + j]
-        r2 -= ws.flex[YP, k + j] * y[e + j]
+def solve_rigid(fr, r0, r1, r2):
+    """Solve with the factored 3 x 3 rigid block of a body."""
     r0 = r0 * fr[5]
     r1 = (r1 - fr[6] * r0) * fr[7]
     r2 = (r2 - fr[8] * r0 - fr[9] * r1) * fr[10] * fr[10]
     r1 = (r1 - fr[9] * r2) * fr[7]
-    r0 = (r0 - fr[6] * r1 - fr[8] * r2) * fr[5]
+    return (r0 - fr[6] * r1 - fr[8] * r2) * fr[5], r1, r2
+
+
+@routine
+def respond(p, i, ws):
+    """Response of body i to its constraint rows, (M + b K)^-1 J^T, and to its rigid coordinates, into ws.response."""
+    body = p.bodies[i]
+    n, k, lanes, fr = body.nf, body.flex, body.lanes, ws.frame[i]
+    for block in range(0, lanes, LANES):
+        at = body.jac + block
+        r0, r1, r2 = load(ws.jac, at), load(ws.jac, at + lanes), load(ws.jac, at + 2 * lanes)
+        for j in range(n):
+            row, d = load(ws.jac, at + (3 + j) * lanes), ws.flex[DINV, k + j]
+            r0 = add_scaled(r0, row, -d * p.modal[S2X, k + j])
+            r1 = add_scaled(r1, row, -d * p.modal[S2Y, k + j])
+            r2 = add_scaled(r2, row, -d * ws.flex[MPF, k + j])
+        # As `solve_rigid`, eight at once.
+        r0 = add_scaled(zeros(), r0, fr[5])
+        r1 = add_scaled(zeros(), add_scaled(r1, r0, -fr[6]), fr[7])
+        r2 = add_scaled(zeros(), add_scaled(add_scaled(r2, r0, -fr[8]), r1, -fr[9]), fr[10] * fr[10])
+        r1 = add_scaled(zeros(), add_scaled(r1, r2, -fr[9]), fr[7])
+        r0 = add_scaled(zeros(), add_scaled(add_scaled(r0, r1, -fr[6]), r2, -fr[8]), fr[5])
+        store(ws.response, at, r0)
+        store(ws.response, at + lanes, r1)
+        store(ws.response, at + 2 * lanes, r2)
+        for j in range(n):
+            d = ws.flex[DINV, k + j]
+            x = add_scaled(zeros(), load(ws.jac, at + (3 + j) * lanes), d)
+            x = add_scaled(add_scaled(x, r0, -d * p.modal[S2X, k + j]), r1, -d * p.modal[S2Y, k + j])
+            store(ws.response, at + (3 + j) * lanes, add_scaled(x, r2, -d * ws.flex[MPF, k + j]))
+    rigid = body.jac + body.parts
+    for r in range(3):
+        for l in range(3):
+            ws.response[rigid + r * lanes + l] = 1.0 if r == l else 0.0
     for j in range(n):
-        x[e + j] = (
-            ws.flex[DINV, k + j] * y[e + j]
-            - ws.flex[YX, k + j] * r0
-            - ws.flex[YY, k + j] * r1
-            - ws.flex[YP, k + j] * r2
-        )
-    x[at], x[at + 1], x[at + 2] = r0, r1, r2
+        d, at = ws.flex[DINV, k + j], rigid + (3 + j) * lanes
+        ws.response[at] = -d * p.modal[S2X, k + j]
+        ws.response[at + 1] = -d * p.modal[S2Y, k + j]
+        ws.response[at + 2] = -d * ws.flex[MPF, k + j]
 
 
 @inlined
 def body_jacobian(p, i, q, ws):
-    """The parts of body i's constraint rows in its own frame, [1, E s, N] and [0, 1, N2'], and J M^-1 J^T of them."""
+    """The parts of body i's constraint rows in its own frame, [1, E s, N] and [0, 1, N2'], into the lanes of ws.jac.
+
+    The lane after them holds M_phif.
+    """
     body = p.bodies[i]
-    n, width = body.nf, 3 + body.nf
+    n, lanes, scratch = body.nf, body.lanes, ws.scratch
+    at = body.jac
+    for j in range((3 + n) * lanes):
+        ws.jac[at + j] = 0.0
     for k in range(body.port, body.port_end):
         port = p.ports[k]
         marker = p.markers[port.marker]
-        h, x = marker.shape, port.jac
+        x, h = at + port.local, marker.shape
         if port.kind == ANGLE:
-            ws.jac[x], ws.jac[x + 1], ws.jac[x + 2] = 0.0, 0.0, 1.0
+            ws.jac[x + 2 * lanes] = 1.0
             for j in range(n):
-                ws.jac[x + 3 + j] = p.shape[SLOPE, h + j]
-        else:
-            y = x + width
-            ux, uy = marker_shape(p, marker, q)
-            ux -= marker_shortening(p, p.bending, marker, q, q, q)[0]
-            ws.jac[x], ws.jac[x + 1], ws.jac[x + 2] = 1.0, 0.0, -(marker.y + uy)
-            ws.jac[y], ws.jac[y + 1], ws.jac[y + 2] = 0.0, 1.0, marker.x + ux
+                ws.jac[x + (3 + j) * lanes] = p.shape[SLOPE, h + j]
+            continue
+        ux, uy = marker_shape(p, marker, q)
+        ux -= marker_shortening(p, p.bending, marker, q, q, q)[0]
+        ws.jac[x], ws.jac[x + 2 * lanes] = 1.0, -(marker.y + uy)
+        ws.jac[x + 1 + lanes], ws.jac[x + 1 + 2 * lanes] = 1.0, marker.x + ux
+        fill(scratch.rigid, 0.0)
+        shorten(p, p.bending, marker, q, -1.0, scratch.rigid, 0)
+        for j in range(n):
+            ws.jac[x + (3 + j) * lanes] = p.shape[NX, h + j] + scratch.rigid[j]
+            ws.jac[x + 1 + (3 + j) * lanes] = p.shape[NY, h + j]
+        if port.parts > 2:
+            ws.jac[x + 2 + 2 * lanes] = 1.0
             for j in range(n):
-                ws.jac[x + 3 + j] = p.shape[NX, h + j]
-                ws.jac[y + 3 + j] = p.shape[NY, h + j]
-            shorten(p, p.bending, marker, q, -1.0, ws.jac, x + 3)
-            if port.parts > 2:
-                z = y + width
-                ws.jac[z], ws.jac[z + 1], ws.jac[z + 2] = 0.0, 0.0, 1.0
-                for j in range(n):
-                    ws.jac[z + 3 + j] = p.shape[SLOPE, h + j]
-            if port.parts > 3:
-                z = y + 2 * width
-                for j in range(width):
-                    ws.jac[z + j] = 0.0
-                add_track(p, port.axis, ws.axes[port.axis, 3], 1.0, ws.jac, z + 3)
-    # The rows of a body lie one after the other, from its first port's on.
-    first = p.ports[body.port].jac if body.port < body.port_end else 0
+                ws.jac[x + 2 + (3 + j) * lanes] = p.shape[SLOPE, h + j]
+        if port.parts > 3:
+            fill(scratch.rigid, 0.0)
+            add_track(p, port.axis, ws.axes[port.axis, 3], 1.0, scratch.rigid, 0)
+            for j in range(n):
+                ws.jac[x + 3 + (3 + j) * lanes] = scratch.rigid[j]
+    for j in range(n):
+        ws.jac[at + body.parts + (3 + j) * lanes] = ws.flex[MPF, body.flex + j]
+
+
+@inlined
+def body_block(p, i, ws):
+    """J M^-1 J^T of body i in its frame, into ws.blocks."""
+    body = p.bodies[i]
+    lanes = body.lanes
     for r in range(body.parts):
-        at = first + r * width
-        solve_body(p, i, ws, ws.dense, ws.jac, ws.inv, at)
-        for s in range(r + 1):
-            other = first + s * width
-            dot = 0.0
-            for j in range(width):
-                dot += ws.inv[at + j] * ws.jac[other + j]
-            ws.blocks[body.block + r * body.parts + s] = dot
-            ws.blocks[body.block + s * body.parts + r] = dot
+        for block in range(0, lanes, LANES):
+            total = zeros()
+            for x in range(body.jac, body.jac + (3 + body.nf) * lanes, lanes):
+                total = add_scaled(total, load(ws.jac, x + block), ws.response[x + r])
+            store(ws.blocks, body.block + r * lanes + block, total)
 
 
 @inlined
@@ -205,7 +216,7 @@ def add_axis_pair(p, ws, body, port, other, same, c, s):
             value = 0.0
             for x in range(port.parts):
                 for y in range(other.parts):
-                    at = body.block + (port.local + x) * body.parts + other.local + y
+                    at = body.block + (port.local + x) * body.lanes + other.local + y
                     value += share(ws, port, r, x, c, s) * ws.blocks[at] * share(ws, other, q, y, c, s)
             add_entry(p, ws, port.row + r, other.row + q, value)
 
@@ -223,15 +234,15 @@ def add_schur(p, i, ws):
                 add_axis_pair(p, ws, body, port, other, l == k, c, s)
                 continue
             sign = port.sign * other.sign
-            at = body.block + port.local * body.parts + other.local
+            at = body.block + port.local * body.lanes + other.local
             # A 2 x 2 block, of which an angle's row or column is missing.
             b00, b01, b10, b11 = ws.blocks[at], 0.0, 0.0, 0.0
             if other.kind == POINT:
                 b01 = ws.blocks[at + 1]
             if port.kind == POINT:
-                b10 = ws.blocks[at + body.parts]
+                b10 = ws.blocks[at + body.lanes]
                 if other.kind == POINT:
-                    b11 = ws.blocks[at + body.parts + 1]
+                    b11 = ws.blocks[at + body.lanes + 1]
                 b00, b10 = c * b00 - s * b10, s * b00 + c * b10
                 b01, b11 = c * b01 - s * b11, s * b01 + c * b11
             if other.kind == POINT:
@@ -294,9 +305,14 @@ def factor_bodies(p, b, q, ws):
     ws.step[0] = max(b, SMALLEST_B)
     turn_axes(p, q, ws.axes)
     for i in range(p.bodies.size):
-        if not factor_bent(p, i, b, q, ws, ws.dense):
+        if factor_bent(p, i, b, q, ws, ws.dense):
+            body_jacobian(p, i, q, ws)
+            respond_bent(p, i, ws, ws.dense, ws.inverse)
+        else:
             factor_body(p, i, b, q, ws)
-        body_jacobian(p, i, q, ws)
+            body_jacobian(p, i, q, ws)
+            respond(p, i, ws)
+        body_block(p, i, ws)
 
 
 @inlined
@@ -347,59 +363,73 @@ def to_ground_frame(p, i, ws, x):
 
 
 @inlined
-def jacobian_times(p, i, ws, x, scale, spring_scale, damper_scale, rows):
-    """Add J x of body i to rows, times the scale of their kind; x in the body frame."""
+def lanes_times(p, i, matrix, x, scratch):
+    """Sums of x over the coordinates of body i by the lanes of ws.jac or ws.response, into scratch.lanes."""
     body = p.bodies[i]
-    o, width = body.offset, 3 + body.nf
-    c, s = ws.frame[i, 0], ws.frame[i, 1]
-    for k in range(body.port, body.port_end):
-        port = p.ports[k]
-        kind = p.rows[port.row].kind
-        kind_scale = scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else damper_scale)
-        factor = port.sign * kind_scale
-        d0, d1 = 0.0, 0.0
-        for j in range(width):
-            d0 += ws.jac[port.jac + j] * x[o + j]
-        if port.kind == ANGLE:
-            rows[port.row] += factor * d0
-            continue
-        if port.kind == AXIS:
-            rows[port.row] += kind_scale * share(ws, port, 0, 0, c, s) * d0
-            for part in range(1, port.parts):
-                d1 = 0.0
-                for j in range(width):
-                    d1 += ws.jac[port.jac + part * width + j] * x[o + j]
-                rows[port.row] += kind_scale * share(ws, port, 0, part, c, s) * d1
-            continue
-        for j in range(width):
-            d1 += ws.jac[port.jac + width + j] * x[o + j]
-        rows[port.row] += factor * (c * d0 - s * d1)
-        rows[port.row + 1] += factor * (s * d0 + c * d1)
+    for block in range(0, body.lanes, LANES):
+        total = zeros()
+        at = body.jac + block
+        for j in range(body.offset, body.offset + 3 + body.nf):
+            total = add_scaled(total, load(matrix, at), x[j])
+            at += body.lanes
+        store(scratch.lanes, block, total)
 
 
 @inlined
-def subtract_reactions(p, i, ws, mu, x):
-    """Subtract M^-1 J^T mu of body i from x, both in the body frame but for the multipliers."""
+def add_lanes(p, i, ws, scale, spring_scale, damper_scale, rows):
+    """Add what `lanes_times` found for the parts of body i's constraint rows to rows, times the scale of their kind."""
     body = p.bodies[i]
-    o, width = body.offset, 3 + body.nf
-    c, s = ws.frame[i, 0], ws.frame[i, 1]
+    c, s, lanes = ws.frame[i, 0], ws.frame[i, 1], ws.scratch.lanes
     for k in range(body.port, body.port_end):
         port = p.ports[k]
+        kind, x = p.rows[port.row].kind, port.local
+        kind_scale = scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else damper_scale)
+        factor = port.sign * kind_scale
         if port.kind == ANGLE:
-            torque = port.sign * mu[port.row]
-            for j in range(width):
-                x[o + j] -= torque * ws.inv[port.jac + j]
-            continue
-        if port.kind == AXIS:
+            rows[port.row] += factor * lanes[x]
+        elif port.kind == AXIS:
             for part in range(port.parts):
-                force = mu[port.row] * share(ws, port, 0, part, c, s)
-                for j in range(width):
-                    x[o + j] -= force * ws.inv[port.jac + part * width + j]
-            continue
-        fx, fy = port.sign * mu[port.row], port.sign * mu[port.row + 1]
-        bx, by = c * fx + s * fy, c * fy - s * fx
-        for j in range(width):
-            x[o + j] -= bx * ws.inv[port.jac + j] + by * ws.inv[port.jac + width + j]
+                rows[port.row] += kind_scale * share(ws, port, 0, part, c, s) * lanes[x + part]
+        else:
+            rows[port.row] += factor * (c * lanes[x] - s * lanes[x + 1])
+            rows[port.row + 1] += factor * (s * lanes[x] + c * lanes[x + 1])
+
+
+@inlined
+def jacobian_times(p, i, ws, x, scale, spring_scale, damper_scale, rows):
+    """Add J x of body i to rows, times the scale of their kind; x in the body frame. M_phif x is left in scratch."""
+    lanes_times(p, i, ws.jac, x, ws.scratch)
+    add_lanes(p, i, ws, scale, spring_scale, damper_scale, rows)
+
+
+@inlined
+def reactions(p, i, ws, mu):
+    """What multipliers do to body i along the parts of its rows, less: -J^T mu by lanes, into scratch.lanes."""
+    body = p.bodies[i]
+    c, s, lanes = ws.frame[i, 0], ws.frame[i, 1], ws.scratch.lanes
+    for k in range(body.port, body.port_end):
+        port = p.ports[k]
+        x = port.local
+        if port.kind == ANGLE:
+            lanes[x] = -port.sign * mu[port.row]
+        elif port.kind == AXIS:
+            for part in range(port.parts):
+                lanes[x + part] = -mu[port.row] * share(ws, port, 0, part, c, s)
+        else:
+            fx, fy = port.sign * mu[port.row], port.sign * mu[port.row + 1]
+            lanes[x], lanes[x + 1] = -(c * fx + s * fy), s * fx - c * fy
+    for x in range(body.parts, body.lanes):
+        lanes[x] = 0.0
+
+
+@inlined
+def lanes_of(p, i, j, ws):
+    """The sum of scratch.lanes as coordinate j of body i feels them."""
+    body = p.bodies[i]
+    total, at = zeros(), body.jac + j * body.lanes
+    for block in range(0, body.lanes, LANES):
+        total = add_product(total, load(ws.response, at + block), load(ws.scratch.lanes, block))
+    return summed(total)
 
 
 @kernel
@@ -408,15 +438,39 @@ def solve_system(p, ws, x, mu):
 
     C holds the compliance of springs, zero for constraints; for dampers it is -C/g.
     """
+    solve_all(p, ws, ws.inverse, x, mu)
+
+
+@inlined
+def solve_all(p, ws, inverse, x, mu):
+    """See `solve_system`; `inverse` is ws.inverse, None for linear geometry."""
+    lanes = ws.scratch.lanes
     for r in range(mu.size):
         mu[r] = -mu[r]
     for i in range(p.bodies.size):
+        body = p.bodies[i]
+        o, rigid = body.offset, body.parts
         to_body_frame(p, i, ws, x)
-        solve_body(p, i, ws, ws.dense, x, x, p.bodies[i].offset)
-        jacobian_times(p, i, ws, x, 1.0, 1.0, 1.0, mu)
+        lanes_times(p, i, ws.response, x, ws.scratch)
+        add_lanes(p, i, ws, 1.0, 1.0, 1.0, mu)
+        if body.slopes == 0:
+            x[o], x[o + 1], x[o + 2] = solve_rigid(ws.frame[i], lanes[rigid], lanes[rigid + 1], lanes[rigid + 2])
     solve_schur(p, ws, mu)
     for i in range(p.bodies.size):
-        subtract_reactions(p, i, ws, mu, x)
+        body = p.bodies[i]
+        o = body.offset
+        reactions(p, i, ws, mu)
+        if body.slopes == 0:
+            for r in range(3):
+                lanes[body.parts + r] = x[o + r]
+            for r in range(3):
+                x[o + r] = lanes_of(p, i, r, ws)
+            for j in range(3, 3 + body.nf):
+                x[o + j] = ws.flex[DINV, body.flex + j - 3] * x[o + j] + lanes_of(p, i, j, ws)
+        else:
+            inverse_times(p, i, inverse, ws.scratch.rigid, x)
+            for j in range(3 + body.nf):
+                x[o + j] += lanes_of(p, i, j, ws)
         to_ground_frame(p, i, ws, x)
 
 
@@ -438,7 +492,7 @@ def mass_times(p, i, ws, mass, x):
     body = p.bodies[i]
     if mass is not None:
         if body.slopes > 0:
-            bent_mass_times(p, i, mass, ws.nf, x)
+            bent_mass_times(p, i, mass, ws.scratch.rigid, x)
             return
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3

@@ -80,14 +80,14 @@ def write_samples(p, tableau, t, h, m, ws, out):
                 m.stage_q[s1, j], m.stage_v[s1, j], m.stage_a[1, s1, j], width, x,
             )  # fmt: skip
         interpolate_multipliers(tableau, (time - t) / h, m, out.lam[i])
-        out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i], ws.points)
+        out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i], ws.scratch)
         out.energy[i, 1] += spring_energy(p, out.lam[i]) + line_energy(p, out.q[i], out.v[i])[0]
         # Within the step by the cubic with the power at its ends; over the whole step by the scheme's own quadrature.
         done, last = min(max((time - t) / h, 0.0), 1.0), m.power.size - 1
         left = 1.0 - done
         out.energy[i, 2] = m.clock[WORK] + done * done * (3.0 - 2.0 * done) * step_work(tableau, h, m)
         out.energy[i, 2] += h * done * left * (left * m.power[0] - done * m.power[last])
-        out.energy[i, 2] += weight_work(p, out.q[i], ws.points) - m.clock[WEIGHT_0]
+        out.energy[i, 2] += weight_work(p, out.q[i], ws.scratch) - m.clock[WEIGHT_0]
         i += 1
     m.counts[SAMPLE] = i
 
@@ -147,10 +147,10 @@ def start(p, signals, tableau, controls, m, ws, out):
     copy(a, m.algorithmic[0])
     m.clock[LAST_STEP], m.clock[LAST_ERROR] = 0.0, 1.0
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques, ws)
-    kinetic, strain = system_energy(p, m.q, m.v, ws.points)
+    kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)
     strain += spring_energy(p, lam) + line_energy(p, m.q, m.v)[0]
     m.clock[ENERGY_0] = kinetic + strain
-    m.clock[WEIGHT_0] = weight_work(p, m.q, ws.points)
+    m.clock[WEIGHT_0] = weight_work(p, m.q, ws.scratch)
     note_constraints(p, signals, t, m, ws)
     if out.times.size > 0 and out.times[0] <= t:
         copy(m.q, out.q[0])
@@ -195,9 +195,9 @@ def accept(p, signals, tableau, controls, t, h, m, ws, out):
     m.counts[STEPS] += 1
     m.counts[AGE] += 1
     m.counts[FAILURES] = 0
-    kinetic, strain = system_energy(p, m.q, m.v, ws.points)
+    kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)
     strain += spring_energy(p, m.stage_lam[0]) + line_energy(p, m.q, m.v)[0]
-    done = m.clock[WORK] + weight_work(p, m.q, ws.points) - m.clock[WEIGHT_0]
+    done = m.clock[WORK] + weight_work(p, m.q, ws.scratch) - m.clock[WEIGHT_0]
     balance = abs(kinetic + strain - m.clock[ENERGY_0] - done)
     m.clock[BALANCE] = max(m.clock[BALANCE], balance)
     note_constraints(p, signals, t + h, m, ws)

@@ -60,11 +60,11 @@ def rates(p, signals, t, weights, y, a, lam, torques, ws, dependent_part, dy):
 
 
 @kernel
-def stored_energy(p, q, v, lam, points):
+def stored_energy(p, q, v, lam, scratch):
     """Kinetic energy, strain energy with that of springs, and what gravity has done: see `bodies.weight_work`."""
-    kinetic, strain = system_energy(p, q, v, points)
+    kinetic, strain = system_energy(p, q, v, scratch)
     strain += spring_energy(p, lam) + line_energy(p, q, v)[0]
-    return kinetic, strain, weight_work(p, q, points)
+    return kinetic, strain, weight_work(p, q, scratch)
 
 
 @kernel

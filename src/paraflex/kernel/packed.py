@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.kernel.vectors import padded
+
 # Rows of PackedSystem.modal.
 S2X, S2Y, I1, GJ, OMEGA2, DAMPING = range(6)
 # Rows of PackedSystem.shape.
@@ -22,8 +24,8 @@ POINT, ANGLE, AXIS = range(3)
 CONSTRAINT, SPRING, DAMPER, FRICTION = range(4)
 # Weights of Phi'', Phi' and Phi: constraints on accelerations, without Baumgarte's terms.
 INDEX_1 = (1.0, 0.0, 0.0)
-# Rows of Workspace.flex: M_phif, 1/(1 + b omega^2), and B D^-1 of the three rigid rows.
-MPF, DINV, YX, YY, YP = range(5)
+# Rows of Workspace.flex: M_phif and 1/(1 + b omega^2).
+MPF, DINV = range(2)
 
 BODY = np.dtype(
     [
@@ -35,12 +37,19 @@ BODY = np.dtype(
         ("port_end", np.int64),
         ("effort", np.int64),  # its efforts: effort .. effort_end
         ("effort_end", np.int64),
-        ("block", np.int64),  # first entry of its parts x parts block J M^-1 J^T in Workspace.blocks
+        ("columns", np.int64),  # first entry of its nf x width matrix in `columns`
+        ("width", np.int64),
+        ("products", np.int64),  # first entry of its nf x 2 stride matrix in `products`
+        ("stride", np.int64),
+        ("block", np.int64),  # first entry of its parts x lanes block J M^-1 J^T in Workspace.blocks
         ("parts", np.int64),  # rows of its ports' Jacobians
+        ("lanes", np.int64),  # columns of `Workspace.jac` and `Workspace.response`: these rows and three more, padded
+        ("jac", np.int64),  # first entry of its (3 + nf) x lanes matrices there
         ("mass", np.int64),  # its mass points, of second-order geometry: mass .. mass_end, none of linear
         ("mass_end", np.int64),
         ("slopes", np.int64),  # the first so many of them are Gauss points
         ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace
+        ("inverse", np.int64),  # and of that with rows padded
         ("m", np.float64),
         ("S1x", np.float64),
         ("S1y", np.float64),
@@ -52,6 +61,7 @@ MARKER = np.dtype(
     [
         ("body", np.int64),
         ("shape", np.int64),  # first column of its rows in `shape`
+        ("column", np.int64),  # its column x in `columns`, with y and slope after it
         ("bending", np.int64),  # first entry of its matrix in `bending`, -1 for none
         ("x", np.float64),
         ("y", np.float64),
@@ -78,7 +88,6 @@ PORT = np.dtype(
         # Rows in the body frame that these are made of: x and y of a point, an angle; of an axis x, y, and where the
         # body carries it the angle, and the deflection along a track.
         ("parts", np.int64),
-        ("jac", np.int64),  # first entry of these parts in Workspace.jac
         ("local", np.int64),  # first of them among those of its body
         ("axis", np.int64),  # which axis it is an end of, -1 for none
         ("sign", np.float64),  # +1 on side b of the joint, -1 on side a
@@ -166,6 +175,9 @@ class PackedSystem(NamedTuple):
     I2: NDArray[np.float64]  # nf x nf of every body, row by row
     G2: NDArray[np.float64]
     shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every marker
+    # The same for vectors: what a body's coordinates give to its sums (see `kernel.sums`), and columns of G2 and I2.
+    columns: NDArray[np.float64]
+    products: NDArray[np.float64]
     # Of second-order geometry; without it there is no `bending`, and kernels are compiled without all that needs it.
     bending: NDArray[np.float64] | None  # nf x nf of every marker that bending moves: f = u . bending u
     masses: NDArray[np.void]
@@ -183,6 +195,22 @@ class Signals(NamedTuple):
     coefficients: NDArray[np.float64]  # (breaks, 6), ascending powers of t - break; the last piece of a signal unused
 
 
+class Scratch(NamedTuple):
+    """What the terms of one body write: sums of u, u' and u'' and what follows from them."""
+
+    q: NDArray[np.float64]  # (widest,) sums of u
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    shares: NDArray[np.float64]  # (widest,) what works on each sum
+    G2_q: NDArray[np.float64]  # (widest stride,) G2 u
+    G2_v: NDArray[np.float64]
+    I2_q: NDArray[np.float64]
+    lanes: NDArray[np.float64]  # (most lanes,)
+    rigid: NDArray[np.float64]  # (3 + max nf, padded)
+    turn: NDArray[np.float64]  # (2,) cosine and sine of the body's angle
+    points: NDArray[np.float64] | None  # (4, max mass points of a body); None for linear geometry
+
+
 class Workspace(NamedTuple):
     """Everything the kernels write, made once a run."""
 
@@ -192,20 +220,22 @@ class Workspace(NamedTuple):
     mu: NDArray[np.float64]  # (m,) solution for the multipliers
     q: NDArray[np.float64]
     v: NDArray[np.float64]
+    scratch: Scratch
     step: NDArray[np.float64]  # (1,) b of the factor
     axes: NDArray[np.float64]  # (axes, 4): e and n . d at the last `orient`, and where a sliding point stands
     compliance: NDArray[np.float64]  # (m,) that of friction at the last `note_friction`
     frame: NDArray[np.float64]  # (bodies, 12): cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
-    flex: NDArray[np.float64]  # (5, total nf)
-    jac: NDArray[np.float64]  # Jacobian rows of every port, wholly in the body frame
-    inv: NDArray[np.float64]  # the same rows times the inverse of the body's iteration matrix
+    flex: NDArray[np.float64]  # (2, total nf)
+    # By body, coordinate and lane: the Jacobian rows of its ports in the body frame; and these times the inverse of the
+    # iteration matrix, then what a force on the coordinate leaves to the three rigid ones.
+    jac: NDArray[np.float64]
+    response: NDArray[np.float64]
     blocks: NDArray[np.float64]  # J M^-1 J^T of every body, in its frame
     schur: NDArray[np.float64]  # envelope of the Schur complement, then its Cholesky factor
-    nf: NDArray[np.float64]  # (3 + max nf,) scratch
     # Of second-order geometry, else None:
-    points: NDArray[np.float64] | None  # (4, max mass points of a body) scratch
     mass: NDArray[np.float64] | None  # M of every body, (3 + nf)^2
     dense: NDArray[np.float64] | None  # the factor of M + b (K + K_g)
+    inverse: NDArray[np.float64] | None  # and its inverse, rows padded
     geometric: NDArray[np.float64] | None  # K_g, nf^2
 
 
@@ -213,8 +243,10 @@ def make_workspace(p: PackedSystem) -> Workspace:
     """Allocate the workspace of a system."""
     n = int(sum(3 + body["nf"] for body in p.bodies))
     m = p.rows.size
-    widths = [(3 + p.bodies[p.markers[port["marker"]]["body"]]["nf"]) * port["parts"] for port in p.ports]
-    dense = int(sum((3 + body["nf"]) ** 2 for body in p.bodies if body["slopes"]))
+    bent = [body for body in p.bodies if body["slopes"]]
+    dense = int(sum((3 + body["nf"]) ** 2 for body in bent))
+    inverse = int(sum((3 + body["nf"]) * padded(3 + body["nf"]) for body in bent))
+    lanes = int(sum((3 + body["nf"]) * body["lanes"] for body in p.bodies))
     envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(p.rows)))
     return Workspace(
         f=np.zeros(n),
@@ -223,25 +255,30 @@ def make_workspace(p: PackedSystem) -> Workspace:
         mu=np.zeros(m),
         q=np.zeros(n),
         v=np.zeros(n),
+        scratch=make_scratch(p),
         step=np.zeros(1),
         axes=np.zeros((p.axes.size, 4)),
         compliance=p.rows["compliance"].copy(),
         frame=np.zeros((p.bodies.size, 12)),
-        flex=np.zeros((5, p.modal.shape[1])),
-        jac=np.zeros(int(sum(widths))),
-        inv=np.zeros(int(sum(widths))),
-        blocks=np.zeros(int(np.sum(p.bodies["parts"] ** 2))),
+        flex=np.zeros((2, p.modal.shape[1])),
+        jac=np.zeros(lanes),
+        response=np.zeros(lanes),
+        blocks=np.zeros(int(np.sum(p.bodies["parts"] * p.bodies["lanes"]))),
         schur=np.zeros(envelope),
-        nf=np.zeros(3 + int(p.bodies["nf"].max(initial=0))),
-        points=make_point_scratch(p),
         mass=None if p.bending is None else np.zeros(dense),
         dense=None if p.bending is None else np.zeros(dense),
+        inverse=None if p.bending is None else np.zeros(inverse),
         geometric=None if p.bending is None else np.zeros(p.I2.size),
     )
 
 
-def make_point_scratch(p: PackedSystem) -> NDArray[np.float64] | None:
-    """Slopes of a body's Gauss points, their derivatives, and forces: what `kernel.bending` writes."""
-    if p.bending is None:
-        return None
-    return np.zeros((4, int((p.bodies["mass_end"] - p.bodies["mass"]).max(initial=0))))
+def make_scratch(p: PackedSystem) -> Scratch:
+    """Allocate what the terms of one body need."""
+    width, stride, lanes = (int(p.bodies[name].max(initial=0)) for name in ("width", "stride", "lanes"))
+    points = None
+    if p.bending is not None:
+        points = np.zeros((4, int((p.bodies["mass_end"] - p.bodies["mass"]).max(initial=0))))
+    q, v, a, shares = (np.zeros(width) for _ in range(4))
+    G2_q, G2_v, I2_q = (np.zeros(stride) for _ in range(3))
+    rigid = np.zeros(padded(3 + int(p.bodies["nf"].max(initial=0))))
+    return Scratch(q, v, a, shares, G2_q, G2_v, I2_q, np.zeros(lanes), rigid, np.zeros(2), points)

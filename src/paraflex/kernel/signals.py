@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from paraflex.kernel.compiling import kernel
+from paraflex.kernel.compiling import allocating, kernel
 
 
 @kernel
@@ -26,7 +26,7 @@ def evaluate_signal(s, k, t):
     return value, rate, acceleration
 
 
-@kernel
+@allocating
 def sample_signals(s, times):
     """Values of all signals at all times: (times, signals)."""
     n = s.start.size - 1

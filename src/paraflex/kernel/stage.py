@@ -17,14 +17,14 @@ from math import isfinite
 
 from paraflex.kernel.arrays import add
 from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.bodies import body_terms
+from paraflex.kernel.bodies import begin_body
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.joints import (
+    add_efforts,
+    add_joints,
     apply_lines,
     apply_loads,
-    body_efforts,
-    body_joints,
     finish_friction,
     start_compliant_rows,
     start_rows,
@@ -32,6 +32,7 @@ from paraflex.kernel.joints import (
 from paraflex.kernel.linear import mass_norm, right_hand_side, solve_system
 from paraflex.kernel.projection import least_change
 from paraflex.kernel.signals import evaluate_signal
+from paraflex.kernel.sums import hand_on
 
 MAX_ITERATIONS = 8
 CONVERGED, DIVERGED = 0, 1
@@ -56,9 +57,10 @@ def equations(p, signals, t, weights, q, v, a, lam, torques, ws):
     start_rows(p, signals, t, weights, ws.rows)
     start_compliant_rows(p, lam, ws.rows)
     for i in range(p.bodies.size):
-        body_terms(p, i, q, v, a, ws.f, ws.points)
-        body_joints(p, i, q, v, a, lam, weights, ws.f, ws.rows)
-        body_efforts(p, i, torques, ws.f)
+        begin_body(p, i, q, v, a, ws.f, ws.scratch, ws.scratch.points)
+        add_joints(p, i, q, v, a, lam, weights, ws.scratch, ws.f, ws.rows)
+        add_efforts(p, i, torques, ws.scratch, ws.f)
+        hand_on(p, i, ws.scratch, ws.f)
     apply_axes(p, q, v, a, lam, weights, torques, ws.f, ws.rows)
     finish_friction(p, lam, ws.compliance, ws.rows)
     apply_loads(p, q, ws.f)

@@ -18,7 +18,7 @@ from paraflex.dynamics import (
 )
 from paraflex.errors import InputError, Moment, UnreachablePathError
 from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, SINGULAR, close_path, task_values
-from paraflex.kernel.packed import MARKER, PackedSystem, Signals
+from paraflex.kernel.packed import MARKER, PackedSystem, Signals, make_scratch
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.mechanism import Assembly, Mechanism
 from paraflex.mechanism.mechanism import TASK_COORDINATES
@@ -171,7 +171,17 @@ class _Closure:
         basis = np.zeros((k, n, self.coordinates.size))
         q[0] = pose
         status, index, residual = close_path(
-            self.packed, self.signals, self.marker, self.coordinates, times, target, q, v, a, basis
+            self.packed,
+            self.signals,
+            self.marker,
+            self.coordinates,
+            times,
+            target,
+            q,
+            v,
+            a,
+            basis,
+            make_scratch(self.packed),
         )
         return status, int(index), residual, (q, v, a, basis)
 

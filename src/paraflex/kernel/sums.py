@@ -1,0 +1,76 @@
+"""Sums over the flexible coordinates of a body, all of them in one pass, and what they give back to each coordinate.
+
+Column k of `PackedSystem.columns` says what each coordinate of the body contributes to sum k: S2 u and so on, then N u
+and the slope N2' u of every marker on it. A force that works on sum k works on coordinate j with columns[j, k] times
+it: all forces on a body are gathered as *shares* of the columns and handed on in a second pass.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from paraflex.kernel.compiling import inlined
+from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
+
+# The first columns of a body; those of its markers follow, x, y and slope each.
+S2X_SUM, S2Y_SUM, I1_SUM, GJ_SUM = range(4)
+FIRST_MARKER = 4
+
+
+@inlined
+def body_sums(p, i, q, v, a, scratch):
+    """Every sum of body i, of u, u' and u'', into scratch."""
+    body = p.bodies[i]
+    e = body.offset + 3
+    scratch.turn[0], scratch.turn[1] = cos(q[e - 1]), sin(q[e - 1])
+    for block in range(0, body.width, LANES):
+        of_q, of_v, of_a = zeros(), zeros(), zeros()
+        at = body.columns + block
+        for j in range(body.nf):
+            column = load(p.columns, at)
+            of_q = add_scaled(of_q, column, q[e + j])
+            of_v = add_scaled(of_v, column, v[e + j])
+            of_a = add_scaled(of_a, column, a[e + j])
+            at += body.width
+        store(scratch.q, block, of_q)
+        store(scratch.v, block, of_v)
+        store(scratch.a, block, of_a)
+
+
+@inlined
+def clear_shares(p, i, scratch):
+    """Nothing works on any sum of body i."""
+    for block in range(0, p.bodies[i].width, LANES):
+        store(scratch.shares, block, zeros())
+
+
+@inlined
+def body_products(p, i, q, v, scratch):
+    """G2 u, G2 u' and I2 u of body i into scratch."""
+    body = p.bodies[i]
+    e = body.offset + 3
+    for block in range(0, body.stride, LANES):
+        G2_q, G2_v, I2_q = zeros(), zeros(), zeros()
+        at = body.products + block
+        for j in range(body.nf):
+            G2 = load(p.products, at)
+            G2_q = add_scaled(G2_q, G2, q[e + j])
+            G2_v = add_scaled(G2_v, G2, v[e + j])
+            I2_q = add_scaled(I2_q, load(p.products, at + body.stride), q[e + j])
+            at += 2 * body.stride
+        store(scratch.G2_q, block, G2_q)
+        store(scratch.G2_v, block, G2_v)
+        store(scratch.I2_q, block, I2_q)
+
+
+@inlined
+def hand_on(p, i, scratch, f):
+    """Add to f what the shares give to each flexible coordinate of body i."""
+    body = p.bodies[i]
+    e, at = body.offset + 3, body.columns
+    for j in range(body.nf):
+        part = zeros()
+        for block in range(0, body.width, LANES):
+            part = add_product(part, load(p.columns, at + block), load(scratch.shares, block))
+        f[e + j] += summed(part)
+        at += body.width

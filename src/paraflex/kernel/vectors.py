@@ -1,0 +1,123 @@
+"""Eight numbers at once: vectors for what a compiler does not find by itself.
+
+Loops over the handful of flexible coordinates of a body are too short for it: they end before the vector units have
+begun. So arrays that such loops run over are laid out in groups of `LANES`, padded with zeros, and taken by these
+functions, which become single instructions (of whatever width the machine has). Arrays are of one dimension.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, models, register_model
+
+from paraflex.kernel.compiling import FAST_MATH
+
+LANES = 8
+# Called without its first argument, which no type checker knows.
+operation: Any = intrinsic
+_VECTOR, _INDEX = ir.VectorType(ir.DoubleType(), LANES), ir.IntType(32)
+_FLAGS = tuple(sorted(FAST_MATH))
+
+
+def padded(count: int) -> int:
+    """The next multiple of LANES."""
+    return -(-count // LANES) * LANES
+
+
+class _Vector(types.Type):
+    """The type of a vector, for Numba."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"Vector{LANES}")
+
+
+_vector = _Vector()
+
+
+@register_model(_Vector)
+class _VectorModel(models.PrimitiveModel):
+    def __init__(self, dmm, fe_type) -> None:
+        super().__init__(dmm, fe_type, _VECTOR)
+
+
+def _pointer(context, builder, array_type, array, index):
+    data = context.make_array(array_type)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [index]), _VECTOR.as_pointer())
+
+
+def _spread(builder, scalar):
+    nothing = ir.Constant(_VECTOR, ir.Undefined)
+    first = builder.insert_element(nothing, scalar, ir.Constant(_INDEX, 0))
+    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(_INDEX, LANES), [0] * LANES))
+
+
+def _add_product(builder, total, a, b):
+    return builder.fadd(total, builder.fmul(a, b, flags=_FLAGS), flags=_FLAGS)
+
+
+@operation
+def zeros(typingctx):
+    """A vector of zeros."""
+
+    def generate(context, builder, signature, arguments):
+        return ir.Constant(_VECTOR, [0.0] * LANES)
+
+    return _vector(), generate
+
+
+@operation
+def load(typingctx, array, index):
+    """The vector array[index : index + LANES]."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.load(_pointer(context, builder, signature.args[0], *arguments), align=8)
+
+    return _vector(array, types.intp), generate
+
+
+@operation
+def store(typingctx, array, index, vector):
+    """Put a vector into array[index : index + LANES]."""
+
+    def generate(context, builder, signature, arguments):
+        builder.store(arguments[2], _pointer(context, builder, signature.args[0], *arguments[:2]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, _vector), generate
+
+
+@operation
+def add_scaled(typingctx, total, vector, scale):
+    """Total + vector * scale, of a number."""
+
+    def generate(context, builder, signature, arguments):
+        total, vector, scale = arguments
+        return _add_product(builder, total, vector, _spread(builder, scale))
+
+    return _vector(_vector, _vector, types.float64), generate
+
+
+@operation
+def add_product(typingctx, total, a, b):
+    """Total + a * b, entry by entry."""
+
+    def generate(context, builder, signature, arguments):
+        return _add_product(builder, *arguments)
+
+    return _vector(_vector, _vector, _vector), generate
+
+
+@operation
+def summed(typingctx, vector):
+    """The sum of a vector's entries."""
+
+    def generate(context, builder, signature, arguments):
+        kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), _VECTOR])
+        reduce = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{LANES}f64")
+        return builder.call(reduce, [ir.Constant(ir.DoubleType(), -0.0), arguments[0]], fastmath=_FLAGS)
+
+    return types.float64(_vector), generate
