@@ -77,14 +77,15 @@ def sparse_jacobian(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_
     offset = np.array([body.offset for body in system.bodies])
     size = np.array([3 + body.nf for body in system.bodies])
     colour = _colours(row, owner, len(system.bodies))
-    still, phi, rate = no_signals(system.packed), np.zeros(system.m), np.zeros(system.m)
+    still, scratch = no_signals(system.packed), make_scratch(system.packed)
+    phi, rate = np.zeros((2, system.m))
     rows, columns, values = [], [], []
     for group in range(int(colour.max(initial=-1)) + 1):
         of_group = colour == group
         for local in range(int(size[of_group].max(initial=0))):
             v = np.zeros(system.n)
             v[offset[of_group & (size > local)] + local] = 1.0
-            constraint_values(system.packed, still, 0.0, q, v, phi, rate)
+            constraint_values(system.packed, still, 0.0, q, v, scratch, phi, rate)
             here = of_group[owner] & (size[owner] > local)
             rows.append(row[here])
             columns.append(offset[owner[here]] + local)

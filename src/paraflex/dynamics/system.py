@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
 from paraflex.dynamics.packing import pack_system, row_order
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
-from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_workspace
+from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.mechanism import Mechanism, PointRef
 
 
@@ -79,7 +79,7 @@ class System:
     def constraints(self, signals: Signals, t: float, q: NDArray, v: NDArray) -> tuple[NDArray, NDArray]:
         """Phi and Phi' at (t, q, v), each (m,); zero in the rows of springs."""
         phi, rate = np.zeros(self.m), np.zeros(self.m)
-        constraint_values(self.packed, signals, t, q, v, phi, rate)
+        constraint_values(self.packed, signals, t, q, v, make_scratch(self.packed), phi, rate)
         return phi, rate
 
     def jacobian(self, q: NDArray) -> NDArray[np.float64]:

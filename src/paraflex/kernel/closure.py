@@ -123,7 +123,7 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
         closed = False
         size = 0.0
         for _ in range(MAX_ITERATIONS):
-            constraint_values(p, signals, t, q[k], zero, phi, dphi)
+            constraint_values(p, signals, t, q[k], zero, scratch, phi, dphi)
             here = task_values(p, marker, coordinates, q[k], zero, zero)
             for r in range(m):
                 single[r, 0] = phi[r]
@@ -144,7 +144,7 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
             if k > 0 and abs(q[k, j] - guess[j]) > LARGEST_JUMP:
                 return TOO_COARSE, k, size
         # Velocities, and with them the basis: one right-hand side each.
-        constraint_values(p, signals, t, q[k], zero, phi, dphi)
+        constraint_values(p, signals, t, q[k], zero, scratch, phi, dphi)
         for r in range(n):
             fill(right[r], 0.0)
         for r in range(m):

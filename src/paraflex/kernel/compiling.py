@@ -6,12 +6,14 @@ with it, by atomic operations that cost more than the arithmetic. Kernels make n
 
 from __future__ import annotations
 
+from typing import Any
+
 from numba import njit
 
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
 
-_OPTIONS = {
+_OPTIONS: dict[str, Any] = {
     "cache": True,
     "nogil": True,
     "error_model": "numpy",

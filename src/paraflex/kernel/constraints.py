@@ -7,9 +7,17 @@ from math import cosh
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import axis_motion, axis_values, fill_axis_rows
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import apply_force, apply_torque, marker_angle, marker_motion
+from paraflex.kernel.joints import (
+    angle_by_sums,
+    apply_force,
+    apply_torque,
+    marker_angle,
+    marker_motion,
+    motion_by_sums,
+)
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION
 from paraflex.kernel.signals import evaluate_signal
+from paraflex.kernel.sums import body_sums
 
 # Friction that slides has next to no slope; its compliance is held finite by counting it no flatter than this
 # fraction of the steepest.
@@ -17,7 +25,7 @@ FLATTEST = 1e-9
 
 
 @kernel
-def constraint_values(p, signals, t, q, v, phi, dphi):
+def constraint_values(p, signals, t, q, v, scratch, phi, dphi):
     """Phi and Phi' at (t, q, v), into phi and dphi; zero in rows that are no constraints."""
     for r in range(p.rows.size):
         row = p.rows[r]
@@ -26,22 +34,24 @@ def constraint_values(p, signals, t, q, v, phi, dphi):
             value, rate, _ = evaluate_signal(signals, row.signal, t)
             phi[r] -= value
             dphi[r] -= rate
-    for k in range(p.ports.size):
-        port = p.ports[k]
-        marker = p.markers[port.marker]
-        r, sign = port.row, port.sign
-        if p.rows[r].kind != CONSTRAINT:
-            continue
-        if port.kind == ANGLE:
-            phi[r] += sign * marker_angle(p, marker, q)
-            dphi[r] += sign * marker_angle(p, marker, v)
-        elif port.kind != AXIS:
-            # The acceleration slot is not used here: v stands in for an array of the right length.
-            px, py, vx, vy, _, _, _, _ = marker_motion(p, marker, q, v, v)
-            phi[r] += sign * px
-            phi[r + 1] += sign * py
-            dphi[r] += sign * vx
-            dphi[r + 1] += sign * vy
+    for i in range(p.bodies.size):
+        # The acceleration slot is not used here: v stands in for an array of the right length.
+        body_sums(p, i, q, v, v, scratch)
+        for k in range(p.bodies[i].port, p.bodies[i].port_end):
+            port = p.ports[k]
+            r, sign = port.row, port.sign
+            if p.rows[r].kind != CONSTRAINT or port.kind == AXIS:
+                continue
+            if port.kind == ANGLE:
+                angle, rate, _ = angle_by_sums(p, p.markers[port.marker], q, v, v, scratch)
+                phi[r] += sign * angle
+                dphi[r] += sign * rate
+            else:
+                px, py, vx, vy, _, _, _, _ = motion_by_sums(p, p.markers[port.marker], q, v, v, scratch)
+                phi[r] += sign * px
+                phi[r + 1] += sign * py
+                dphi[r] += sign * vx
+                dphi[r + 1] += sign * vy
     axis_values(p, q, v, phi, dphi)
 
 

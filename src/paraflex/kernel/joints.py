@@ -285,6 +285,22 @@ def angle_part(kind, weights, angles):
 
 
 @inlined
+def angle_by_sums(p, marker, q, v, a, scratch):
+    """Angle of a marker with its rate and acceleration, by the sums of its body."""
+    turn, z = p.bodies[marker.body].offset + 2, marker.column + SLOPE
+    return q[turn] + scratch.q[z], v[turn] + scratch.v[z], a[turn] + scratch.a[z]
+
+
+@inlined
+def motion_by_sums(p, marker, q, v, a, scratch):
+    """What `marker_motion` returns, by the sums of the marker's body."""
+    x = marker.column
+    y = x + 1
+    shapes = (scratch.q[x], scratch.q[y]), (scratch.v[x], scratch.v[y]), (scratch.a[x], scratch.a[y])
+    return point_motion(p, marker, scratch.turn[0], scratch.turn[1], shapes, q, v, a)
+
+
+@inlined
 def add_joints(p, i, q, v, a, lam, weights, scratch, f, rows):
     """Add body i's part of the weighted sum of Phi'', Phi' and Phi to rows, and Phi_q^T lambda to f and the shares."""
     body = p.bodies[i]
@@ -295,17 +311,10 @@ def add_joints(p, i, q, v, a, lam, weights, scratch, f, rows):
         marker = p.markers[port.marker]
         r, sign, x = port.row, port.sign, marker.column
         if port.kind == ANGLE:
-            z = x + SLOPE
-            angles = q[o + 2] + scratch.q[z], v[o + 2] + scratch.v[z], a[o + 2] + scratch.a[z]
-            rows[r] += sign * angle_part(p.rows[r].kind, weights, angles)
+            rows[r] += sign * angle_part(p.rows[r].kind, weights, angle_by_sums(p, marker, q, v, a, scratch))
             share_torque(p, marker, sign * lam[r], scratch, f)
         elif port.kind != AXIS:
-            shapes = (
-                (scratch.q[x], scratch.q[x + 1]),
-                (scratch.v[x], scratch.v[x + 1]),
-                (scratch.a[x], scratch.a[x + 1]),
-            )
-            px, py, vx, vy, ax, ay, rx, ry = point_motion(p, marker, c, s, shapes, q, v, a)
+            px, py, vx, vy, ax, ay, rx, ry = motion_by_sums(p, marker, q, v, a, scratch)
             rows[r] += sign * (weights[0] * ax + weights[1] * vx + weights[2] * px)
             rows[r + 1] += sign * (weights[0] * ay + weights[1] * vy + weights[2] * py)
             fx, fy = sign * lam[r], sign * lam[r + 1]

@@ -164,7 +164,7 @@ def start(p, signals, tableau, controls, m, ws, out):
 @routine
 def note_constraints(p, signals, t, m, ws):
     """Keep the largest constraint violation seen at accepted steps."""
-    constraint_values(p, signals, t, m.q, m.v, ws.rows, ws.mu)
+    constraint_values(p, signals, t, m.q, m.v, ws.scratch, ws.rows, ws.mu)
     for r in range(ws.rows.size):
         m.clock[PHI_MAX] = max(m.clock[PHI_MAX], abs(ws.rows[r]))
         m.clock[DPHI_MAX] = max(m.clock[DPHI_MAX], abs(ws.mu[r]))

@@ -174,7 +174,7 @@ def stabilised_residual(p, signals, t, y, dy, dropped, weight, torques, idle, ws
     lam, mu = y[2 * n : 2 * n + m], y[2 * n + m : 2 * n + 2 * m]
     note_friction(p, q, v, ws.mu, ws.compliance)
     equations(p, signals, t, INDEX_1, q, v, a, lam, torques, ws)
-    constraint_values(p, signals, t, q, v, phi, dphi)
+    constraint_values(p, signals, t, q, v, ws.scratch, phi, dphi)
     for r in range(m):
         free = dropped[r] or p.rows[r].kind != CONSTRAINT
         d.lam[r] = 0.0 if free else mu[r]

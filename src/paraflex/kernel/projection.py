@@ -19,13 +19,13 @@ CLOSED, PASSES = 1e-14, 4
 def project(p, signals, t, q, v, ws):
     """Change q until Phi = 0, then v until Phi' = 0."""
     for _ in range(PASSES):
-        constraint_values(p, signals, t, q, v, ws.rows, ws.mu)
+        constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
         if largest(ws.rows) <= CLOSED:
             break
         least_change(p, ws.rows, ws)
         add(ws.x, q)
     for _ in range(PASSES):
-        constraint_values(p, signals, t, q, v, ws.mu, ws.rows)
+        constraint_values(p, signals, t, q, v, ws.scratch, ws.mu, ws.rows)
         if largest(ws.rows) <= CLOSED:
             break
         least_change(p, ws.rows, ws)

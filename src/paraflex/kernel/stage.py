@@ -101,7 +101,7 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
         change = size * max(b, g * time_scale)
         if shift.size > 0:
             place(qs, vs, g, b, a, shift, ws)
-            constraint_values(p, signals, t, ws.q, ws.v, ws.rows, ws.mu)
+            constraint_values(p, signals, t, ws.q, ws.v, ws.scratch, ws.rows, ws.mu)
             least_change(p, ws.rows, ws)
             add(ws.x, shift)
             change = max(change, mass_norm(p, ws, ws.x))
