@@ -1,10 +1,9 @@
-"""What the benchmarks share: one thread, the machine they ran on, medians, the search for a setting, tables, JSON."""
+"""What the benchmarks share: one thread, the machine they ran on, the search for a setting, tables, JSON."""
 
 from __future__ import annotations
 
 import json
 import os
-import statistics
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -60,15 +59,15 @@ def _version(package: str) -> str | None:
         return None
 
 
-def median_time(call: Callable[[], Any], repeats: int) -> float:
-    """Median wall time of so many calls [s], after one that is not counted."""
+def least_time(call: Callable[[], Any], repeats: int) -> float:
+    """Least wall time of so many calls [s], after one that is not counted: what others do on the machine only adds."""
     call()
     times = []
     for _ in range(repeats):
         began = time.perf_counter()
         call()
         times.append(time.perf_counter() - began)
-    return statistics.median(times)
+    return min(times)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ are searched from coarse to fine; what counts is the median wall time of several
 target together with the next finer one. Integration alone is timed, making and assembling the model is told beside it.
 
 Exudyn is tried with full and modified Newton, dense and sparse matrices and several numerical dampings; its torques are
-set by a function of Python before each step, whose time is told and taken off in a column of its own. MuJoCo is tried
-with each of its integrators; it runs without Python, in its own rollout. Takes some minutes.
+set by a function of Python before each step, whose time is taken off in a column of its own. MuJoCo is tried with each
+of its integrators. What each chose is timed in turns, so that all see the same moods of the machine. Takes minutes.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import argparse
 import itertools
 import math
 import statistics
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
@@ -26,6 +27,15 @@ from typing import Any
 
 import numpy as np
 from common import Trial, coarsest_within, single_thread, table, write_json
+from engines import (
+    ExudynSetting,
+    MuJoCoSetting,
+    Run,
+    distance,
+    run_exudyn,
+    run_mujoco,
+    tracking_problem,
+)
 from numpy.typing import NDArray
 
 import paraflex as pf
@@ -39,70 +49,66 @@ from paraflex.studies import tracking_case
 MODE, TARGET, DURATION, REPEATS = "++++", 1.2e-5, 0.7, 5
 # Leads to reach over Exudyn and MuJoCo, and times [s] of TR-BDF2 and of the best method.
 LEADS, GOALS = {"Exudyn": 10.0, "MuJoCo": 40.0}, {"TR-BDF2": 0.10, "the best method": 0.05}
-TOLERANCES = tuple(1e-3 * 10.0 ** (-k / 8.0) for k in range(33))
+TOLERANCES = tuple(1e-3 * 10.0 ** (-k / 10.0) for k in range(36))
 CONVERGED = 1e-7
 
 
 @dataclass(frozen=True)
-class Run:
-    """One run of whatever model.
+class Converged:
+    """The path that deviations are taken from, by which setting, and how far another one is off [m]."""
+
+    setting: str
+    path: NDArray[np.float64]
+    uncertainty: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The setting that an engine was found close enough with, or why there is none.
 
     Attributes
     ----------
-    path : (k, 2) array
-        Of the end-effector at the samples [m].
-    seconds : float
-        Of the integration.
-    setup : float
-        Of making and assembling the model [s].
-    python : float
-        Part of `seconds` spent in functions of ours that the engine calls [s].
-    steps : int
+    name : str
+    converged : Converged
+    run : callable
+        Of a setting.
+    setting : object
+        None where nothing tried was close enough.
+    trial : Trial or None
+    tried : list of dict
+        All trials.
     """
 
-    path: NDArray[np.float64]
-    seconds: float
-    setup: float
-    python: float = 0.0
-    steps: int = 0
+    name: str
+    converged: Converged
+    run: Callable[[Any], Run]
+    setting: Any = None
+    trial: Trial | None = None
+    tried: list[dict[str, Any]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class Result:
-    """An engine at its fastest setting that is close enough, or why there is none."""
+    """A choice, timed: medians over the repeats, and the range of times [s]; deviations [m]."""
 
     name: str
     setting: str
     converged: str
-    uncertainty: float | None = None
-    deviation: float | None = None
-    seconds: float | None = None
-    without_python: float | None = None
-    fastest: float | None = None
-    slowest: float | None = None
-    setup: float | None = None
-    steps: int | None = None
-    reason: str = ""
-    tried: list[dict[str, Any]] = field(default_factory=list)
+    uncertainty: float
+    deviation: float
+    seconds: float
+    without_python: float
+    fastest: float
+    slowest: float
+    setup: float
+    steps: int
+    tried: list[dict[str, Any]]
 
 
-def distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Largest between two paths at the same times [m]; infinite for one that ended early or is no longer finite."""
-    if one.shape != other.shape or not np.isfinite(one).all():
-        return math.inf
-    return float(np.max(np.linalg.norm(one - other, axis=-1)))
-
-
-def measure(
-    name: str,
-    settings: Sequence[Any],
-    run: Callable[[Any], Run],
-    converged: tuple[str, NDArray[np.float64], float],
-    target: float,
-    repeats: int,
-) -> Result:
-    """The fastest setting of a family, coarse to fine, and its median time."""
-    words, path, uncertainty = converged
+def choose(
+    name: str, settings: Sequence[Any], run: Callable[[Any], Run], converged: Converged, target: float
+) -> Choice:
+    """The first of settings, coarse to fine, that is close enough."""
     tried: list[dict[str, Any]] = []
 
     def attempt(setting: Any) -> Trial:
@@ -111,34 +117,42 @@ def measure(
         except (NumericalError, RuntimeError) as error:
             tried.append({"setting": str(setting), "reason": str(error)[:200]})
             return Trial(math.inf, math.inf)
-        error = distance(found.path, path)
-        tried.append({"setting": str(setting), "deviation": _plain(error), "seconds": found.seconds})
+        error = distance(found.path, converged.path)
+        deviation = error if math.isfinite(error) else None
+        tried.append({"setting": str(setting), "deviation": deviation, "seconds": found.seconds})
         return Trial(error, found.seconds)
 
     chosen = coarsest_within(settings, attempt, target)
-    if chosen is None:
-        return Result(name, "", words, uncertainty, reason=f"nothing tried is within {target:.1e} m", tried=tried)
-    setting, trial = chosen
-    runs = [run(setting) for _ in range(repeats)]
+    return Choice(name, converged, run, *(chosen or (None, None)), tried)
+
+
+def timed(choices: Sequence[Choice], repeats: int) -> list[Result]:
+    """All choices that there are, run in turns."""
+    able = [choice for choice in choices if choice.trial is not None]
+    runs: list[list[Run]] = [[] for _ in able]
+    for _ in range(repeats):
+        for choice, found in zip(able, runs, strict=True):
+            found.append(choice.run(choice.setting))
+    return [_result(choice, found) for choice, found in zip(able, runs, strict=True)]
+
+
+def _result(choice: Choice, runs: Sequence[Run]) -> Result:
     times = [one.seconds for one in runs]
+    assert choice.trial is not None
     return Result(
-        name=name,
-        setting=str(setting),
-        converged=words,
-        uncertainty=uncertainty,
-        deviation=trial.error,
+        name=choice.name,
+        setting=str(choice.setting),
+        converged=choice.converged.setting,
+        uncertainty=choice.converged.uncertainty,
+        deviation=choice.trial.error,
         seconds=statistics.median(times),
         without_python=statistics.median(one.seconds - one.python for one in runs),
         fastest=min(times),
         slowest=max(times),
         setup=statistics.median(one.setup for one in runs),
         steps=runs[0].steps,
-        tried=tried,
+        tried=choice.tried,
     )
-
-
-def _plain(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 # --- paraflex, and SciPy on its equations --------------------------------------------------------------------------
@@ -164,220 +178,78 @@ def run_paraflex(task: TrackingTask, geometry: Geometry, setting: Tolerance) -> 
     return Run(case.places(solution)[:, 0], solution.wall_time, setup, steps=solution.steps)
 
 
-def our_results(task: TrackingTask, target: float, repeats: int, *, with_scipy: bool = True) -> Iterator[Result]:
+def our_choices(task: TrackingTask, target: float, *, with_scipy: bool = True) -> Iterator[Choice]:
     """Both geometries, and SciPy's Radau on the ordinary differential equations of the linear one."""
-    for geometry, methods in (
-        (Geometry.LINEAR, ("tr-bdf2", "esdirk5")),
-        (Geometry.SECOND_ORDER, ("tr-bdf2", "esdirk5")),
-    ):
+    for geometry in Geometry:
 
         def run(setting: Tolerance, geometry: Geometry = geometry) -> Run:
             return run_paraflex(task, geometry, setting)
 
-        path = run(Tolerance("esdirk5", CONVERGED)).path
-        uncertainty = distance(path, run(Tolerance("esdirk4", 5.0 * CONVERGED)).path)
-        converged = (f"esdirk5, {CONVERGED:g} m", path, uncertainty)
-        for method in methods:
+        fine = Tolerance("esdirk5", CONVERGED)
+        path = run(fine).path
+        converged = Converged(str(fine), path, distance(path, run(Tolerance("esdirk4", 5.0 * CONVERGED)).path))
+        for method in ("tr-bdf2", "esdirk5"):
             settings = [Tolerance(method, tolerance) for tolerance in TOLERANCES]
-            yield measure(f"paraflex {method}, {geometry.value}", settings, run, converged, target, repeats)
+            yield choose(f"paraflex {method}, {geometry.value}", settings, run, converged, target)
         if geometry is Geometry.LINEAR and with_scipy:
             settings = [Tolerance("radau", tolerance) for tolerance in TOLERANCES[::2]]
-            yield measure("SciPy Radau on the ODE, linear", settings, run, converged, target, 1)
+            yield choose("SciPy Radau on the ODE, linear", settings, run, converged, target)
 
 
-# --- Exudyn --------------------------------------------------------------------------------------------------------
+# --- Exudyn and MuJoCo ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ExudynSetting:
-    """Equal steps between samples, and how Exudyn solves them."""
+def exudyn_choice(task: TrackingTask, target: float) -> Choice:
+    """Its fastest way to solve, then its coarsest step for each damping; the fastest of those."""
+    problem = tracking_problem(task, MODE)
 
-    substeps: int
-    spectral_radius: float = 0.9
-    modified: bool = True
-    solver: str = "EigenSparse"
+    def run(setting: ExudynSetting) -> Run:
+        return run_exudyn(problem, setting)
 
-    def __str__(self) -> str:
-        newton = "modified" if self.modified else "full"
-        return f"{self.substeps} steps a sample, radius {self.spectral_radius:g}, {newton} Newton, {self.solver}"
-
-
-def run_exudyn(task: TrackingTask, setting: ExudynSetting) -> Run:
-    """ANCF cables on the mesh of the beams; the end-effector is recorded by a sensor of the engine."""
-    from paraflex.engines import exudyn as adapter
-    from paraflex.engines.cables import Cable
-
-    times, torques = task.motion.t, task.torques(MODE)
-    began = time.perf_counter()
-    engine = adapter._start_engine()
-    exu, mbs = engine.exu, engine.mbs
-    with adapter._silent(exu):
-        model = adapter._build(engine, task, 1)
-        sensor = _end_effector_sensor(engine, model, task)
-        grid = np.linspace(times[0], times[-1], setting.substeps * (times.size - 1) + 1)
-        driver = _Driver(model.loads, torques.evaluate(grid))
-        options = adapter.ExudynOptions(spectral_radius=setting.spectral_radius)
-        reference = mbs.systemData.GetODE2Coordinates(exu.ConfigurationType.Reference)
-        rounding = [link.rounding(reference) for link in model.linkage.bodies.values() if isinstance(link, Cable)]
-        settings = adapter._settings(exu, grid, options, adapter._FLOOR * max(rounding, default=0.0))
-        settings.timeIntegration.newton.useModifiedNewton = setting.modified
-        settings.linearSolver.solverType = getattr(exu.LinearSolverType, setting.solver)
-        settings.solution.sensors.active = True
-        settings.solution.sensors.writePeriod = 1e-12
-        driver.before(mbs, grid[0])
-        mbs.SetPreStepUserFunction(driver.before)
-        solver = exu.MainSolverImplicitSecondOrder()
-        setup = time.perf_counter() - began
-        driver.seconds, began = 0.0, time.perf_counter()
+    def seconds(way: ExudynSetting) -> float:
         try:
-            if solver.InitializeSolver(mbs, settings):
-                solver.SolveSteps(mbs, settings)
-            solver.FinalizeSolver(mbs, settings)
-        except exu.ExudynError as error:
-            raise RuntimeError(str(error)) from None
-        seconds = time.perf_counter() - began
-        mbs.SetPreStepUserFunction(0)
-        path = np.array(mbs.GetSensorStoredData(sensor))[:: setting.substeps, 1:3]
-    return Run(path, seconds, setup, driver.seconds, grid.size - 1)
+            return min(run(way).seconds for _ in range(3))
+        except RuntimeError:
+            return math.inf
 
-
-def _end_effector_sensor(engine: Any, model: Any, task: TrackingTask) -> int:
-    effector = task.mechanism.end_effector
-    assert effector is not None
-    place = model.linkage.part(effector.point).place(effector.point.point)
-    position = engine.exu.OutputVariableType.Position
-    sensor = engine.items.SensorBody(**place, storeInternal=True, outputVariableType=position)
-    number = engine.mbs.AddSensor(sensor)
-    engine.mbs.Assemble()
-    return number
-
-
-@dataclass
-class _Driver:
-    """Sets the torques of every step, at its end, and clocks itself."""
-
-    loads: list[list[tuple[int, float]]]
-    torques: NDArray[np.float64]
-    steps: int = 0
-    seconds: float = 0.0
-
-    def before(self, mbs: Any, _: float) -> bool:
-        began = time.perf_counter()
-        for torque, sides in zip(self.torques[self.steps].tolist(), self.loads, strict=True):
-            for load, sign in sides:
-                mbs.SetLoadParameter(load, "loadVector", [0.0, 0.0, sign * torque])
-        self.steps = min(self.steps + 1, len(self.torques) - 1)
-        self.seconds += time.perf_counter() - began
-        return True
-
-
-def exudyn_results(task: TrackingTask, target: float, repeats: int) -> Iterator[Result]:
-    """Its fastest way to solve, then its coarsest step for each damping; the fastest of those counts."""
     fine = ExudynSetting(80)
-    path = run_exudyn(task, fine).path
-    uncertainty = distance(path, run_exudyn(task, ExudynSetting(40)).path) / 3.0
-    ways = [
-        ExudynSetting(10, 0.9, modified, solver)
-        for modified, solver in itertools.product((True, False), ("EigenSparse", "EXUdense", "EigenDense"))
-    ]
-    seconds = {way: min(_seconds_or_never(task, way) for _ in range(2)) for way in ways}
-    best = min(seconds, key=lambda way: seconds[way])
-    counts = (2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18, 20, 23, 26, 30)
+    path = run(fine).path
+    # Of second order: half the step errs by a quarter.
+    converged = Converged(str(fine), path, distance(path, run(ExudynSetting(40)).path) / 3.0)
+    solvers = ("EigenSparse", "EXUdense", "EigenDense")
+    ways = [ExudynSetting(10, 0.9, newton, solver) for newton, solver in itertools.product((True, False), solvers)]
+    best = min(ways, key=seconds)
+    counts = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 23, 26, 30)
     found = []
     for radius in (1.0, 0.95, 0.9, 0.8, 0.6):
         settings = [ExudynSetting(count, radius, best.modified, best.solver) for count in counts]
-        result = measure(
-            f"Exudyn, radius {radius:g}", settings, lambda setting: run_exudyn(task, setting),
-            (str(fine), path, uncertainty), target, repeats,
-        )  # fmt: skip
-        found.append(result)
-    yield fastest_of("Exudyn, ANCF cables", found)
+        found.append(choose("Exudyn, ANCF cables", settings, run, converged, target))
+    return fastest_of(found)
 
 
-def _seconds_or_never(task: TrackingTask, setting: ExudynSetting) -> float:
-    try:
-        return run_exudyn(task, setting).seconds
-    except RuntimeError:
-        return math.inf
+def fastest_of(choices: Sequence[Choice]) -> Choice:
+    """The fastest of several choices of one engine by their trials, with all that was tried."""
+    best = min(choices, key=lambda choice: math.inf if choice.trial is None else choice.trial.seconds)
+    tried = [trial for choice in choices for trial in choice.tried]
+    return Choice(best.name, best.converged, best.run, best.setting, best.trial, tried)
 
 
-def fastest_of(name: str, results: Sequence[Result]) -> Result:
-    """The fastest of several results under one name, with all that was tried."""
-    tried = [trial for result in results for trial in result.tried]
-    timed = [result for result in results if result.seconds is not None]
-    if not timed:
-        return Result(name, "", results[0].converged, results[0].uncertainty, reason=results[0].reason, tried=tried)
-    best = min(timed, key=lambda result: result.seconds or math.inf)
-    return Result(**{**asdict(best), "name": name, "tried": tried})
-
-
-# --- MuJoCo --------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class MuJoCoSetting:
-    """Equal steps between samples, and MuJoCo's integrator."""
-
-    substeps: int
-    integrator: str = "RK4"
-
-    def __str__(self) -> str:
-        return f"{self.integrator}, {self.substeps} steps a sample"
-
-
-def run_mujoco(task: TrackingTask, setting: MuJoCoSetting) -> Run:
-    """Finite segments; torques of the middle of a step act throughout it, which errs by far less than a step does."""
-    import mujoco
-    from mujoco import rollout
-
-    from paraflex.engines import mujoco as adapter
-    from paraflex.engines.tree import body_motion, joint_state, spanning_tree
-    from paraflex.results.motion import point_motion
-
-    times, torques = task.motion.t, task.torques(MODE)
-    began = time.perf_counter()
-    tree = spanning_tree(task.mechanism)
-    step = float(times[1] - times[0]) / setting.substeps
-    model = adapter._model(mujoco, task.system, tree, step)
-    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{setting.integrator}")
-    model.opt.enableflags = 0
-    data = mujoco.MjData(model)
-    order = np.array([model.joint(link.name).dofadr[0] for link in tree.links])
-    data.qpos[order], data.qvel[order] = joint_state(task, tree)
-    selection = np.zeros((model.nv, len(task.mechanism.motors)))
-    for k, motor in enumerate(task.mechanism.motors):
-        selection[order, k] = tree.relative_angle(task.mechanism.joint(motor.joint))
-    middles = times[0] + step * (np.arange(setting.substeps * (times.size - 1)) + 0.5)
-    control = torques.evaluate(middles) @ selection.T
-    physics = mujoco.mjtState.mjSTATE_FULLPHYSICS
-    start = np.zeros(mujoco.mj_stateSize(model, physics))
-    mujoco.mj_getState(model, data, start, physics)
-    setup, began = time.perf_counter() - began, time.perf_counter()
-    states, _ = rollout.rollout(model, data, start, control, control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED))
-    seconds = time.perf_counter() - began
-    kept = np.vstack([start, states[0, setting.substeps - 1 :: setting.substeps]])
-    position, velocity = kept[:, 1 : 1 + model.nq], kept[:, 1 + model.nq : 1 + 2 * model.nq]
-    joints = (position[:, order], velocity[:, order], np.zeros_like(velocity))
-    effector = task.mechanism.end_effector
-    assert effector is not None
-    path = point_motion(task.system, effector.point, *body_motion(task.system, tree, joints)).position
-    return Run(path, seconds, setup, steps=control.shape[0])
-
-
-def mujoco_results(task: TrackingTask, target: float, repeats: int, segments: int = 8) -> Iterator[Result]:
+def mujoco_choices(task: TrackingTask, target: float, segments: int = 8) -> Iterator[Choice]:
     """Each integrator on the segments of the paper's virtual prototype."""
     cut = task.in_segments(proportional_segments(task.mechanism, segments))
+    problem = tracking_problem(cut, MODE)
+
+    def run(setting: MuJoCoSetting) -> Run:
+        return run_mujoco(problem, setting)
+
     fine = MuJoCoSetting(60)
-    path = run_mujoco(cut, fine).path
-    converged = (str(fine), path, distance(path, run_mujoco(cut, MuJoCoSetting(45)).path))
-    counts = {"RK4": (14, 16, 18, 20, 22, 24, 26, 28, 30, 33, 36, 40)}
-    other = (30, 45, 60, 90, 120, 180, 240)
+    path = run(fine).path
+    converged = Converged(str(fine), path, distance(path, run(MuJoCoSetting(45)).path))
+    counts = {"RK4": (12, 14, 16, 17, 18, 19, 20, 22, 24, 26, 28, 30, 33, 36, 40)}
+    others = (20, 25, 30, 35, 40, 45, 50, 60, 70, 80, 90, 100, 120, 150, 180, 240)
     for integrator in ("RK4", "EULER", "IMPLICIT", "IMPLICITFAST", "DISCRETE"):
-        settings = [MuJoCoSetting(count, integrator) for count in counts.get(integrator, other)]
-        yield measure(
-            f"MuJoCo {integrator}, {len(cut.system.bodies)} segments", settings,
-            lambda setting: run_mujoco(cut, setting), converged, target, repeats if integrator == "RK4" else 1,
-        )  # fmt: skip
+        settings = [MuJoCoSetting(count, integrator) for count in counts.get(integrator, others)]
+        yield choose(f"MuJoCo {integrator}, {len(cut.system.bodies)} segments", settings, run, converged, target)
 
 
 # --- The comparison ------------------------------------------------------------------------------------------------
@@ -391,7 +263,7 @@ def plan(duration: float) -> TrackingTask:
 
 def leads(results: Sequence[Result]) -> dict[str, Any]:
     """How many times faster paraflex's methods are than the best of every other engine, and whether goals are met."""
-    times = {result.name: result.seconds for result in results if result.seconds is not None}
+    times = {result.name: result.seconds for result in results}
     ours = {name: seconds for name, seconds in times.items() if name.startswith("paraflex")}
     out: dict[str, Any] = {}
     for engine, goal in LEADS.items():
@@ -407,15 +279,12 @@ def leads(results: Sequence[Result]) -> dict[str, Any]:
 
 def print_results(results: Sequence[Result]) -> None:
     """The table."""
-    default = next((r.seconds for r in results if r.name == "paraflex tr-bdf2, linear"), None)
-    rows = []
-    for r in results:
-        if r.seconds is None or r.deviation is None or r.setup is None or r.without_python is None:
-            rows.append([r.name, r.reason, "", "", "", "", "", ""])
-            continue
-        times = [f"{r.seconds:.3f}", f"{r.without_python:.3f}", f"{r.fastest:.3f}-{r.slowest:.3f}", f"{r.setup:.3f}"]
-        ratio = "" if default is None else f"{r.seconds / default:.1f}"
-        rows.append([r.name, r.setting, f"{r.deviation:.1e}", *times, ratio])
+    default = next((r.seconds for r in results if r.name == "paraflex tr-bdf2, linear"), math.nan)
+    rows = [
+        [r.name, r.setting, f"{r.deviation:.1e}", f"{r.seconds:.3f}", f"{r.without_python:.3f}",
+         f"{r.fastest:.3f}-{r.slowest:.3f}", f"{r.setup:.3f}", f"{r.seconds / default:.1f}"]
+        for r in results
+    ]  # fmt: skip
     print(table(["", "setting", "off by [m]", "time [s]", "less Python", "from-to", "set-up", "ratio"], rows))
 
 
@@ -424,25 +293,25 @@ def main() -> None:
     parser.add_argument("--target", type=float, default=TARGET, help="deviation from the converged path [m]")
     parser.add_argument("--duration", type=float, default=DURATION, help="[s]")
     parser.add_argument("--repeats", type=int, default=REPEATS)
-    parser.add_argument("--skip-scipy", action="store_true", help="it takes minutes")
+    parser.add_argument("--skip-scipy", action="store_true", help="it takes as long as all others")
     parser.add_argument("--out", help="folder for peers.json")
     given = parser.parse_args()
     single_thread()
-    import sys
-
     # Exudyn's build without checks.
-    sys.exudynFast = True  # type: ignore[attr-defined]
+    setattr(sys, "exudynFast", True)  # noqa: B010
     for geometry in Geometry:
         compile_kernels(geometry)
-    task, results = plan(given.duration), []
+    task, choices = plan(given.duration), []
     sources = (
-        our_results(task, given.target, given.repeats, with_scipy=not given.skip_scipy),
-        exudyn_results(task, given.target, given.repeats),
-        mujoco_results(task, given.target, given.repeats),
+        our_choices(task, given.target, with_scipy=not given.skip_scipy),
+        (exudyn_choice(task, given.target) for _ in range(1)),
+        mujoco_choices(task, given.target),
     )
-    for result in itertools.chain(*sources):
-        results.append(result)
-        print(f"{result.name}: {result.reason or f'{result.seconds:.3f} s'}", flush=True)
+    for choice in itertools.chain(*sources):
+        choices.append(choice)
+        found = f"nothing tried is within {given.target:g} m" if choice.setting is None else choice.setting
+        print(f"{choice.name}: {found}", flush=True)
+    results = timed(choices, given.repeats)
     print_results(results)
     found = leads(results)
     for engine, lead in found.items():
@@ -454,6 +323,7 @@ def main() -> None:
             "mode": MODE, "target": given.target, "duration": given.duration, "repeats": given.repeats,
             "goals": {"seconds": GOALS, "leads": LEADS}, "leads": found,
             "results": [asdict(result) for result in results],
+            "not_close_enough": {choice.name: choice.tried for choice in choices if choice.setting is None},
         },
         given.out,
     )  # fmt: skip
