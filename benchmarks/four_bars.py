@@ -125,7 +125,7 @@ def compare(*, flexible: bool, given: argparse.Namespace) -> list[dict[str, Any]
                 slow.add(engine.name)
         results = {result.name: result for result in timed(choices, given.repeats)}
         rows.append({"n": n, "coordinates": problem.system.n, "rows": problem.system.m, "results": results})
-        said = ", ".join(f"{name} {result.seconds:.3f} s" for name, result in results.items())
+        said = ", ".join(f"{name} {result.seconds:.4f} s" for name, result in results.items())
         print(f"{'flexible' if flexible else 'rigid'} n = {n}: {said or 'nothing close enough'}", flush=True)
     return rows
 
@@ -145,7 +145,7 @@ def print_rows(rows: Sequence[dict[str, Any]], names: Sequence[str], grown: dict
     """The table."""
 
     def cell(result: Result | None) -> str:
-        return "" if result is None else f"{result.seconds:.3f} ({result.deviation:.0e} m)"
+        return "" if result is None else f"{result.seconds:.4f} ({result.deviation:.0e} m)"
 
     lines = [
         [str(entry["n"]), str(entry["coordinates"]), *(cell(entry["results"].get(name)) for name in names)]
