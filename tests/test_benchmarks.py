@@ -17,6 +17,7 @@ from paraflex.mechanism import Geometry, RigidBody, proportional_segments
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 sys.path.append(str(BENCHMARKS))
 
+import batch  # noqa: E402
 import common  # noqa: E402
 import cost_model  # noqa: E402
 import engines  # noqa: E402
@@ -124,6 +125,16 @@ def test_engines_agree_on_a_rigid_row():
     assert engines.distance(exudyn, ours) < 1e-6
     assert engines.distance(mujoco, ours) < 1e-6
     assert np.ptp(ours, axis=0).max() > 0.1
+
+
+def test_designs_differ_in_stiffness_alone(task):
+    made = [batch.design(task.mechanism, k) for k in range(50)]
+    factors = [one.bodies[0].material.youngs_modulus / task.mechanism.bodies[0].material.youngs_modulus for one in made]
+    assert min(factors) < 0.82
+    assert max(factors) > 1.18
+    assert len(set(factors)) == 50
+    assert made[7].bodies[2].section == task.mechanism.bodies[2].section
+    assert made[7].joints == task.mechanism.joints
 
 
 def test_fits_find_what_was_put_in():
