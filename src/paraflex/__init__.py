@@ -6,7 +6,10 @@ The names below are the package's public ones; each is imported when it is first
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from paraflex.cache_folder import ensure_cache_folder
 
 if TYPE_CHECKING:
     from paraflex import plots
@@ -79,6 +82,9 @@ __all__ = [
     "summary",
     "tracking_dataset",
 ]
+
+
+ensure_cache_folder(Path(__file__).parent / "kernel")
 
 
 def __getattr__(name: str) -> Any:

@@ -7,11 +7,14 @@ round differently from those of all later ones. So other processes compile, two 
 
 from __future__ import annotations
 
+import hashlib
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import llvmlite.binding
+import numba
 import numpy as np
 
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
@@ -27,9 +30,8 @@ NOTICE = "Compiling the kernels: once after an installation, about a minute."
 
 
 def are_compiled(geometry: Geometry = Geometry.LINEAR) -> bool:
-    """Whether the kernels for beams of this geometry stand in the cache on disk and are newer than their source."""
-    stamp = _stamp(geometry)
-    return stamp.exists() and stamp.stat().st_mtime > _newest_source()
+    """Whether the kernels for beams of this geometry, as their source is now, stand in the cache on disk."""
+    return _stamp(geometry).exists()
 
 
 def compile_kernels(geometry: Geometry = Geometry.LINEAR, announce: Callable[[str], None] = print) -> None:
@@ -45,10 +47,7 @@ def compile_kernels(geometry: Geometry = Geometry.LINEAR, announce: Callable[[st
     if are_compiled(geometry):
         return
     announce(NOTICE)
-    # Numba looks at the file of a cached kernel, not at those of the kernels it calls: one edited, all go.
-    for entry in [*_folder().glob("*.nb?"), *_folder().glob("compiled-*")]:
-        if entry.stat().st_mtime < _newest_source():
-            entry.unlink(missing_ok=True)
+    _drop_outdated()
     command = [sys.executable, "-m", "paraflex.compilation", geometry.value]
     processes = [subprocess.Popen([*command, part], stdout=subprocess.DEVNULL) for part in _PARTS]
     try:
@@ -67,16 +66,42 @@ def compile_kernels_for(mechanism: Mechanism, announce: Callable[[str], None] = 
     compile_kernels(mechanism.geometry if bent else Geometry.LINEAR, announce)
 
 
+def _drop_outdated() -> None:
+    """Empty the cache of kernels that were compiled from other sources.
+
+    Numba looks at the file of a cached kernel, not at those of the kernels it calls: one edited, all go.
+    """
+    sources = _folder() / f"sources-{_digest(*_sources())}"
+    if sources.exists():
+        return
+    for pattern in ("*.nb?", "compiled-*", "sources-*"):
+        for entry in _folder().glob(pattern):
+            entry.unlink(missing_ok=True)
+    sources.touch()
+
+
 def _folder() -> Path:
+    """Where Numba keeps the machine code: beside the sources, or elsewhere if it may not write there."""
     return Path(str(march.stats.cache_path))
 
 
 def _stamp(geometry: Geometry) -> Path:
-    return _folder() / f"compiled-{geometry.value}"
+    """A file that says: compiled from these sources, by this compiler, for this processor.
+
+    A cache folder in a user's home may be shared by machines, and file times of another release may be older.
+    """
+    here = (sys.version, numba.__version__, llvmlite.binding.get_host_cpu_name())
+    return _folder() / f"compiled-{geometry.value}-{_digest(*_sources(), *(text.encode() for text in here))}"
 
 
-def _newest_source() -> float:
-    return max(source.stat().st_mtime for source in Path(march.py_func.__code__.co_filename).parent.glob("*.py"))
+def _sources() -> list[bytes]:
+    """Texts of all kernels."""
+    folder = Path(march.py_func.__code__.co_filename).parent
+    return [source.read_bytes() for source in sorted(folder.glob("*.py"))]
+
+
+def _digest(*texts: bytes) -> str:
+    return hashlib.sha256(b"".join(hashlib.sha256(text).digest() for text in texts)).hexdigest()[:16]
 
 
 def _free_beam(geometry: Geometry) -> NativeRun:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from paraflex.simulate import TrackingTask
-from paraflex.studies import StudyResult
+if TYPE_CHECKING:
+    # With what they import they take as long as all of `paraflex info`.
+    from paraflex.simulate import TrackingTask
+    from paraflex.studies import StudyResult
 
 # How a run ends that did what was asked.
 FINISHED = ("complete", "stopped")

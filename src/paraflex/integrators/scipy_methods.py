@@ -8,8 +8,7 @@ from collections.abc import Callable
 from types import FunctionType
 
 import numpy as np
-import scipy.integrate
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from paraflex.integrators.forms import OdeForm

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.integrate
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from paraflex.errors import InputError

@@ -9,7 +9,7 @@ from math import pi
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-import scipy.interpolate
+import scipy
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError

@@ -1,0 +1,333 @@
+"""RAParM-I against Exudyn, MuJoCo and SciPy: same torques and start, each at its fastest setting that is close enough.
+
+    python benchmarks/peers.py [--target METRES] [--duration S] [--repeats N] [--out DIR]
+
+Mode ++++ on the square, reference set, all 104 coordinates, 0.7 s, one thread each, kernels warm. Close enough is an
+end-effector nowhere further than the target from the path that the same model takes with much finer steps: models
+differ (the linear shape, second order, exact beams, rigid segments), and none is charged for being another. Settings
+are searched from coarse to fine; what counts is the median wall time of several runs of the first that is within the
+target together with the next finer one. Integration alone is timed, making and assembling the model is told beside it.
+
+Exudyn is tried with full and modified Newton, dense and sparse matrices and several numerical dampings; its torques are
+set by a function of Python before each step, whose time is taken off in a column of its own. MuJoCo is tried with each
+of its integrators. What each chose is timed in turns, so that all see the same moods of the machine. Takes minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from common import Trial, coarsest_within, single_thread, table, write_json
+from engines import (
+    ExudynSetting,
+    MuJoCoSetting,
+    Run,
+    distance,
+    run_exudyn,
+    run_mujoco,
+    tracking_problem,
+)
+from numpy.typing import NDArray
+
+import paraflex as pf
+from paraflex.compilation import compile_kernels
+from paraflex.errors import NumericalError
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import Geometry, proportional_segments
+from paraflex.simulate import TrackingTask
+from paraflex.studies import tracking_case
+
+MODE, TARGET, DURATION, REPEATS = "++++", 1.2e-5, 0.7, 5
+# Leads to reach over Exudyn and MuJoCo, and times [s] of TR-BDF2 and of the best method.
+LEADS, GOALS = {"Exudyn": 10.0, "MuJoCo": 40.0}, {"TR-BDF2": 0.10, "the best method": 0.05}
+TOLERANCES = tuple(1e-3 * 10.0 ** (-k / 10.0) for k in range(36))
+CONVERGED = 1e-7
+
+
+@dataclass(frozen=True)
+class Converged:
+    """The path that deviations are taken from, by which setting, and how far another one is off [m]."""
+
+    setting: str
+    path: NDArray[np.float64]
+    uncertainty: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The setting that an engine was found close enough with, or why there is none.
+
+    Attributes
+    ----------
+    name : str
+    converged : Converged
+    run : callable
+        Of a setting.
+    setting : object
+        None where nothing tried was close enough.
+    trial : Trial or None
+    tried : list of dict
+        All trials.
+    """
+
+    name: str
+    converged: Converged
+    run: Callable[[Any], Run]
+    setting: Any = None
+    trial: Trial | None = None
+    tried: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A choice, timed: medians over the repeats, and the range of times [s]; deviations [m]."""
+
+    name: str
+    setting: str
+    converged: str
+    uncertainty: float
+    deviation: float
+    seconds: float
+    without_python: float
+    fastest: float
+    slowest: float
+    setup: float
+    steps: int
+    tried: list[dict[str, Any]]
+
+
+def choose(
+    name: str, settings: Sequence[Any], run: Callable[[Any], Run], converged: Converged, target: float
+) -> Choice:
+    """The first of settings, coarse to fine, that is close enough."""
+    tried: list[dict[str, Any]] = []
+
+    def attempt(setting: Any) -> Trial:
+        try:
+            found = run(setting)
+        except (NumericalError, RuntimeError) as error:
+            tried.append({"setting": str(setting), "reason": str(error)[:200]})
+            return Trial(math.inf, math.inf)
+        error = distance(found.path, converged.path)
+        deviation = error if math.isfinite(error) else None
+        tried.append({"setting": str(setting), "deviation": deviation, "seconds": found.seconds})
+        return Trial(error, found.seconds)
+
+    chosen = coarsest_within(settings, attempt, target)
+    return Choice(name, converged, run, *(chosen or (None, None)), tried)
+
+
+def timed(choices: Sequence[Choice], repeats: int) -> list[Result]:
+    """All choices that there are, run in turns."""
+    able = [choice for choice in choices if choice.trial is not None]
+    runs: list[list[Run]] = [[] for _ in able]
+    for _ in range(repeats):
+        for choice, found in zip(able, runs, strict=True):
+            found.append(choice.run(choice.setting))
+    return [_result(choice, found) for choice, found in zip(able, runs, strict=True)]
+
+
+def _result(choice: Choice, runs: Sequence[Run]) -> Result:
+    times = [one.seconds for one in runs]
+    assert choice.trial is not None
+    return Result(
+        name=choice.name,
+        setting=str(choice.setting),
+        converged=choice.converged.setting,
+        uncertainty=choice.converged.uncertainty,
+        deviation=choice.trial.error,
+        seconds=statistics.median(times),
+        without_python=statistics.median(one.seconds - one.python for one in runs),
+        fastest=min(times),
+        slowest=max(times),
+        setup=statistics.median(one.setup for one in runs),
+        steps=runs[0].steps,
+        tried=choice.tried,
+    )
+
+
+# --- paraflex, and SciPy on its equations --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A method at a tolerance [m]."""
+
+    method: str
+    tolerance: float
+
+    def __str__(self) -> str:
+        return f"{self.method}, {self.tolerance:.2g} m"
+
+
+def run_paraflex(task: TrackingTask, geometry: Geometry, setting: Tolerance) -> Run:
+    """Our own run; set-up is that of the system from the mechanism."""
+    began = time.perf_counter()
+    case = tracking_case(task.remodelled(task.mechanism.with_geometry(geometry)), MODE)
+    setup = time.perf_counter() - began
+    solution = case.solve(IntegrationOptions(method=setting.method, tolerance=setting.tolerance), None)
+    return Run(case.places(solution)[:, 0], solution.wall_time, setup, steps=solution.steps)
+
+
+def our_choices(task: TrackingTask, target: float, *, with_scipy: bool = True) -> Iterator[Choice]:
+    """Both geometries, and SciPy's Radau on the ordinary differential equations of the linear one."""
+    for geometry in Geometry:
+
+        def run(setting: Tolerance, geometry: Geometry = geometry) -> Run:
+            return run_paraflex(task, geometry, setting)
+
+        fine = Tolerance("esdirk5", CONVERGED)
+        path = run(fine).path
+        converged = Converged(str(fine), path, distance(path, run(Tolerance("esdirk4", 5.0 * CONVERGED)).path))
+        for method in ("tr-bdf2", "esdirk5"):
+            settings = [Tolerance(method, tolerance) for tolerance in TOLERANCES]
+            yield choose(f"paraflex {method}, {geometry.value}", settings, run, converged, target)
+        if geometry is Geometry.LINEAR and with_scipy:
+            settings = [Tolerance("radau", tolerance) for tolerance in TOLERANCES[::2]]
+            yield choose("SciPy Radau on the ODE, linear", settings, run, converged, target)
+
+
+# --- Exudyn and MuJoCo ---------------------------------------------------------------------------------------------
+
+
+def exudyn_choice(task: TrackingTask, target: float) -> Choice:
+    """Its fastest way to solve, then its coarsest step for each damping; the fastest of those."""
+    problem = tracking_problem(task, MODE)
+
+    def run(setting: ExudynSetting) -> Run:
+        return run_exudyn(problem, setting)
+
+    def seconds(way: ExudynSetting) -> float:
+        try:
+            return min(run(way).seconds for _ in range(3))
+        except RuntimeError:
+            return math.inf
+
+    fine = ExudynSetting(80)
+    path = run(fine).path
+    # Of second order: half the step errs by a quarter.
+    converged = Converged(str(fine), path, distance(path, run(ExudynSetting(40)).path) / 3.0)
+    solvers = ("EigenSparse", "EXUdense", "EigenDense")
+    ways = [ExudynSetting(10, 0.9, newton, solver) for newton, solver in itertools.product((True, False), solvers)]
+    best = min(ways, key=seconds)
+    counts = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 23, 26, 30)
+    found = []
+    for radius in (1.0, 0.95, 0.9, 0.8, 0.6):
+        settings = [ExudynSetting(count, radius, best.modified, best.solver) for count in counts]
+        found.append(choose("Exudyn, ANCF cables", settings, run, converged, target))
+    return fastest_of(found)
+
+
+def fastest_of(choices: Sequence[Choice]) -> Choice:
+    """The fastest of several choices of one engine by their trials, with all that was tried."""
+    best = min(choices, key=lambda choice: math.inf if choice.trial is None else choice.trial.seconds)
+    tried = [trial for choice in choices for trial in choice.tried]
+    return Choice(best.name, best.converged, best.run, best.setting, best.trial, tried)
+
+
+def mujoco_choices(task: TrackingTask, target: float, segments: int = 8) -> Iterator[Choice]:
+    """Each integrator on the segments of the paper's virtual prototype."""
+    cut = task.in_segments(proportional_segments(task.mechanism, segments))
+    problem = tracking_problem(cut, MODE)
+
+    def run(setting: MuJoCoSetting) -> Run:
+        return run_mujoco(problem, setting)
+
+    fine = MuJoCoSetting(60)
+    path = run(fine).path
+    converged = Converged(str(fine), path, distance(path, run(MuJoCoSetting(45)).path))
+    counts = {"RK4": (12, 14, 16, 17, 18, 19, 20, 22, 24, 26, 28, 30, 33, 36, 40)}
+    others = (20, 25, 30, 35, 40, 45, 50, 60, 70, 80, 90, 100, 120, 150, 180, 240)
+    for integrator in ("RK4", "EULER", "IMPLICIT", "IMPLICITFAST", "DISCRETE"):
+        settings = [MuJoCoSetting(count, integrator) for count in counts.get(integrator, others)]
+        yield choose(f"MuJoCo {integrator}, {len(cut.system.bodies)} segments", settings, run, converged, target)
+
+
+# --- The comparison ------------------------------------------------------------------------------------------------
+
+
+def plan(duration: float) -> TrackingTask:
+    """The study of RAParM-I on its square, a sample each millisecond."""
+    model = pf.load("raparm_i")
+    return pf.plan_tracking(model.mechanism, model.path("square"), duration=duration, samples=round(1e3 * duration) + 1)
+
+
+def leads(results: Sequence[Result]) -> dict[str, Any]:
+    """How many times faster paraflex's methods are than the best of every other engine, and whether goals are met."""
+    times = {result.name: result.seconds for result in results}
+    ours = {name: seconds for name, seconds in times.items() if name.startswith("paraflex")}
+    out: dict[str, Any] = {}
+    for engine, goal in LEADS.items():
+        theirs = [seconds for name, seconds in times.items() if name.startswith(engine)]
+        if theirs and ours:
+            out[engine] = {
+                "goal": goal,
+                "seconds": min(theirs),
+                "ratios": {name: min(theirs) / seconds for name, seconds in ours.items()},
+            }
+    return out
+
+
+def print_results(results: Sequence[Result]) -> None:
+    """The table."""
+    default = next((r.seconds for r in results if r.name == "paraflex tr-bdf2, linear"), math.nan)
+    rows = [
+        [r.name, r.setting, f"{r.deviation:.1e}", f"{r.seconds:.3f}", f"{r.without_python:.3f}",
+         f"{r.fastest:.3f}-{r.slowest:.3f}", f"{r.setup:.3f}", f"{r.seconds / default:.1f}"]
+        for r in results
+    ]  # fmt: skip
+    print(table(["", "setting", "off by [m]", "time [s]", "less Python", "from-to", "set-up", "ratio"], rows))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--target", type=float, default=TARGET, help="deviation from the converged path [m]")
+    parser.add_argument("--duration", type=float, default=DURATION, help="[s]")
+    parser.add_argument("--repeats", type=int, default=REPEATS)
+    parser.add_argument("--skip-scipy", action="store_true", help="it takes as long as all others")
+    parser.add_argument("--out", help="folder for peers.json")
+    given = parser.parse_args()
+    single_thread()
+    # Exudyn's build without checks.
+    setattr(sys, "exudynFast", True)  # noqa: B010
+    for geometry in Geometry:
+        compile_kernels(geometry)
+    task, choices = plan(given.duration), []
+    sources = (
+        our_choices(task, given.target, with_scipy=not given.skip_scipy),
+        (exudyn_choice(task, given.target) for _ in range(1)),
+        mujoco_choices(task, given.target),
+    )
+    for choice in itertools.chain(*sources):
+        choices.append(choice)
+        found = f"nothing tried is within {given.target:g} m" if choice.setting is None else choice.setting
+        print(f"{choice.name}: {found}", flush=True)
+    results = timed(choices, given.repeats)
+    print_results(results)
+    found = leads(results)
+    for engine, lead in found.items():
+        for name, ratio in lead["ratios"].items():
+            print(f"{name}: {ratio:.1f} times {engine} (goal of the linear model: {lead['goal']:.0f})")
+    write_json(
+        "peers",
+        {
+            "mode": MODE, "target": given.target, "duration": given.duration, "repeats": given.repeats,
+            "goals": {"seconds": GOALS, "leads": LEADS}, "leads": found,
+            "results": [asdict(result) for result in results],
+            "not_close_enough": {choice.name: choice.tried for choice in choices if choice.setting is None},
+        },
+        given.out,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

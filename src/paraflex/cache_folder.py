@@ -1,0 +1,60 @@
+"""A place for compiled kernels where Numba finds none: neither beside the sources nor in the user's cache folder.
+
+Numba tries NUMBA_CACHE_DIR, the folder of the sources, and the user's cache folder, and refuses to import kernels
+where it may write to none of them: a read-only installation, run by a user without a home.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import MutableMapping
+from pathlib import Path
+
+VARIABLE = "NUMBA_CACHE_DIR"
+
+
+def ensure_cache_folder(sources: Path, environment: MutableMapping[str, str] = os.environ) -> None:
+    """Name a folder in the environment if Numba would find none; to be called before Numba is imported.
+
+    Parameters
+    ----------
+    sources : Path
+        Folder of the kernels.
+    environment : mapping
+        Changed where a folder is named.
+    """
+    if environment.get(VARIABLE) or not hasattr(os, "getuid"):
+        return
+    if not any(_can_write(folder) for folder in (sources / "__pycache__", _users(environment))):
+        environment[VARIABLE] = str(_own_folder())
+
+
+def _users(environment: MutableMapping[str, str]) -> Path:
+    """Where Numba keeps what it compiles for this user."""
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "numba"
+    return Path(environment.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "numba"
+
+
+def _can_write(folder: Path) -> bool:
+    """Whether files can be made in a folder, or the folder itself."""
+    existing = next((place for place in (folder, *folder.parents) if place.exists()), None)
+    return existing is not None and os.access(existing, os.W_OK | os.X_OK)
+
+
+def _own_folder() -> Path:
+    """One in the folder for temporary files that nobody else can write to: what is in a cache is executed."""
+    import tempfile
+
+    user = os.getuid()
+    folder = Path(tempfile.gettempdir()) / f"paraflex-kernels-{user}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        if folder.is_dir() and not folder.is_symlink() and found.st_uid == user and not found.st_mode & 0o022:
+            return folder
+    except OSError:
+        pass
+    # Somebody else's: kernels are compiled anew in every process.
+    return Path(tempfile.mkdtemp(prefix="paraflex-kernels-"))

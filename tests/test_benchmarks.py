@@ -1,0 +1,170 @@
+"""The benchmarks' own parts: what they measure is what they say; nothing is timed here."""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import paraflex as pf
+from counting import operations_of
+from paraflex.kernel.linear import mass_norm, solve_system
+from paraflex.kernel.stage import equations
+from paraflex.mechanism import Geometry, RigidBody, proportional_segments
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+sys.path.append(str(BENCHMARKS))
+
+import batch  # noqa: E402
+import common  # noqa: E402
+import cost_model  # noqa: E402
+import engines  # noqa: E402
+import four_bars  # noqa: E402
+import iteration  # noqa: E402
+import operations  # noqa: E402
+import peers  # noqa: E402
+import startup  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def task():
+    model = pf.load("raparm_i")
+    return pf.plan_tracking(model.mechanism, model.path("square"), duration=0.02, samples=21)
+
+
+def test_a_lucky_setting_is_passed_over():
+    errors = {5: 0.3, 4: 0.05, 3: 0.2, 2: 0.08, 1: 0.01}
+    found = common.coarsest_within(errors, lambda k: common.Trial(errors[k], 1.0), 0.1)
+    assert found == (2, common.Trial(0.08, 1.0))
+    assert common.coarsest_within(errors, lambda k: common.Trial(math.inf, 1.0), 0.1) is None
+
+
+@pytest.mark.parametrize("geometry", list(Geometry))
+def test_operations_are_those_that_the_kernels_do(task, geometry):
+    run = iteration.half_way(task.remodelled(task.mechanism.with_geometry(geometry)), 1e-4, 3)
+    p, state, ws = run.problem.system.packed, run.state, run.workspace
+    motion = (state.q, state.v, state.stage_a[1, 0], state.stage_lam[0], state.torques)
+    done = {
+        "equations": operations_of(equations, p, run.problem.signals, 0.01, (1.0, 40.0, 400.0), *motion, ws),
+        "solve": operations_of(solve_system, p, ws, ws.x, ws.mu),
+        "norm": operations_of(mass_norm, p, ws, ws.x),
+    }
+    counted = operations.iteration(p)
+    for part, count in done.items():
+        assert counted[part] == pytest.approx(count, rel=0.08), part
+
+
+def test_exudyn_runs_the_same_motion_as_its_adapter(task):
+    pytest.importorskip("exudyn")
+    from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
+
+    found = engines.run_exudyn(engines.tracking_problem(task, "++++"), engines.ExudynSetting(4))
+    record = simulate_exudyn(task, "++++", ExudynOptions(step=2.5e-4))
+    assert found.steps == 80
+    assert engines.distance(found.path, record.end_effector.position) < 1e-10
+    assert np.ptp(found.path, axis=0).max() > 1e-3
+
+
+def test_mujoco_runs_the_same_motion_as_its_adapter(task):
+    pytest.importorskip("mujoco")
+    from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
+
+    cut = task.in_segments(proportional_segments(task.mechanism, 8))
+    problem = engines.tracking_problem(cut, "++++")
+    found = engines.run_mujoco(problem, engines.MuJoCoSetting(30))
+    record = simulate_mujoco(cut, "++++", MuJoCoOptions(step=1e-3 / 30.0))
+    # Torques of the middle of a step act throughout it.
+    assert engines.distance(found.path, record.end_effector.position) < 2e-8
+    with pytest.raises(RuntimeError):
+        engines.run_mujoco(problem, engines.MuJoCoSetting(3))
+
+
+def test_choices_are_timed_and_told(task):
+    converged = peers.Converged("x", np.zeros((2, 2)), 0.0)
+
+    def run(setting):
+        if setting == 0:
+            raise RuntimeError("diverges")
+        return engines.Run(np.full((2, 2), 0.1**setting), 1.0 / setting, 0.5, 0.1, setting)
+
+    choice = peers.choose("paraflex tr-bdf2, linear", [0, 1, 2, 3, 4], run, converged, 0.05)
+    assert choice.setting == 2
+    assert [trial.get("reason") for trial in choice.tried][:2] == ["diverges", None]
+    other = peers.choose("Exudyn, x", [1, 2], run, converged, 0.05)
+    (ours, theirs) = peers.timed([choice, other], 3)
+    assert ours.seconds == 0.5
+    assert ours.without_python == 0.4
+    assert peers.leads([ours, theirs])["Exudyn"]["ratios"] == {ours.name: 1.0}
+    assert peers.choose("none", [1], run, converged, 1e-9).setting is None
+
+
+def test_our_run_is_the_study_itself(task):
+    solution = task.simulate("++++").solution
+    found = peers.run_paraflex(task, Geometry.LINEAR, peers.Tolerance("tr-bdf2", 1e-4))
+    assert found.steps == solution.steps
+
+
+def test_links_of_a_flexible_row_weigh_what_rigid_ones_do():
+    rigid, flexible = four_bars.row(2, flexible=False), four_bars.row(2, flexible=True)
+    for one, other in zip(rigid.bodies, flexible.bodies, strict=True):
+        assert isinstance(one, RigidBody)
+        section, material = other.section, other.material
+        assert section.area * material.density * other.length == pytest.approx(one.mass)
+        assert other.points == {name: place[0] for name, place in one.points.items()}
+
+
+def test_engines_agree_on_a_rigid_row():
+    pytest.importorskip("exudyn")
+    pytest.importorskip("mujoco")
+    problem = four_bars.problem_of(four_bars.row(2, flexible=False))
+    ours = four_bars.run_ours(problem, peers.Tolerance("esdirk5", 1e-7)).path
+    exudyn = engines.run_exudyn(problem, engines.ExudynSetting(200)).path
+    mujoco = engines.run_mujoco(problem, engines.MuJoCoSetting(40)).path
+    assert engines.distance(exudyn, ours) < 1e-6
+    assert engines.distance(mujoco, ours) < 1e-6
+    assert np.ptp(ours, axis=0).max() > 0.1
+
+
+def test_designs_differ_in_stiffness_alone(task):
+    made = [batch.design(task.mechanism, k) for k in range(50)]
+    factors = [one.bodies[0].material.youngs_modulus / task.mechanism.bodies[0].material.youngs_modulus for one in made]
+    assert min(factors) < 0.82
+    assert max(factors) > 1.18
+    assert len(set(factors)) == 50
+    assert made[7].bodies[2].section == task.mechanism.bodies[2].section
+    assert made[7].joints == task.mechanism.joints
+
+
+def test_fits_find_what_was_put_in():
+    bodies, loops = np.array([1.0, 3.0, 5.0, 9.0]), np.array([0.0, 1.0, 0.0, 4.0])
+    fit = cost_model.linear_fit([np.ones(4), bodies, loops], 2.0 + 3.0 * bodies + 0.5 * loops, "{} {} {}")
+    assert fit.coefficients == pytest.approx((2.0, 3.0, 0.5))
+    assert fit.misfit < 1e-9
+    fit = cost_model.power_fit([1.0, 2.0, 4.0], [3.0, 3.0 * 2**-0.5, 1.5], "{} {}")
+    assert fit.coefficients == pytest.approx((3.0, -0.5))
+    design = {"alone": 1.8, "together": 3.6}
+    assert cost_model.hours(design, 1) == pytest.approx(500.0)
+    assert cost_model.hours(design, 1000) == pytest.approx(1.0)
+
+
+def test_only_what_is_between_the_marks_is_written(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{cost_model.BEGIN}\nold\n{cost_model.END}\nafter\n")
+    cost_model.write_page("new \\1", page)
+    assert page.read_text() == f"before\n{cost_model.BEGIN}\n\nnew \\1\n\n{cost_model.END}\nafter\n"
+    with pytest.raises(ValueError, match="no part"):
+        cost_model.write_page("new", BENCHMARKS / "common.py")
+    assert cost_model.BEGIN in cost_model.PAGE.read_text(encoding="utf-8")
+
+
+def test_measurements_keep_their_conditions(tmp_path):
+    file = common.write_json("x", {"value": 1.0}, str(tmp_path))
+    told = json.loads(file.read_text())
+    assert told["value"] == 1.0
+    assert told["machine"]["processor"]
+    assert told["versions"]["numba"]
+    start = startup.timed("python", ["-c", "pass"], 1)
+    assert 0.0 < start.least == start.median
+    assert start.processor > 0.0

@@ -1,0 +1,167 @@
+"""Starting: what is not needed is not imported, nothing is compiled by an import, and caches find a place."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+import paraflex
+from paraflex import cache_folder
+
+HEAVY = ("numba", "matplotlib", "xarray", "scipy", "numpy", "netCDF4", "pydantic")
+
+HELP = """
+import sys
+from paraflex.cli.app import app
+try:
+    app(["--help"])
+except SystemExit:
+    pass
+print([name for name in sys.argv[1:] if name in sys.modules])
+"""
+
+EVERYTHING = """
+import importlib, pkgutil, sys
+import paraflex
+for module in pkgutil.walk_packages(paraflex.__path__, "paraflex."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+kernels = [f for module in list(sys.modules.values()) if module.__name__.startswith("paraflex.kernel")
+           for f in vars(module).values() if hasattr(f, "signatures")]
+print(len(kernels), sum(len(f.signatures) for f in kernels))
+"""
+
+WHERE = """
+import numpy as np
+from paraflex import compilation
+from paraflex.kernel.dense import solve_dense
+solve_dense(np.eye(2), np.ones((2, 1)))
+print(compilation._folder())
+print(compilation.are_compiled())
+compilation._drop_outdated()
+print(len(list(compilation._folder().glob("*.nb?"))))
+compilation._stamp(compilation.Geometry.LINEAR).touch()
+compilation._drop_outdated()
+print(compilation.are_compiled(), compilation.are_compiled(compilation.Geometry.SECOND_ORDER))
+"""
+
+
+# Root may write anywhere but in what is mounted to be read only.
+MOUNT = 'for at in $1 $2; do mount --bind $at $at && mount -o remount,ro,bind $at || exit 77; done; shift 2; exec "$@"'
+
+
+def python(*arguments, read_only=(), **environment):
+    command = [sys.executable, *arguments]
+    if read_only and os.getuid() == 0:
+        command = ["unshare", "--mount", "sh", "-c", MOUNT, "sh", *map(str, read_only), *command]
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd="/", env={**os.environ, **environment}
+    )
+    if done.returncode == 77 or "unshare failed" in done.stderr:
+        pytest.skip("root may write anywhere, and nothing can be mounted here")
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip().splitlines()
+
+
+def test_help_imports_nothing_heavy():
+    assert python("-c", HELP, *HEAVY)[-1] == "[]"
+
+
+def test_describing_the_library_imports_nothing_that_only_runs_need():
+    look = "import sys; from paraflex.cli.inspect import library; library(); print(*set(sys.argv) & set(sys.modules))"
+    unneeded = ("matplotlib", "xarray", "netCDF4", "scipy.interpolate", "scipy.integrate", "scipy.optimize")
+    assert python("-c", look, *unneeded) == []
+
+
+def test_imports_compile_nothing(tmp_path):
+    kernels, signatures = python("-c", EVERYTHING, NUMBA_CACHE_DIR=str(tmp_path))[-1].split()
+    assert int(kernels) > 50
+    assert int(signatures) == 0
+    assert not list(tmp_path.rglob("*.nb?"))
+
+
+@pytest.fixture
+def installation(tmp_path):
+    """A copy of the package that cannot be written to, by file modes for all but root."""
+    shutil.copytree(Path(paraflex.__file__).parent, tmp_path / "lib" / "paraflex", ignore=_caches)
+    folders = [tmp_path / "lib", *(path for path in (tmp_path / "lib").rglob("*") if path.is_dir())]
+    for folder in folders:
+        folder.chmod(0o555)
+    yield tmp_path
+    for folder in folders:
+        folder.chmod(0o755)
+
+
+def _caches(_, names):
+    return [name for name in names if name == "__pycache__"]
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs users")
+@pytest.mark.parametrize("place", ["home", "named", "none"])
+def test_a_read_only_installation_keeps_kernels_elsewhere(installation, place):
+    home, temporary, read_only = (
+        installation / name for name in ("home", "temporary", "home" if place == "none" else "lib")
+    )
+    home.mkdir(mode=0o555 if place == "none" else 0o755)
+    temporary.mkdir()
+    options = {
+        "read_only": (installation / "lib", read_only),
+        "PYTHONPATH": str(installation / "lib"), "PYTHONDONTWRITEBYTECODE": "1", "HOME": str(home),
+        "XDG_CACHE_HOME": str(home / "cache"), "TMPDIR": str(temporary),
+        "NUMBA_CACHE_DIR": str(home / "chosen") if place == "named" else "",
+    }  # fmt: skip
+    folder, before, left, after = python("-c", WHERE, **options)[-4:]
+    expected = {
+        "home": home / "cache" / "numba",
+        "named": home / "chosen",
+        "none": temporary / f"paraflex-kernels-{os.getuid()}",
+    }[place]
+    assert Path(folder).parent == expected
+    # What was there before anybody compiled all of it says nothing of its sources.
+    assert (before, left, after) == ("False", "0", "True False")
+    # A second process finds the stamp.
+    look = "from paraflex.compilation import are_compiled; print(are_compiled())"
+    assert python("-c", look, **options)[-1] == "True"
+
+
+def test_a_folder_that_others_can_write_to_is_not_used(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    tempfile.tempdir = None
+    monkeypatch.setattr(cache_folder, "_can_write", lambda folder: False)
+    named = {}
+    cache_folder.ensure_cache_folder(tmp_path, named)
+    own = Path(named["NUMBA_CACHE_DIR"])
+    assert own.parent == tmp_path
+    assert own.stat().st_mode & 0o777 == 0o700
+    own.chmod(0o777)
+    named = {}
+    cache_folder.ensure_cache_folder(tmp_path, named)
+    tempfile.tempdir = None
+    assert Path(named["NUMBA_CACHE_DIR"]) != own
+
+
+def test_a_place_that_numba_finds_is_left_to_it(tmp_path):
+    named = {"XDG_CACHE_HOME": str(tmp_path)}
+    cache_folder.ensure_cache_folder(Path("/nowhere/that/can/be/written"), named)
+    assert "NUMBA_CACHE_DIR" not in named
+
+
+def test_edited_kernels_count_as_not_compiled(monkeypatch, tmp_path):
+    from paraflex import compilation
+
+    monkeypatch.setattr(compilation, "_folder", lambda: tmp_path)
+    compilation._drop_outdated()
+    compilation._stamp(compilation.Geometry.LINEAR).touch()
+    (tmp_path / "march.nbi").touch()
+    compilation._drop_outdated()
+    assert compilation.are_compiled()
+    assert (tmp_path / "march.nbi").exists()
+    sources = compilation._sources()
+    monkeypatch.setattr(compilation, "_sources", lambda: [*sources[:-1], sources[-1] + b" "])
+    assert not compilation.are_compiled()
+    compilation._drop_outdated()
+    assert [entry.name[:8] for entry in tmp_path.iterdir()] == ["sources-"]
