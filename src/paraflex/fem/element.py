@@ -36,7 +36,8 @@ _AXIAL_COLUMNS = [AXIAL, 4 + AXIAL]
 @cache
 def _coefficients(derivative: int) -> NDArray[np.float64]:
     """Of the derivatives of the Hermite polynomials with respect to z: (powers, 6)."""
-    return np.ascontiguousarray(np.polynomial.polynomial.polyder(_HERMITE, derivative, axis=1).T)
+    rows = np.polynomial.polynomial.polyder(_HERMITE, derivative, axis=1)
+    return np.ascontiguousarray(rows.T, dtype=np.float64)
 
 
 def axial_shape(x: NDArray[np.float64], length: float, derivative: int = 0) -> NDArray[np.float64]:

@@ -4,8 +4,8 @@ from paraflex.studies.sweeps.engines import ENGINES, Engine, LostCluster, open_e
 from paraflex.studies.sweeps.metrics import METRICS, Metric
 from paraflex.studies.sweeps.run import Outcome, Task, run_task
 from paraflex.studies.sweeps.samples import Varied
-from paraflex.studies.sweeps.study import Setting, SweepStudy, load_sweep
 from paraflex.studies.sweeps.session import SweepProgress, SweepResult, sweep
+from paraflex.studies.sweeps.study import Setting, SweepStudy, load_sweep
 
 __all__ = [
     "ENGINES",

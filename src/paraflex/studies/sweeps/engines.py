@@ -13,9 +13,15 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, ThreadPoolExecutor, wait
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from typing import Any, Protocol, TypeVar
 
 from paraflex.errors import InputError, ParaflexError, suggestion
@@ -29,7 +35,8 @@ _DEATHS = 2
 # Seconds in which a scheduler must answer, and between two counts of a cluster's workers.
 _REACHED_WITHIN, _RECOUNT = 10.0, 5.0
 
-T, R = TypeVar("T"), TypeVar("R")
+T = TypeVar("T")
+R = TypeVar("R")
 
 
 class LostWorker(ParaflexError):
@@ -219,13 +226,15 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
         for future in done:
             task = running.pop(future)
             try:
-                yield task, future.result()
+                result = future.result()
             except (BrokenExecutor, CancelledError):
                 suspects.append(task)
+                continue
             except Exception as error:
                 if not _is_death(error):
                     raise
-                yield task, LostWorker(str(error))
+                result = LostWorker(f"every worker that took it died: {error}")
+            yield task, result
         if suspects:
             suspects += running.values()
             running = {}
@@ -236,14 +245,14 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
 def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> Iterator[tuple[T, R | LostWorker]]:
     """Results of tasks of which one killed a worker: each alone, so that only that one is given up."""
     for task in tasks:
-        for death in range(1, _DEATHS + 1):
+        result: R | LostWorker = LostWorker(f"{_DEATHS + 1} workers died of it: out of memory, or killed")
+        for _ in range(_DEATHS):
             try:
-                yield task, _submit(engine, function, task).result()
+                result = _submit(engine, function, task).result()
                 break
             except (BrokenExecutor, CancelledError):
                 engine.restart()
-                if death == _DEATHS:
-                    yield task, LostWorker(f"{_DEATHS + 1} workers died of it: out of memory, or killed")
+        yield task, result
 
 
 def _processors() -> int:
@@ -251,7 +260,7 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _submit(engine: Engine, function: Callable[..., R], task: T) -> Future:
+def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Future:
     try:
         return engine.submit(function, task)
     except BrokenExecutor as error:

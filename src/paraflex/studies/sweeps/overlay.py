@@ -35,7 +35,7 @@ def find_place(data: Mapping[str, Any], field: str) -> Place:
     inside: Any = data
     for part in _parts(field):
         key: str | int = int(part) if isinstance(inside, list) and part.isdigit() else part
-        if isinstance(inside, dict) and key in inside or isinstance(inside, list) and _has(inside, key):
+        if (isinstance(inside, dict) and key in inside) or (isinstance(inside, list) and _has(inside, key)):
             inside = inside[key]  # pyright: ignore[reportArgumentType, reportCallIssue]
             place.append(key)
         else:

@@ -49,7 +49,8 @@ class Varied:
 
     def spread(self, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at fractions of the range, from 0 to 1."""
-        assert self.low is not None and self.high is not None
+        assert self.low is not None
+        assert self.high is not None
         if self.whole:
             return np.minimum(np.floor(self.low + fraction * (self.high - self.low + 1.0)), self.high)
         if self.log:
@@ -60,7 +61,9 @@ class Varied:
         """Values of a grid or list, (k,)."""
         if self.values is not None:
             return np.array(self.values, dtype=float)
-        assert self.number is not None and self.low is not None and self.high is not None
+        assert self.low is not None
+        assert self.high is not None
+        assert self.number is not None
         if self.whole:
             return np.unique(np.round(np.linspace(self.low, self.high, self.number)))
         return self.spread(np.linspace(0.0, 1.0, self.number))
@@ -142,7 +145,7 @@ def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np
         return generator.random((number, dimensions))
     from scipy.stats import qmc
 
-    sequence = qmc.Sobol(dimensions, scramble=True, seed=generator)
+    sequence = qmc.Sobol(dimensions, scramble=True, seed=generator)  # pyright: ignore[reportCallIssue]
     # SciPy warns of numbers that are no powers of two: the first of more are what was asked for.
     return sequence.random_base2(max(number - 1, 0).bit_length())[:number]
 
@@ -152,7 +155,8 @@ def _between(low: float, high: float, fraction: NDArray[np.float64]) -> NDArray[
 
 
 def _check_range(parameter: Varied, where: str) -> None:
-    assert parameter.low is not None and parameter.high is not None
+    assert parameter.low is not None
+    assert parameter.high is not None
     if parameter.high < parameter.low:
         raise InputError(
             f"below low, {parameter.low:g}", field=f"{where}.high", value=parameter.high, remedy="exchange the two"

@@ -26,6 +26,8 @@ from paraflex.studies.sweeps.samples import Varied, check_varied, designs
 from paraflex.studies.sweeps.schema import SweepTable, VaryTable
 from paraflex.studies.sweeps.table import FIXED_COLUMNS
 
+# Attempted steps before a run is given up, unless the study says: a design that flails about must not hold up the rest.
+MOST_STEPS = 200_000
 # What results depend on besides the study.
 _PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
@@ -239,7 +241,7 @@ def _varied(name: str, entry: VaryTable) -> Varied:
     for value in values or []:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
             raise InputError("not a number", field=f"vary.{name}.values", value=value, remedy="give a list of numbers")
-    whole = entry.whole or bool(values) and all(isinstance(value, int) for value in values)
+    whole = entry.whole or (bool(values) and all(isinstance(value, int) for value in values))
     if entry.whole and any(value % 1 for value in values or []):
         raise InputError(
             "not all of them whole", field=f"vary.{name}.values", value=values, remedy="leave out whole = true"
@@ -293,7 +295,7 @@ def _metrics(names: list[str]) -> tuple[str, ...]:
 
 def _integration(table: SweepTable) -> dict[str, Any]:
     given = {name: getattr(table.integration, name) for name in table.integration.model_fields_set}
-    return {name: value for name, value in given.items() if value not in (None, {})}
+    return {"max_steps": MOST_STEPS} | {name: value for name, value in given.items() if value not in (None, {})}
 
 
 def _check(setting: Setting, model: Model) -> None:

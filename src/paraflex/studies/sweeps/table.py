@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,10 +109,8 @@ class whole_file:
                 return
         except OSError as trouble:
             error = trouble
-        try:
+        with suppress(OSError):
             self.unfinished.unlink(missing_ok=True)
-        except OSError:
-            pass
         if isinstance(error, OSError):
             raise _unwritable(self.path, error) from error
 
