@@ -2,10 +2,11 @@
 
     python benchmarks/throughput.py [--designs 24] [--modes 6] [--engine threads,processes] [--json throughput.json]
 
-Designs differ in the thickness of the links by up to 2 %, so that each is planned anew; each is run along the square for
-0.7 s in so many of the study's six modes, by esdirk5. The tolerance is the coarsest of a few with which the end-effector
-of the reference set stays within 1.5e-5 m of a converged run in each of these modes. Runs a second are the best of three
-sweeps, start of the workers left out: timed from the first design done to the last.
+Designs differ in the thickness of the links by up to 2 %, so that each is planned anew; each is run along the square
+for 0.7 s in so many of the study's six modes, by esdirk5. The tolerance is the coarsest of a few with which the
+end-effector of the reference set stays within 1.5e-5 m of a converged run in each of these modes. Runs a second are the
+best of three sweeps, start of the workers left out: timed from the first design of each worker to the last. The goals:
+25 runs a second, and with two workers 1.9 times what one does.
 """
 
 from __future__ import annotations

@@ -284,7 +284,7 @@ def test_a_folder_of_another_study_is_left_alone(finished, tmp_path):
     file, one = finished
     changed = write(tmp_path, STUDY.replace("0.3]", "0.4]"))
     before = one.table.read_bytes()
-    with pytest.raises(InputError, match="results of another study.*name a new folder"):
+    with pytest.raises(InputError, match=r"results of another study.*name a new folder"):
         sweep(load_sweep(changed), one.folder, run=stub)
     assert one.table.read_bytes() == before
     (tmp_path / "mine").mkdir()

@@ -20,6 +20,8 @@ from paraflex.mechanism import ActuationMode
 _DEGREE = 5
 # The spline's largest error, as a fraction of the peak torque of the run.
 _ACCURACY = 1e-8
+# By how much an error falls with half the interval, at least: 2^6 where the torques are smooth.
+_GAIN = 32.0
 # Points of a smooth stretch to begin with, at least, and seconds between them at most.
 _FEWEST, _SPACING = 12, 2e-3
 _REFINEMENTS = 6
@@ -90,7 +92,7 @@ class TorquePlan:
             t, torques = effort.motion.t, allocate(effort, mode)
             checked = FeedForward(mode, tuple(_splines(t[::2], torques[::2], self.knots)), self.knots)
             error = np.max(np.abs(checked.evaluate(t) - torques))
-            if error <= _ACCURACY * max(np.max(np.abs(torques)), np.finfo(float).tiny):
+            if error <= _GAIN * _ACCURACY * max(np.max(np.abs(torques)), np.finfo(float).tiny):
                 return FeedForward(mode, tuple(_splines(t, torques, self.knots)), self.knots)
         raise NumericalError(f'the torques of mode "{mode.name}" are too steep to interpolate: near a singularity')
 

@@ -168,7 +168,9 @@ class _Closure:
         assert effector is not None
         self.mechanism = mechanism
         # Springs, dampers and friction do not constrain.
-        self.system = system = build_system(replace(mechanism, springs=(), dampers=(), frictions=()))
+        acts = mechanism.springs or mechanism.dampers or mechanism.frictions
+        free = replace(mechanism, springs=(), dampers=(), frictions=()) if acts else mechanism
+        self.system = system = build_system(free)
         self.orientation = orientation
         end = end if end > 0.0 else 1.0
         self.signals: Signals = pack_signals(
