@@ -177,18 +177,18 @@ def test_a_stopped_sweep_goes_on_and_makes_no_run_twice(finished, tmp_path):
 
 def test_what_cannot_run_is_a_row_with_its_reason(tmp_path):
     text = STUDY.replace("[0.005, 0.006]", "[-0.001, 0.006]").replace("[0.2, 0.3]", "[0.25]")
-    text += '\n[vary.corner]\nfields = ["path.line.end.0"]\nvalues = [0.05, 9.0]\n'
+    text += '\n[vary.corner]\nfields = ["path.line.end.1"]\nvalues = [0.264, 0.9]\n'
     result = sweep(load_sweep(write(tmp_path, text)), tmp_path / "out")
     data = pd.read_parquet(result.table).set_index(["thickness", "corner", "mode"])
-    thin = data.loc[(-0.001, 0.05, "++++")]
+    thin = data.loc[(-0.001, 0.264, "++++")]
     assert thin["status"] == "invalid"
     assert "section.bar.thickness: must be positive (got -0.001)" in thin["reason"]
     assert np.isnan(thin["tracking_rms"])
-    far = data.loc[(0.006, 9.0, "++++")]
+    far = data.loc[(0.006, 0.9, "++++")]
     assert far["status"] == "failed"
     assert "out of reach" in far["reason"] or "singularity" in far["reason"]
     assert 0.0 < far["time_reached"] < 0.15
-    assert data.loc[(0.006, 0.05, "++++")]["status"] == "complete"
+    assert data.loc[(0.006, 0.264, "++++")]["status"] == "complete"
     assert result.counts["complete"] == 2
 
 
