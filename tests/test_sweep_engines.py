@@ -163,3 +163,23 @@ def test_an_unreachable_cluster(study, tmp_path, monkeypatch):
 def test_bad_engines_say_what_to_do(study, tmp_path, asked, says):
     with pytest.raises(InputError, match=says):
         sweep(study, tmp_path / "out", **asked)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl-C of a terminal as a signal")
+def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(study, tmp_path):
+    file, out = tmp_path / "study.toml", tmp_path / "out"
+    file.write_text(STUDY.replace("number = 12", "number = 4096"), encoding="utf-8")
+    command = [sys.executable, "-W", "error", "-m", "paraflex", "sweep", str(file), "--output", str(out)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        while not any(out.glob("parts/part-*.parquet")):
+            assert process.poll() is None
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGINT)
+        said, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "of 8192 runs:" in said
+    assert "the same command goes on from there" in told
+    assert "Traceback" not in told
+    assert 0 < len(pd.read_parquet(out / "parts")) < 8192

@@ -22,6 +22,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
+from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar
 
 from paraflex.errors import InputError, ParaflexError, suggestion
@@ -131,9 +132,10 @@ class Dask:
         distributed = _distributed()
         self._cluster = None
         if address is None:
-            self._cluster = distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
-            )
+            with _deaf_to_interrupts():
+                self._cluster = distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+                )
         self._client = _connect(distributed, address, self._cluster)
         self._pool = self._client.get_executor(pure=False)
         self._counted, self._workers = -math.inf, 1
@@ -272,6 +274,19 @@ def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Futur
 def _is_death(error: Exception) -> bool:
     """Whether Dask gave a task up because its workers died."""
     return type(error).__name__ == "KilledWorker"
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Processes started within ignore Ctrl-C, which reaches all of a terminal: this one stops them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _leave_interrupts_to_parent() -> None:
