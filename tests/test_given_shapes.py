@@ -435,7 +435,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_a_tracking_study_tells_of_them_what_it_tells_of_a_beam(kind):
     beam, body = replace(stiff(quintic()), **TIP), KINDS[kind]()
-    options = IntegrationOptions(method="esdirk5", tolerance=1e-7, newton_fraction=1e-6)
+    options = IntegrationOptions(method="esdirk5", tolerance=1e-8, newton_fraction=1e-6)
     theirs, mine = (record(tracked(link).simulate("+", options=options)) for link in (beam, body))
     for name in ("angle", "chord", "chord_rate", "tip", "points", "strain_energy", "torque"):
         scale = np.abs(getattr(theirs, name)).max()

@@ -12,7 +12,7 @@ from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condit
 from paraflex.dynamics import State, System, build_system, pack_signals, static_equilibrium
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
-from paraflex.kinematics import Path, RigidMotion, follow_path
+from paraflex.kinematics import Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 
 # Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
@@ -193,9 +193,7 @@ def plan_tracking(
         raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
     times = np.linspace(0.0, end, samples)
 
-    def follow(t: NDArray[np.float64]) -> RigidMotion:
-        return follow_path(mechanism, path, t, assembly=assembly, orientation=orientation)
-
+    follow = path_follower(mechanism, path, end, assembly=assembly, orientation=orientation)
     motion = follow(times)
     system = build_system(mechanism)
     return TrackingTask(

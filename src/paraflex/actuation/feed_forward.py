@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import factorial
 
@@ -20,9 +20,12 @@ from paraflex.mechanism import ActuationMode
 _DEGREE = 5
 # The spline's largest error, as a fraction of the peak torque of the run.
 _ACCURACY = 1e-8
+# By how much an error falls with half the interval, at least: 2^6 where the torques are smooth.
+_GAIN = 32.0
 # Points of a smooth stretch to begin with, at least, and seconds between them at most.
 _FEWEST, _SPACING = 12, 2e-3
 _REFINEMENTS = 6
+_IN_TIME = ("t", "q", "v", "a", "basis")
 
 
 @dataclass(frozen=True)
@@ -58,19 +61,21 @@ class TorquePlan:
 
     Attributes
     ----------
-    coarse, fine : Effort
-        The fine grid has the coarse one's points and the middles between them: it is what the spline of the coarse
-        one is checked against, and then the spline's own grid.
+    fine : Effort
+        Every other instant of it is one of a coarse grid, whose spline is checked against those between; then the
+        fine grid is the spline's own.
     knots : (j,) array
         Times between which the motion is smooth [s].
     follow : callable
         Gives the rigid motion at any times, to refine.
+    finer : list of Effort
+        Found when a mode asked for them: kept, for the others will too.
     """
 
-    coarse: Effort
     fine: Effort
     knots: NDArray[np.float64]
     follow: Callable[[NDArray[np.float64]], RigidMotion]
+    finer: list[Effort] = field(default_factory=list, repr=False, compare=False)
 
     def feed_forward(self, mode: ActuationMode) -> FeedForward:
         """Torques of a mode, minimum norm, as smooth functions of time.
@@ -82,16 +87,25 @@ class TorquePlan:
         NumericalError
             Torques too steep for a spline: the path passes very close to a singularity of the mode.
         """
-        coarse, fine = self.coarse, self.fine
-        for _ in range(_REFINEMENTS):
-            low, high = allocate(coarse, mode), allocate(fine, mode)
-            checked = _splines(coarse.motion.t, low, self.knots)
-            plan = FeedForward(mode, tuple(checked), self.knots)
-            error = np.max(np.abs(plan.evaluate(fine.motion.t) - high))
-            if error <= _ACCURACY * max(np.max(np.abs(high)), np.finfo(float).tiny):
-                return FeedForward(mode, tuple(_splines(fine.motion.t, high, self.knots)), self.knots)
-            coarse, fine = fine, required_effort(self.follow(_with_middles(fine.motion.t)))
+        for refined in range(_REFINEMENTS):
+            effort = self._effort(refined)
+            t, torques = effort.motion.t, allocate(effort, mode)
+            checked = FeedForward(mode, tuple(_splines(t[::2], torques[::2], self.knots)), self.knots)
+            error = np.max(np.abs(checked.evaluate(t) - torques))
+            if error <= _GAIN * _ACCURACY * max(np.max(np.abs(torques)), np.finfo(float).tiny):
+                return FeedForward(mode, tuple(_splines(t, torques, self.knots)), self.knots)
         raise NumericalError(f'the torques of mode "{mode.name}" are too steep to interpolate: near a singularity')
+
+    def _effort(self, refined: int) -> Effort:
+        """On the fine grid with every interval halved so often."""
+        efforts = [self.fine, *self.finer]
+        while len(efforts) <= refined:
+            t = efforts[-1].motion.t
+            between = required_effort(self.follow(0.5 * (t[1:] + t[:-1])))
+            efforts.append(_interleaved(efforts[-1], between))
+        # Modes that run at the same time may find the same; either is kept whole.
+        self.finer[:] = max(self.finer, efforts[1:], key=len)
+        return efforts[refined]
 
 
 def plan_torques(follow: Callable[[NDArray[np.float64]], RigidMotion], knots: NDArray[np.float64]) -> TorquePlan:
@@ -106,13 +120,28 @@ def plan_torques(follow: Callable[[NDArray[np.float64]], RigidMotion], knots: ND
     """
     stretches = [np.linspace(a, b, max(_FEWEST, int(np.ceil((b - a) / _SPACING)) + 1)) for a, b in pairwise(knots)]
     times = np.unique(np.concatenate(stretches))
-    return TorquePlan(
-        required_effort(follow(times)), required_effort(follow(_with_middles(times))), np.asarray(knots), follow
-    )
+    return TorquePlan(required_effort(follow(_with_middles(times))), np.asarray(knots), follow)
 
 
 def _with_middles(t: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
+    return _alternating(t, 0.5 * (t[1:] + t[:-1]))
+
+
+def _alternating(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows of one array (k + 1, ...) and of another (k, ...) between them."""
+    out = np.empty((len(a) + len(b), *a.shape[1:]))
+    out[::2], out[1::2] = a, b
+    return out
+
+
+def _interleaved(effort: Effort, between: Effort) -> Effort:
+    """Effort at instants and at those between them."""
+    parts = {name: _alternating(getattr(effort.motion, name), getattr(between.motion, name)) for name in _IN_TIME}
+    return Effort(
+        replace(effort.motion, **parts),
+        _alternating(effort.required, between.required),
+        _alternating(effort.matrix, between.matrix),
+    )
 
 
 def _splines(t: NDArray[np.float64], values: NDArray[np.float64], knots: NDArray[np.float64]) -> list[InputSignals]:

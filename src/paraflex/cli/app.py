@@ -246,6 +246,34 @@ def compare_methods(
 
 
 @app.command()
+def sweep(
+    study: Annotated[str, typer.Argument(metavar="STUDY.toml", help="What varies, what is run, what is kept.")],
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "--out", metavar="DIR", help="Folder for the table. Default: results/STUDY."),
+    ] = None,
+    engine: Annotated[
+        str, typer.Option(metavar="threads|processes|dask", help="Who computes; results are the same.")
+    ] = "threads",
+    workers: Annotated[int | None, typer.Option(metavar="N", help="How many. Default: one a processor.")] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Of a Dask scheduler, tcp://host:8786. Default: one on this machine."),
+    ] = None,
+    limit: Annotated[int | None, typer.Option(metavar="N", help="Runs this time, rounded up to whole designs.")] = None,
+    json: Json = False,
+) -> None:
+    """Run a mechanism thousands of times with other numbers; the same command goes on where it was stopped.
+
+    Writes results.parquet and summary.json, and trajectories/ where the study says so.
+    """
+    from paraflex.cli.sweep import SweepRequest, sweep_command
+
+    chosen = "dask" if cluster is not None and engine == "threads" else engine
+    raise typer.Exit(sweep_command(SweepRequest(study, output, chosen, workers, cluster, limit, json)))
+
+
+@app.command()
 def modes(source: Source = "raparm_i", path: PathOption = None, json: Json = False) -> None:
     """List the actuation modes and how well each can drive the path."""
     from paraflex.cli.modes import modes_command

@@ -61,11 +61,9 @@ def plan_study(
             "a path says where and how the mechanism starts", field="start", source=model.source,
             remedy="drop the [start] table, or run without a path",
         )  # fmt: skip
-    # Another path than the study's has another length: its own duration, with the study's share of dwell.
     duration, samples = request.duration, request.samples
     if duration is None:
-        own = path_name == model.study.path
-        duration = model.study.duration if own and model.study.duration is not None else _with_dwell(model, path)
+        duration = model.duration(path_name, path)
     try:
         return plan_tracking(
             mechanism,
@@ -90,12 +88,6 @@ def at_fault(error: InputError, model: Model) -> InputError:
     if error.field in flags:
         return InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy)
     return error.in_file(model.source)
-
-
-def _with_dwell(model: Model, path: EndEffectorPath) -> float:
-    if model.study.path is None or model.study.duration is None:
-        return path.duration
-    return path.duration * model.study.duration / model.paths[model.study.path].duration
 
 
 def results_folder(out: str) -> Path:

@@ -184,7 +184,7 @@ def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
     mesh, points = body.mesh, body.points
     assert mesh is not None
     x = float(mesh.nodes[node])
-    N, slope = mesh.shape_at(x)
+    N, slope = mesh.shape_at_node(node)
     bending = points.bending(node_weights(mesh, node)) if points is not None and node > 0 else None
     return Marker(index, np.array([x, 0.0]), N @ body.integrals.D, slope @ body.integrals.D, bending)
 

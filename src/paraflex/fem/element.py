@@ -7,6 +7,8 @@ them this is the common element (Remark 1).
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +31,13 @@ _HERMITE = np.array(
 _LENGTH_POWER = np.array([0, 1, 2, 0, 1, 2])
 _TRANSVERSE_COLUMNS = [TRANSVERSE, SLOPE, CURVATURE, 4 + TRANSVERSE, 4 + SLOPE, 4 + CURVATURE]
 _AXIAL_COLUMNS = [AXIAL, 4 + AXIAL]
+
+
+@cache
+def _coefficients(derivative: int) -> NDArray[np.float64]:
+    """Of the derivatives of the Hermite polynomials with respect to z: (powers, 6)."""
+    rows = np.polynomial.polynomial.polyder(_HERMITE, derivative, axis=1)
+    return np.ascontiguousarray(rows.T, dtype=np.float64)
 
 
 def axial_shape(x: NDArray[np.float64], length: float, derivative: int = 0) -> NDArray[np.float64]:
@@ -73,8 +82,7 @@ def transverse_shape(x: NDArray[np.float64], length: float, derivative: int = 0)
     (n, 8) array
     """
     z = np.asarray(x, dtype=float) / length
-    coefficients = np.polynomial.polynomial.polyder(_HERMITE, derivative, axis=1)
     rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE))
-    values = np.polynomial.polynomial.polyval(z, coefficients.T).T
+    values = np.polynomial.polynomial.polyval(z, _coefficients(derivative)).T
     rows[:, _TRANSVERSE_COLUMNS] = values * float(length) ** (_LENGTH_POWER - derivative)
     return rows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,7 @@ from paraflex.fem.reference import ReferenceCondition, reference_basis
 
 # N^T N is of degree 10 in x, exact with six Gauss points.
 GAUSS_POINTS = 6
-
-# E^T of dR/dphi = R E: the paper's K~ below Eq. 25.
-_ET = np.array([[0.0, 1.0], [-1.0, 0.0]])
+_GAUSS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
 @dataclass(frozen=True)
@@ -182,8 +181,24 @@ def beam_integrals(
     ShapeIntegrals
         In the independent coordinates of the reference condition.
     """
+    # Mechanisms have many links alike, and the rigid mechanism of a plan has those of the flexible one.
+    return _beam_integrals(
+        tuple(mesh.nodes.tolist()), tuple(mesh.spans.tolist()), mesh.separate, tuple(spans), tuple(lumps), condition
+    )
+
+
+@lru_cache(maxsize=256)
+def _beam_integrals(
+    nodes: tuple[float, ...],
+    spans_of: tuple[int, ...],
+    separate: tuple[int, ...],
+    spans: tuple[SpanProperties, ...],
+    lumps: tuple[Lump, ...],
+    condition: ReferenceCondition,
+) -> ShapeIntegrals:
+    mesh = BeamMesh(np.array(nodes), np.array(spans_of), {}, separate)
     points, stiffness = _quadrature(mesh, spans)
-    points += [(mesh.nodes[lump.node], mesh.shape_at(mesh.nodes[lump.node])[0], lump.mass) for lump in lumps]
+    points += [(mesh.nodes[lump.node], mesh.shape_at_node(lump.node)[0], lump.mass) for lump in lumps]
     turning = [(np.eye(mesh.n_nodal)[mesh.slope_column(lump.node)], lump.inertia) for lump in lumps]
     nodal = bar_integrals(points, turning, stiffness, np.eye(mesh.n_nodal))
     return nodal.in_basis(reference_basis(mesh, condition, nodal.Mff, stiffness))
@@ -212,15 +227,16 @@ def bar_integrals(
     S2, I1, I2 = np.zeros((2, n)), np.zeros(n), np.zeros((n, n))
     G1, G2 = np.zeros(n), np.zeros((n, n))
     for x, N, dm in points:
-        s0 = np.array([x, 0.0])
         m += dm
-        S1 += dm * s0
+        S1[0] += dm * x
         S2 += dm * N
         I0 += dm * x * x
-        I1 += dm * (s0 @ N)
+        # s0 = [x, 0] and E^T = [[0, 1], [-1, 0]].
+        I1 += dm * x * N[0]
         I2 += dm * (N.T @ N)
-        G1 += dm * (s0 @ _ET @ N)
-        G2 += dm * (N.T @ _ET @ N)
+        G1 += dm * x * N[1]
+        across = np.outer(N[0], N[1])
+        G2 += dm * (across - across.T)
 
     J, Jf, Jff = 0.0, np.zeros(n), np.zeros((n, n))
     for slope, inertia in turning:
@@ -234,7 +250,7 @@ def bar_integrals(
 
 def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
     """Mass points (x, N, dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
-    z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    z, w = _GAUSS
     points = []
     stiffness = np.zeros((mesh.n_nodal, mesh.n_nodal))
     for e in range(mesh.n_elements):

@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.fem.element import COORDINATES_PER_NODE, CURVATURE, SLOPE, axial_shape, transverse_shape
+from paraflex.fem.element import (
+    AXIAL,
+    COORDINATES_PER_NODE,
+    CURVATURE,
+    SLOPE,
+    TRANSVERSE,
+    axial_shape,
+    transverse_shape,
+)
 
 # Two points closer than this fraction of the beam are one node: an element that short is a typing slip.
 COINCIDENT_POINTS = 1e-9
@@ -106,6 +114,12 @@ class BeamMesh:
         transverse = self.scatter(element, transverse_shape(local, length))
         slope = self.scatter(element, transverse_shape(local, length, derivative=1))
         return np.vstack([axial, transverse]), slope[0]
+
+    def shape_at_node(self, node: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """`shape_at` of a node, whose coordinates are displacement and slope themselves."""
+        rows = np.zeros((3, self.n_nodal))
+        rows[[0, 1, 2], [self.column(node, AXIAL), self.column(node, TRANSVERSE), self.slope_column(node)]] = 1.0
+        return rows[:2], rows[2]
 
     def slope_column(self, node: int) -> int:
         """Index of a node's slope."""

@@ -2,7 +2,7 @@
 
 from paraflex.files.generators import generator_names
 from paraflex.files.library import library_file, library_names, library_text
-from paraflex.files.model import Model, StudyDefaults, load, load_path
+from paraflex.files.model import Model, StudyDefaults, load, load_data, load_path, model_from
 from paraflex.files.schema import model_schema
 
 __all__ = [
@@ -13,6 +13,8 @@ __all__ = [
     "library_names",
     "library_text",
     "load",
+    "load_data",
     "load_path",
+    "model_from",
     "model_schema",
 ]

@@ -159,6 +159,19 @@ class Model:
             )
         return self.paths[wanted]
 
+    def duration(self, name: str, path: Path) -> float:
+        """How long a run along a path of that name takes [s].
+
+        The study's duration along its own path; another path has another length, and the study's share of dwell.
+        """
+        if self.study.duration is None:
+            return path.duration
+        if name == self.study.path:
+            return self.study.duration
+        if self.study.path is None:
+            return path.duration
+        return path.duration * self.study.duration / self.paths[self.study.path].duration
+
 
 def load(name_or_file: str | FilePath) -> Model:
     """Read a model from the library or from a TOML file.
@@ -177,9 +190,35 @@ def load(name_or_file: str | FilePath) -> Model:
     InputError
         Unknown name, unreadable file, or anything in it that does not fit: it names file, field, value and remedy.
     """
+    return model_from(*load_data(name_or_file))
+
+
+def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:
+    """What a model file says, parsed and not yet checked, and the name of its source; see `load` for the argument.
+
+    Raises
+    ------
+    InputError
+        Unknown name, unreadable file, or a file it names that cannot be read.
+    """
     data, source, folder = _read(name_or_file)
     try:
-        data = with_rows(data, folder)
+        return with_rows(data, folder), source
+    except InputError as error:
+        raise (error if error.source else error.in_file(source)) from None
+
+
+def model_from(data: dict[str, Any], source: str) -> Model:
+    """The model that parsed data describe; see `load` for what is raised.
+
+    Parameters
+    ----------
+    data : dict
+        See `load_data`; left as it is.
+    source : str
+        Named in errors.
+    """
+    try:
         return _model(validate(ModelTable, data, source), data, source)
     except InputError as error:
         raise (error if error.source else error.in_file(source)) from None

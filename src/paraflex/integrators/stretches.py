@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import perm
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,11 +43,18 @@ def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
     piece = int(np.searchsorted(breaks, time, side="right")) - 1
     if piece < 1 or breaks[piece] != time:
         return False
-    before = np.polynomial.Polynomial(signals.coefficients[first + piece - 1])
-    after = np.polynomial.Polynomial(signals.coefficients[first + piece])
+    before, after = signals.coefficients[first + piece - 1], signals.coefficients[first + piece]
     x = time - breaks[piece - 1]
     for order in range(derivatives):
-        left, right = before.deriv(order)(x), after.deriv(order)(0.0)
+        left, right = _derivative(before, order, x), _derivative(after, order, 0.0)
         if abs(right - left) > _SMOOTH * max(abs(left), abs(right), 1.0):
             return True
     return False
+
+
+def _derivative(coefficients: NDArray[np.float64], order: int, x: float) -> float:
+    """Of a polynomial with coefficients of ascending powers."""
+    value = 0.0
+    for power in range(coefficients.size - 1, order - 1, -1):
+        value = value * x + perm(power, order) * float(coefficients[power])
+    return value

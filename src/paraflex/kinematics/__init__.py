@@ -1,6 +1,6 @@
 """Paths of the end-effector, and the joint motion that follows them."""
 
-from paraflex.kinematics.closure import RigidMotion, follow_path
+from paraflex.kinematics.closure import RigidMotion, follow_path, path_follower
 from paraflex.kinematics.laws import TrapezoidalLaw
 from paraflex.kinematics.paths import Circle, Line, Path, PathMotion, PointPath, Polygon
 
@@ -14,4 +14,5 @@ __all__ = [
     "RigidMotion",
     "TrapezoidalLaw",
     "follow_path",
+    "path_follower",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,23 +102,62 @@ def follow_path(
     UnreachablePathError
         The path leaves the workspace or passes a Type I singularity: it names time and position.
     """
-    rigid = mechanism.rigid()
+    end = float(np.max(times, initial=0.0))
+    return path_follower(mechanism, path, end, assembly=assembly, orientation=orientation)(times)
+
+
+def path_follower(
+    mechanism: Mechanism,
+    path: Path,
+    end: float,
+    *,
+    assembly: str | Assembly | None = None,
+    orientation: float = 0.0,
+) -> Callable[[Sequence[float] | NDArray[np.float64]], RigidMotion]:
+    """`follow_path` for several sets of times: what does not depend on them is made once.
+
+    Parameters
+    ----------
+    mechanism, path, assembly, orientation
+        See `follow_path`, also for what is raised; of the path itself, when the times are known.
+    end : float
+        The last time of all [s].
+
+    Returns
+    -------
+    callable
+        The motion at times (k,), ascending [s].
+    """
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
-    closure = _Closure(rigid, orientation, float(np.max(times, initial=0.0)))
+    closure = _Closure(mechanism.rigid(), orientation, end)
     closure.check_degrees_of_freedom()
     chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
-    times = np.ascontiguousarray(times, dtype=float)
-    if _turning(path, times[:1]) is not None and "angle" not in mechanism.end_effector.coordinates:
+    if _turning(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
         raise InputError(
             "the path gives angles, the task has none", field="end_effector.coordinates",
             value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
         )  # fmt: skip
-    pose = closure.approach(path, closure.assemble(chosen), times[0])
-    grid = np.unique(np.concatenate([times, np.arange(times[0], times[-1], _LONGEST_STEP)]))
-    # Union of two grids: points a rounding error apart would divide by nothing when torques are interpolated.
-    keep = np.isin(grid, times)
-    return closure.walk(path, pose, grid, keep)
+    assembled = closure.assemble(chosen)
+
+    def follow(times: Sequence[float] | NDArray[np.float64]) -> RigidMotion:
+        times = np.ascontiguousarray(times, dtype=float)
+        grid, keep = _no_long_steps(times)
+        return closure.walk(path, closure.approach(path, assembled, times[0]), grid, keep)
+
+    return follow
+
+
+def _no_long_steps(times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Times and more between them where they are further apart than closure steps; which of them were there."""
+    pieces = np.maximum(1, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9))).astype(int)
+    first = np.concatenate([[0], np.cumsum(pieces)])
+    step = np.repeat(np.diff(times) / pieces, pieces)
+    within = np.arange(first[-1]) - np.repeat(first[:-1], pieces)
+    grid = np.append(np.repeat(times[:-1], pieces) + within * step, times[-1:])
+    keep = np.zeros(grid.size, dtype=bool)
+    keep[first] = True
+    return grid, keep
 
 
 class _Closure:
@@ -129,7 +168,9 @@ class _Closure:
         assert effector is not None
         self.mechanism = mechanism
         # Springs, dampers and friction do not constrain.
-        self.system = system = build_system(replace(mechanism, springs=(), dampers=(), frictions=()))
+        acts = mechanism.springs or mechanism.dampers or mechanism.frictions
+        free = replace(mechanism, springs=(), dampers=(), frictions=()) if acts else mechanism
+        self.system = system = build_system(free)
         self.orientation = orientation
         end = end if end > 0.0 else 1.0
         self.signals: Signals = pack_signals(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 from typing import TypeVar
 
 from paraflex.errors import InputError
@@ -146,7 +147,7 @@ class FlexibleBeam:
     damping: Damping | None = None
     flexible: bool = True
 
-    @property
+    @cached_property
     def mesh(self) -> BeamMesh:
         """Its elements and nodes.
 

@@ -4,6 +4,7 @@ from paraflex.studies.agreement import agreement
 from paraflex.studies.cases import Case, motion_case, tracking_case
 from paraflex.studies.compare import ComparisonOptions, compare_methods
 from paraflex.studies.comparison import Measurement, MethodComparison, Reference
+from paraflex.studies.sweeps import SweepProgress, SweepResult, SweepStudy, load_sweep, sweep
 from paraflex.studies.tracking import Simulator, StudyResult, run_study
 from paraflex.studies.verification import (
     FIDELITIES,
@@ -27,14 +28,19 @@ __all__ = [
     "Refinement",
     "Simulator",
     "StudyResult",
+    "SweepProgress",
+    "SweepResult",
+    "SweepStudy",
     "Verification",
     "VerificationOptions",
     "agreement",
     "check_model",
     "compare_methods",
+    "load_sweep",
     "motion_case",
     "reference_model",
     "run_study",
+    "sweep",
     "tracking_case",
     "verify",
 ]

@@ -1,0 +1,104 @@
+"""`paraflex sweep`: thousands of runs of a mechanism whose numbers vary, gone on with when run again."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
+from paraflex.cli.tables import plain_console
+from paraflex.compilation import compile_kernels_for
+from paraflex.studies import SweepProgress, SweepResult, load_sweep, sweep
+from paraflex.studies.sweeps import SweepStudy
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """What `paraflex sweep` was asked for."""
+
+    study: str
+    output: str | None
+    engine: str
+    workers: int | None
+    cluster: str | None
+    limit: int | None
+    json: bool
+
+
+def sweep_command(request: SweepRequest) -> int:
+    """Do what is left of a sweep; the exit code."""
+    console = plain_console(stderr=True)
+    study = load_sweep(request.study)
+    folder = Path("results") / Path(request.study).stem if request.output is None else Path(request.output)
+    compile_kernels_for(study.model().mechanism, console.print)
+    result = _sweep(console, study, folder, request)
+    if request.json:
+        print(json.dumps(_figures(result), indent=2))
+    else:
+        _report(console, result)
+    if result.interrupted:
+        return INTERRUPTED
+    return TROUBLE if result.done and not result.counts.get("complete") else COMPLETE
+
+
+def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequest) -> SweepResult:
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total} runs"),
+        TextColumn("{task.fields[told]}", markup=False),
+    )
+    with Progress(*columns, console=console, transient=not console.is_terminal, refresh_per_second=4) as progress:
+        bar = progress.add_task(study.name, total=study.runs, told="", start=False)
+
+        def report(at: SweepProgress) -> None:
+            left = "" if at.left is None else f", {_clock(at.left)} left"
+            progress.start_task(bar)
+            progress.update(bar, completed=at.done, told=f"{at.rate:.1f} runs/s{left}")
+
+        return sweep(
+            study,
+            folder,
+            engine=request.engine,
+            workers=request.workers,
+            cluster=request.cluster,
+            limit=request.limit,
+            on_progress=report,
+        )
+
+
+def _report(console: Console, result: SweepResult) -> None:
+    statuses = ", ".join(f"{number} {status}" for status, number in sorted(result.counts.items()))
+    plain_console().print(f"{result.done} of {result.total} runs: {statuses or 'none yet'}")
+    if result.fresh:
+        console.print(f"{result.fresh} of them in {result.seconds:.1f} s now, {_rate(result)} runs/s")
+    if result.finished:
+        console.print(f"one table: {result.table}", soft_wrap=True)
+    else:
+        console.print(f"so far: {result.table}; the same command goes on from there", soft_wrap=True)
+
+
+def _figures(result: SweepResult) -> dict:
+    return {
+        "folder": str(result.folder),
+        "table": str(result.table),
+        "runs": result.total,
+        "done": result.done,
+        "status": dict(result.counts),
+        "fresh": result.fresh,
+        "seconds": result.seconds,
+        "interrupted": result.interrupted,
+    }
+
+
+def _rate(result: SweepResult) -> str:
+    return f"{result.fresh / result.seconds:.1f}"
+
+
+def _clock(seconds: float) -> str:
+    return time.strftime("%H:%M:%S", time.gmtime(seconds)) if seconds < 86_400 else f"{seconds / 86_400:.1f} days"

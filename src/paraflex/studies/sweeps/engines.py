@@ -1,0 +1,314 @@
+"""Who computes: threads of this process, other processes, or the workers of a Dask cluster.
+
+Each engine runs the same function on the same tasks; what comes back does not depend on which it is.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
+from typing import Any, Protocol, TypeVar
+
+from paraflex.errors import InputError, ParaflexError, suggestion
+
+THREADS, PROCESSES, DASK = "threads", "processes", "dask"
+ENGINES = (THREADS, PROCESSES, DASK)
+# Tasks given out for each worker: one it works on and one that waits, so that memory does not grow with the sweep.
+_AHEAD = 2
+# Workers that may die of a task that has one to itself before it is given up.
+_DEATHS = 2
+# Seconds in which a scheduler must answer, and between two counts of a cluster's workers.
+_REACHED_WITHIN, _RECOUNT = 10.0, 5.0
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class LostWorker(ParaflexError):
+    """Every worker that took a task died."""
+
+
+class LostCluster(ParaflexError):
+    """The cluster went away; what is written stays."""
+
+
+class Engine(Protocol):
+    """Takes calls and gives futures for them."""
+
+    @property
+    def workers(self) -> int:
+        """How many tasks run at once."""
+        ...
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
+        """Call a function with arguments elsewhere."""
+        ...
+
+    def restart(self) -> None:
+        """Be ready again after a worker died and took the others with it."""
+        ...
+
+    def close(self, *, abandon: bool = False) -> None:
+        """Let go of the workers; abandon tells them not to finish what they have."""
+        ...
+
+
+class Threads:
+    """Threads of this process: the kernels release the GIL."""
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._stop = threading.Event()
+        self._pool = ThreadPoolExecutor(workers)
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
+        """See `Engine`."""
+        return self._pool.submit(function, *arguments, self._watch)
+
+    def restart(self) -> None:
+        """See `Engine`; threads do not die."""
+
+    def close(self, *, abandon: bool = False) -> None:
+        """See `Engine`."""
+        if abandon:
+            self._stop.set()
+        self._pool.shutdown(cancel_futures=True)
+
+    def _watch(self, _: float) -> None:
+        if self._stop.is_set():
+            raise KeyboardInterrupt
+
+
+class Processes:
+    """Processes on this machine."""
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._pool = self._start()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
+        """See `Engine`."""
+        return self._pool.submit(function, *arguments)
+
+    def restart(self) -> None:
+        """See `Engine`."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._pool = self._start()
+
+    def close(self, *, abandon: bool = False) -> None:
+        """See `Engine`."""
+        processes = list((self._pool._processes or {}).values())
+        if abandon:
+            for process in processes:
+                process.terminate()
+        self._pool.shutdown(cancel_futures=True)
+
+    def _start(self) -> ProcessPoolExecutor:
+        # Not forked: threads of this process may hold locks.
+        context = multiprocessing.get_context("spawn")
+        return ProcessPoolExecutor(self.workers, mp_context=context, initializer=_leave_interrupts_to_parent)
+
+
+class Dask:
+    """Workers of a Dask cluster, which gives the tasks of one that died to others."""
+
+    def __init__(self, workers: int, address: str | None) -> None:
+        distributed = _distributed()
+        self._cluster = None
+        if address is None:
+            with _deaf_to_interrupts():
+                self._cluster = distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+                )
+        self._client = _connect(distributed, address, self._cluster)
+        self._pool = self._client.get_executor(pure=False)
+        self._counted, self._workers = -math.inf, 1
+
+    @property
+    def workers(self) -> int:
+        """See `Engine`; workers may come and go."""
+        now = time.monotonic()
+        if now - self._counted > _RECOUNT:
+            self._counted, self._workers = now, max(1, sum(self._client.nthreads().values()))
+        return self._workers
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
+        """See `Engine`."""
+        return self._pool.submit(function, *arguments)
+
+    def restart(self) -> None:
+        """See `Engine`."""
+        raise LostCluster("the cluster no longer answers; run the same command again: it goes on from there")
+
+    def close(self, *, abandon: bool = False) -> None:
+        """See `Engine`."""
+        self._pool.shutdown(wait=not abandon)
+        self._client.close(timeout=5)
+        if self._cluster is not None:
+            self._cluster.close(timeout=5)
+
+
+def open_engine(name: str, workers: int | None = None, cluster: str | None = None) -> Engine:
+    """An engine by name.
+
+    Parameters
+    ----------
+    name : str
+        "threads", "processes" or "dask".
+    workers : int, optional
+        As many as there are processors by default.
+    cluster : str, optional
+        Address of a Dask scheduler, "tcp://host:8786"; a cluster on this machine by default.
+
+    Raises
+    ------
+    InputError
+        Unknown name, no workers, a cluster that does not answer, or a package that is missing.
+    """
+    if name not in ENGINES:
+        raise InputError("unknown engine", field="--engine", value=name, remedy=suggestion(name, ENGINES))
+    if cluster is not None and name != DASK:
+        raise InputError("is for dask", field="--cluster", value=cluster, remedy="say --engine dask, or leave it out")
+    if cluster is not None and workers is not None:
+        raise InputError(
+            "the cluster has its own", field="--workers", value=workers, remedy="leave it out with --cluster"
+        )
+    if workers is not None and workers < 1:
+        raise InputError("must be positive", field="--workers", value=workers, remedy="say 2")
+    count = workers or _processors()
+    if name == THREADS:
+        return Threads(count)
+    return Processes(count) if name == PROCESSES else Dask(count, cluster)
+
+
+def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> Iterator[tuple[T, R | LostWorker]]:
+    """Results of a function for all tasks, as they come; no more tasks are given out than workers can soon take.
+
+    Parameters
+    ----------
+    engine : Engine
+    function : callable
+        Of a task; from threads, of a task and of what is told the time reached.
+    tasks : iterable
+        Taken from as workers become free.
+
+    Yields
+    ------
+    task, result
+        The result is a LostWorker where every worker that took the task died.
+    """
+    waiting, running = iter(tasks), {}
+    more = True
+    while more or running:
+        while more and len(running) < _AHEAD * engine.workers:
+            task = next(waiting, None)
+            if task is None:
+                more = False
+            else:
+                running[_submit(engine, function, task)] = task
+        # Short waits, for Ctrl-C to be heard everywhere.
+        done, _ = wait(running, timeout=1.0, return_when=FIRST_COMPLETED)
+        suspects = []
+        for future in done:
+            task = running.pop(future)
+            try:
+                result = future.result()
+            except (BrokenExecutor, CancelledError):
+                suspects.append(task)
+                continue
+            except Exception as error:
+                if not _is_death(error):
+                    raise
+                result = LostWorker(f"every worker that took it died: {error}")
+            yield task, result
+        if suspects:
+            suspects += running.values()
+            running = {}
+            engine.restart()
+            yield from _one_by_one(engine, function, suspects)
+
+
+def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> Iterator[tuple[T, R | LostWorker]]:
+    """Results of tasks of which one killed a worker: each alone, so that only that one is given up."""
+    for task in tasks:
+        result: R | LostWorker = LostWorker(f"{_DEATHS + 1} workers died of it: out of memory, or killed")
+        for _ in range(_DEATHS):
+            try:
+                result = _submit(engine, function, task).result()
+                break
+            except (BrokenExecutor, CancelledError):
+                engine.restart()
+        yield task, result
+
+
+def _processors() -> int:
+    """Those this process may use, not all the machine has: batch systems give out a part."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Future:
+    try:
+        return engine.submit(function, task)
+    except BrokenExecutor as error:
+        broken: Future = Future()
+        broken.set_exception(error)
+        return broken
+
+
+def _is_death(error: Exception) -> bool:
+    """Whether Dask gave a task up because its workers died."""
+    return type(error).__name__ == "KilledWorker"
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Processes started within ignore Ctrl-C, which reaches all of a terminal: this one stops them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _leave_interrupts_to_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise InputError(
+            "Dask is not installed", field="--engine", value=DASK, remedy="pip install 'paraflex[cluster]'"
+        ) from None
+    return distributed
+
+
+def _connect(distributed: Any, address: str | None, cluster: Any) -> Any:
+    try:
+        return distributed.Client(address or cluster, timeout=_REACHED_WITHIN, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(
+            f"cannot be reached ({reason})", field="--cluster", value=address,
+            remedy="start it with dask scheduler, and give the address it prints",
+        ) from None  # fmt: skip

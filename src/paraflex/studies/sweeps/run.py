@@ -1,0 +1,190 @@
+"""One design along one path in every mode: the one function that all engines call."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import xarray as xr
+
+from paraflex.compilation import compile_kernels_for
+from paraflex.errors import InputError, NumericalError
+from paraflex.files import model_from
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import Geometry, Mechanism
+from paraflex.results import tracking_dataset
+from paraflex.simulate import TrackingRun, TrackingTask, plan_tracking, simulate
+from paraflex.studies.sweeps.metrics import measure
+from paraflex.studies.sweeps.overlay import overlaid
+from paraflex.studies.sweeps.study import Setting, digest, versions
+
+COMPLETE, FAILED, INVALID = "complete", "failed", "invalid"
+STATUSES = (COMPLETE, FAILED, INVALID)
+_ID_DIGITS = 16
+
+Row = dict[str, Any]
+
+
+class Task(NamedTuple):
+    """A design along a path: its number among all, the number and values of its design, and the path's name."""
+
+    number: int
+    design: int
+    values: tuple[float, ...]
+    path: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a task.
+
+    Attributes
+    ----------
+    task : Task
+    rows : list of dict
+        One a mode, by column.
+    trajectories : mapping of str to Dataset
+        Whole runs by run id, where they are kept.
+    """
+
+    task: Task
+    rows: list[Row]
+    trajectories: Mapping[str, xr.Dataset] = field(default_factory=dict)
+
+
+class Abandoned(Exception):
+    """A run was told to stop; nothing of it counts."""
+
+
+def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None = None) -> Outcome:
+    """Plan a design's motion along a path and simulate it in every mode.
+
+    The rows depend on nothing but setting and task.
+
+    Parameters
+    ----------
+    setting : Setting
+    task : Task
+    watch : callable, optional
+        Told the time reached in a run [s]; a KeyboardInterrupt from it abandons the task.
+
+    Raises
+    ------
+    InputError
+        This process has other versions of the packages that results depend on.
+    Abandoned
+        See `watch`.
+    """
+    _check_versions(setting)
+    rows, kept = [_blank(setting, task, mode) for mode in setting.modes], {}
+    try:
+        planned, options = _plan(setting, task)
+    except Exception as error:
+        for row in rows:
+            row |= trouble(error)
+        return Outcome(task, rows)
+    for row in rows:
+        try:
+            run = _simulate(planned, row["mode"], options, watch)
+        except Abandoned:
+            raise
+        # Whatever a strange design does, it is that design's row and not the end of the sweep.
+        except Exception as error:
+            row |= trouble(error)
+            continue
+        row |= measure(run, setting.metrics) | {"status": COMPLETE, "time_reached": float(run.solution.t[-1])}
+        if setting.trajectories:
+            kept[row["id"]] = _trajectory(run, options, row)
+    return Outcome(task, rows, kept)
+
+
+def trouble(error: Exception) -> Row:
+    """Status, reason and time reached of a run that an error ended."""
+    if isinstance(error, InputError):
+        return {"status": INVALID, "reason": str(error)}
+    if isinstance(error, NumericalError):
+        reached = None if error.moment is None else float(error.moment.time)
+        return {"status": FAILED, "reason": str(error), "time_reached": reached}
+    return {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}
+
+
+def lost(setting: Setting, task: Task, reason: str) -> Outcome:
+    """Rows of a task that no worker survives."""
+    rows = [_blank(setting, task, mode) | {"status": FAILED, "reason": reason} for mode in setting.modes]
+    return Outcome(task, rows)
+
+
+def run_id(setting: Setting, task: Task, mode: str) -> str:
+    """Of a run, from all it depends on: the same design of the same file has the same one in any study."""
+    numbers = sorted((str(place), number) for place, number in setting.numbers(task.values))
+    return digest([setting.identity, numbers, task.path, mode])[:_ID_DIGITS]
+
+
+def _blank(setting: Setting, task: Task, mode: str) -> Row:
+    first = task.number * len(setting.modes)
+    return {
+        "run": first + setting.modes.index(mode),
+        "id": run_id(setting, task, mode),
+        "design": task.design,
+        "path": task.path,
+        "mode": mode,
+        **dict(zip(setting.names, task.values, strict=True)),
+        "status": FAILED,
+        "reason": "",
+        "time_reached": None,
+    }
+
+
+def _plan(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOptions]:
+    model = model_from(overlaid(dict(setting.data), setting.numbers(task.values)), setting.source)
+    options = setting.options(model)
+    _compile(model.mechanism)
+    path = model.path(task.path)
+    planned = plan_tracking(
+        model.mechanism,
+        path,
+        duration=model.duration(task.path, path) if setting.duration is None else setting.duration,
+        samples=model.study.samples if setting.samples is None else setting.samples,
+        assembly=setting.assembly or model.study.assembly,
+        orientation=model.study.orientation,
+    )
+    return planned, options
+
+
+def _simulate(
+    planned: TrackingTask, mode: str, options: IntegrationOptions, watch: Callable[[float], None] | None
+) -> TrackingRun:
+    run = simulate(planned, mode, options=options, on_progress=watch)
+    if run.solution.status == "interrupted":
+        raise Abandoned
+    return run
+
+
+def _trajectory(run: TrackingRun, options: IntegrationOptions, row: Row) -> xr.Dataset:
+    data = tracking_dataset([run], options=options)
+    # Of two runs of one design all must be equal.
+    return data.drop_vars("wall_time").assign_attrs({"run": row["run"], "id": row["id"], "design": row["design"]})
+
+
+def _check_versions(setting: Setting) -> None:
+    for name, wanted in setting.versions.items():
+        if versions()[name] != wanted:
+            raise InputError(
+                f"a worker has {name} {versions()[name]}, the sweep was begun with {wanted}", field="--cluster",
+                remedy="give workers the same installation: results must not depend on who computes them",
+            )  # fmt: skip
+
+
+def _compile(mechanism: Mechanism) -> None:
+    """Compile the kernels where whoever started this process has not: once a process and geometry."""
+    if mechanism.geometry not in _compiled:
+        with _compiling:
+            if mechanism.geometry not in _compiled:
+                compile_kernels_for(mechanism, lambda _: None)
+                _compiled.add(mechanism.geometry)
+
+
+_compiled: set[Geometry] = set()
+_compiling = threading.Lock()

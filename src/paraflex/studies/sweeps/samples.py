@@ -1,0 +1,202 @@
+"""Designs of a sweep: grids, lists, random and Sobol samples of several parameters at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+
+# More designs than this are a slip: their table alone would fill the memory.
+_MOST = 10_000_000
+GRID, LIST, RANDOM, SOBOL = "grid", "list", "random", "sobol"
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A parameter of a sweep.
+
+    Attributes
+    ----------
+    name : str
+        Of its column in the table.
+    fields : tuple of str
+        Of the mechanism's file; all are given the same number.
+    values : tuple of float, optional
+        In a list or grid.
+    low, high : float, optional
+        Its range, where it has no values of its own.
+    number : int, optional
+        Of values of a grid from low to high.
+    log : bool
+        Whether values are spaced, or spread, evenly in their logarithm.
+    whole : bool
+        Whether values are whole numbers.
+    """
+
+    name: str
+    fields: tuple[str, ...]
+    values: tuple[float, ...] | None = None
+    low: float | None = None
+    high: float | None = None
+    number: int | None = None
+    log: bool = False
+    whole: bool = False
+
+    def spread(self, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at fractions of the range, from 0 to 1."""
+        assert self.low is not None
+        assert self.high is not None
+        if self.whole:
+            return np.minimum(np.floor(self.low + fraction * (self.high - self.low + 1.0)), self.high)
+        if self.log:
+            return np.clip(np.exp(_between(math.log(self.low), math.log(self.high), fraction)), self.low, self.high)
+        return _between(self.low, self.high, fraction)
+
+    def levels(self) -> NDArray[np.float64]:
+        """Values of a grid or list, (k,)."""
+        if self.values is not None:
+            return np.array(self.values, dtype=float)
+        assert self.low is not None
+        assert self.high is not None
+        assert self.number is not None
+        if self.whole:
+            return np.unique(np.round(np.linspace(self.low, self.high, self.number)))
+        return self.spread(np.linspace(0.0, 1.0, self.number))
+
+
+def check_varied(parameter: Varied, kind: str) -> None:
+    """Nothing, if a parameter says what a kind of sampling asks for.
+
+    Raises
+    ------
+    InputError
+        What is missing, or does not fit; fields are named from the study file.
+    """
+    where = f"vary.{parameter.name}"
+    if parameter.values is not None:
+        if kind in (RANDOM, SOBOL):
+            raise InputError(
+                f"{kind} samples are taken from a range", field=f"{where}.values", value=list(parameter.values),
+                remedy="give low and high",
+            )  # fmt: skip
+        if (parameter.low, parameter.high, parameter.number) != (None, None, None):
+            raise InputError("values and a range exclude each other", field=where, remedy="leave one of them out")
+        if not parameter.values:
+            raise InputError("has no values", field=f"{where}.values", value=[], remedy="give at least one")
+        return
+    if kind == LIST:
+        raise InputError("is missing", field=f"{where}.values", remedy="give a list of numbers, one a design")
+    for side in ("low", "high"):
+        if getattr(parameter, side) is None:
+            raise InputError("is missing", field=f"{where}.{side}", remedy="give low and high, or values")
+    _check_range(parameter, where)
+    if kind == GRID and not (parameter.number is not None and parameter.number >= 1):
+        raise InputError(
+            "how many values?", field=f"{where}.number", value=parameter.number, remedy="give number, or values"
+        )
+    if kind != GRID and parameter.number is not None:
+        raise InputError(
+            "is for grids", field=f"{where}.number", value=parameter.number, remedy="give number in [sampling]"
+        )
+
+
+def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> NDArray[np.float64]:
+    """All designs, (designs, parameters).
+
+    Parameters
+    ----------
+    parameters : sequence of Varied
+        Checked; see `check_varied`. Without any there is one design, the mechanism as it is.
+    kind : str
+        "grid" (every combination, the last parameter fastest), "list" (the first of all, the second of all, ...),
+        "random" or "sobol" (scrambled).
+    number : int, optional
+        Of random or Sobol samples.
+    seed : int
+        Samples of a seed are the same everywhere; the first of many those of fewer.
+
+    Raises
+    ------
+    InputError
+        No number, too many designs, lists of different lengths.
+    """
+    _check_number(parameters, kind, number, seed)
+    if not parameters:
+        return np.zeros((1, 0))
+    if kind == GRID:
+        levels = [parameter.levels() for parameter in parameters]
+        _check_total(math.prod(level.size for level in levels), "vary")
+        return np.stack([axis.ravel() for axis in np.meshgrid(*levels, indexing="ij")], axis=1)
+    if kind == LIST:
+        return np.stack([parameter.levels() for parameter in parameters], axis=1)
+    assert number is not None
+    fractions = _fractions(kind, number, len(parameters), seed)
+    return np.stack([p.spread(column) for p, column in zip(parameters, fractions.T, strict=True)], axis=1)
+
+
+def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np.float64]:
+    generator = np.random.default_rng(seed)
+    if kind == RANDOM:
+        return generator.random((number, dimensions))
+    from scipy.stats import qmc
+
+    sequence = qmc.Sobol(dimensions, scramble=True, seed=generator)  # pyright: ignore[reportCallIssue]
+    # SciPy warns of numbers that are no powers of two: the first of more are what was asked for.
+    return sequence.random_base2(max(number - 1, 0).bit_length())[:number]
+
+
+def _between(low: float, high: float, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+    return (1.0 - fraction) * low + fraction * high
+
+
+def _check_range(parameter: Varied, where: str) -> None:
+    assert parameter.low is not None
+    assert parameter.high is not None
+    if parameter.high < parameter.low:
+        raise InputError(
+            f"below low, {parameter.low:g}", field=f"{where}.high", value=parameter.high, remedy="exchange the two"
+        )
+    if parameter.log and not parameter.low > 0.0:
+        raise InputError(
+            "a logarithmic range must be positive", field=f"{where}.low", value=parameter.low,
+            remedy='choose scale = "linear"',
+        )  # fmt: skip
+    if parameter.whole and (parameter.log or parameter.low % 1.0 or parameter.high % 1.0):
+        raise InputError(
+            "whole numbers have a linear range between two of them", field=f"{where}.whole", value=True,
+            remedy="give whole low and high",
+        )  # fmt: skip
+
+
+def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> None:
+    if seed < 0:
+        raise InputError("must not be negative", field="sampling.seed", value=seed, remedy="say 0")
+    if kind in (RANDOM, SOBOL):
+        if not parameters:
+            raise InputError("nothing varies", field="vary", remedy="add a [vary.NAME] table")
+        if number is None or number < 1:
+            raise InputError(
+                "must be positive" if number is not None else "is missing", field="sampling.number", value=number,
+                remedy="say how many designs",
+            )  # fmt: skip
+        _check_total(number, "sampling.number")
+    elif number is not None:
+        raise InputError(
+            f"a {kind} has as many designs as its values make", field="sampling.number", value=number,
+            remedy="leave it out",
+        )  # fmt: skip
+    if kind == LIST:
+        lengths = {p.name: len(p.values or ()) for p in parameters}
+        if len(set(lengths.values())) > 1:
+            told = ", ".join(f"{name}: {length}" for name, length in lengths.items())
+            raise InputError(f"lists of different lengths ({told})", field="vary", remedy="give one value a design")
+
+
+def _check_total(total: int, field: str) -> None:
+    if total > _MOST:
+        raise InputError("too many designs", field=field, value=total, remedy=f"at most {_MOST}")

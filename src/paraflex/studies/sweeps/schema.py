@@ -1,0 +1,68 @@
+"""The study file of a sweep as pydantic sees it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from paraflex.files.schema import Count, Number, Text
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class VaryTable(_Table):
+    """A parameter that varies."""
+
+    fields: list[Text] = Field(default=[], description="fields of the mechanism's file, all given the same number")
+    values: list[Any] | None = Field(default=None, description="a list of numbers")
+    low: Number | None = Field(default=None, description="the smallest value")
+    high: Number | None = Field(default=None, description="the largest value")
+    number: Count | None = Field(default=None, description="how many values of a grid from low to high")
+    scale: Literal["linear", "log"] = Field(default="linear", description='"linear" or "log"')
+    whole: Annotated[bool, Field(strict=True)] = Field(default=False, description="true for whole numbers only")
+
+
+class SamplingTable(_Table):
+    """How designs are taken from the ranges of the parameters."""
+
+    kind: Literal["grid", "list", "random", "sobol"] = Field(
+        default="grid", description='"grid", "list", "random" or "sobol"'
+    )
+    number: Count | None = Field(default=None, description="how many designs")
+    seed: Count = Field(default=0, description="a whole number from 0 on")
+
+
+class IntegrationTable(_Table):
+    """How runs are integrated; the mechanism's [study] and the program's defaults where nothing is said."""
+
+    method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
+    tolerance: Number | None = Field(default=None, description="the tolerance in m")
+    step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
+    constraints: Text | None = Field(default=None, description='"baumgarte", "projection" or "ggl"')
+    alpha: Number | None = Field(default=None, description="Baumgarte's coefficient alpha in 1/s")
+    beta: Number | None = Field(default=None, description="Baumgarte's coefficient beta in 1/s")
+    automatic_gains: Annotated[bool, Field(strict=True)] | None = Field(default=None, description="true or false")
+    max_steps: Count | None = Field(default=None, description="steps before a run is given up")
+    parameters: dict[str, Number] = Field(default={}, description="the method's own parameters")
+
+
+class SweepTable(_Table):
+    """A study file."""
+
+    name: Text = Field(default="sweep", description="a name for the study")
+    mechanism: Text = Field(description="a library mechanism or a file, seen from the study file's folder")
+    paths: list[Text] = Field(default=[], description="paths of the mechanism's file by name")
+    modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
+    duration: Number | None = Field(default=None, description="the duration in s, dwell included")
+    samples: Count | None = Field(default=None, description="the number of samples of each run")
+    assembly: Text | None = Field(default=None, description="the name of an assembly")
+    metrics: list[Text] = Field(default=[], description="names of the metrics to keep; all by default")
+    trajectories: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="true to keep every run as a netCDF file"
+    )
+    sampling: SamplingTable = SamplingTable()
+    integration: IntegrationTable = IntegrationTable()
+    vary: dict[str, VaryTable] = Field(default={}, description="a [vary.NAME] table for each parameter")

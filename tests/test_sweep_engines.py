@@ -1,0 +1,185 @@
+"""Threads, processes and Dask give the same table to the last bit; killed workers lose nothing."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pandas as pd
+import pytest
+
+from paraflex.errors import InputError
+from paraflex.studies import load_sweep, sweep
+from paraflex.studies.sweeps import LostCluster, Outcome, run_task
+
+distributed = pytest.importorskip("distributed")
+
+STUDY = """
+mechanism = "raparm_i"
+paths = ["line"]
+modes = ["++++", "+-+-"]
+duration = 0.05
+samples = 26
+
+[sampling]
+kind = "sobol"
+number = 12
+seed = 5
+
+[integration]
+method = "esdirk5"
+tolerance = 1e-3
+
+[vary.thickness]
+fields = ["section.bar.thickness"]
+low = 0.005
+high = 0.007
+scale = "log"
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    file = tmp_path_factory.mktemp("study") / "study.toml"
+    file.write_text(STUDY, encoding="utf-8")
+    return load_sweep(file)
+
+
+@pytest.fixture(scope="module")
+def table(study, tmp_path_factory):
+    """Of one thread."""
+    return sweep(study, tmp_path_factory.mktemp("one") / "out", workers=1).table.read_bytes()
+
+
+def slow(setting, task):
+    """Time enough to be killed in."""
+    time.sleep(0.3)
+    return run_task(setting, task)
+
+
+def deadly(setting, task):
+    """The third task kills whoever takes it, as running out of memory does."""
+    if task.number == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return instant(setting, task)
+
+
+def instant(setting, task):
+    rows = [{"run": 2 * task.number + k, "id": "", "status": "complete", "reason": ""} for k in range(2)]
+    return Outcome(task, rows)
+
+
+@pytest.mark.parametrize("workers", [2, 3])
+def test_threads(study, table, tmp_path, workers):
+    assert sweep(study, tmp_path / "out", workers=workers).table.read_bytes() == table
+
+
+def test_processes(study, table, tmp_path):
+    assert sweep(study, tmp_path / "out", engine="processes", workers=2).table.read_bytes() == table
+
+
+def test_a_task_that_kills_its_process_is_a_row(study, tmp_path):
+    result = sweep(study, tmp_path / "out", engine="processes", workers=2, run=deadly)
+    assert result.counts == {"complete": 22, "failed": 2}
+    data = pd.read_parquet(result.table).set_index("run")
+    assert "workers died of it" in data.loc[4, "reason"]
+    assert data.loc[3, "status"] == data.loc[6, "status"] == "complete"
+
+
+def test_dask_with_a_worker_killed_in_the_middle(study, table, tmp_path):
+    """Several worker processes; one is killed while it has a task: all rows are there, the same as ever."""
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        first = [worker.pid for worker in cluster.workers.values()]
+        killed = []
+
+        def kill_one(progress):
+            if not killed:
+                killed.append(first[0])
+                os.kill(first[0], signal.SIGKILL)
+
+        result = sweep(
+            study, tmp_path / "out", engine="dask", cluster=cluster.scheduler_address, run=slow, on_progress=kill_one
+        )
+        pids = set(distributed.Client(cluster, set_as_default=False).run(os.getpid).values())
+    assert killed
+    assert killed[0] not in pids
+    assert result.counts == {"complete": 24}
+    assert result.table.read_bytes() == table
+
+
+def test_a_cluster_that_goes_away_leaves_what_is_written(study, table, tmp_path):
+    file = tmp_path / "scheduler.json"
+    dask, quiet = [sys.executable, "-m", "dask"], {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler = [*dask, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1"]
+    processes = [subprocess.Popen([*scheduler, "--scheduler-file", str(file)], **quiet)]
+    try:
+        while not (file.exists() and file.read_text().strip().endswith("}")):
+            time.sleep(0.1)
+        address = json.loads(file.read_text())["address"]
+        processes.append(subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-dashboard"], **quiet))
+
+        def kill_scheduler(_):
+            processes[0].kill()
+
+        with pytest.raises(LostCluster, match="run the same command again"):
+            sweep(study, tmp_path / "out", engine="dask", cluster=address, on_progress=kill_scheduler)
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+    made = []
+
+    def counted(setting, task, watch=None):
+        made.append(task.number)
+        return run_task(setting, task, watch)
+
+    again = sweep(study, tmp_path / "out", run=counted)
+    assert 0 < len(made) < 12
+    assert again.table.read_bytes() == table
+
+
+def test_an_unreachable_cluster(study, tmp_path, monkeypatch):
+    from paraflex.studies.sweeps import engines
+
+    monkeypatch.setattr(engines, "_REACHED_WITHIN", 1.0)
+    with pytest.raises(InputError, match=r"--cluster: cannot be reached .*127.0.0.1:9.*; start it with dask scheduler"):
+        sweep(study, tmp_path / "out", engine="dask", cluster="tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        ({"engine": "dusk"}, "--engine: unknown engine"),
+        ({"workers": 0}, "--workers: must be positive"),
+        ({"cluster": "tcp://a:1"}, "--cluster: is for dask"),
+        ({"engine": "dask", "cluster": "tcp://a:1", "workers": 2}, "--workers: the cluster has its own"),
+        ({"limit": 0}, "--limit: must be positive"),
+    ],
+)
+def test_bad_engines_say_what_to_do(study, tmp_path, asked, says):
+    with pytest.raises(InputError, match=says):
+        sweep(study, tmp_path / "out", **asked)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl-C of a terminal as a signal")
+def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(study, tmp_path):
+    file, out = tmp_path / "study.toml", tmp_path / "out"
+    file.write_text(STUDY.replace("number = 12", "number = 4096"), encoding="utf-8")
+    command = [sys.executable, "-W", "error", "-m", "paraflex", "sweep", str(file), "--output", str(out)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        while not any(out.glob("parts/part-*.parquet")):
+            assert process.poll() is None
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGINT)
+        said, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "of 8192 runs:" in said
+    assert "the same command goes on from there" in told
+    assert "Traceback" not in told
+    assert 0 < len(pd.read_parquet(out / "parts")) < 8192
