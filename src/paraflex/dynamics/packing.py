@@ -197,6 +197,9 @@ def pack_system(
         masses=_mass_records(bodies),
         mass_shape=np.concatenate([np.zeros((3, 0)), *(_mass_rows(body) for body in bodies)], axis=1),
         mass_weights=np.concatenate([np.zeros(0), *(w for body in bodies for w in _mass_weights(body))]),
+        places=np.concatenate([_places(body).ravel() for body in bodies]),
+        spans=np.concatenate([_spans(body).ravel() for body in bodies]),
+        inertias=np.concatenate([_inertias(body).ravel() for body in bodies]),
         total_mass=float(sum(body.integrals.m for body in bodies)),
         gravity=np.array(mechanism.gravity, dtype=float),
     )
@@ -342,7 +345,7 @@ def _products(body: BodyCoordinates) -> NDArray[np.float64]:
 def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> NDArray[np.float64] | None:
     if all(body.points is None for body in bodies):
         return None
-    return np.concatenate([np.zeros(0), *(m.bending.ravel() for m in markers if m.bending is not None)])
+    return np.concatenate([np.zeros(0), *(_padded(m.bending).ravel() for m in markers if m.bending is not None)])
 
 
 def _mass_weights(body: BodyCoordinates) -> list[NDArray[np.float64]]:
@@ -350,6 +353,25 @@ def _mass_weights(body: BodyCoordinates) -> list[NDArray[np.float64]]:
     if body.points is None:
         return []
     return [row[: 1 + int(np.max(np.nonzero(row)[0], initial=-1))] for row in body.points.weights]
+
+
+def _places(body: BodyCoordinates) -> NDArray[np.float64]:
+    """Nx, Ny and N2' of all mass points by coordinate, (nf, 3 pitch)."""
+    if body.points is None:
+        return np.zeros((body.nf, 0))
+    N = body.points.N
+    return np.hstack([_padded(rows.T) for rows in (N[:, 0], N[:, 1], body.points.slope)])
+
+
+def _spans(body: BodyCoordinates) -> NDArray[np.float64]:
+    """Weights of all mass points by Gauss point, (slopes, pitch)."""
+    return np.zeros((0, 0)) if body.points is None else _padded(body.points.weights.T)
+
+
+def _inertias(body: BodyCoordinates) -> NDArray[np.float64]:
+    """Place along the beam, mass and moment of inertia of all mass points, (3, pitch)."""
+    points = body.points
+    return np.zeros((3, 0)) if points is None else _padded(np.stack([points.x, points.mass, points.inertia]))
 
 
 def _mass_rows(body: BodyCoordinates) -> NDArray[np.float64]:
@@ -392,6 +414,7 @@ def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
 def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
     values = []
     flex = square = port = effort = block = mass = dense = inverse = first = products = jac = 0
+    places = spans = inertias = 0
     for body, body_ports, body_efforts, matrix in zip(bodies, ports, efforts, columns, strict=True):
         s = body.integrals
         parts = sum(port["parts"] for port in body_ports)
@@ -419,6 +442,10 @@ def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
                 "mass": mass,
                 "mass_end": mass + masses,
                 "slopes": slopes,
+                "pitch": padded(masses),
+                "places": places,
+                "spans": spans,
+                "inertias": inertias,
                 "dense": dense,
                 "inverse": inverse,
                 "m": s.m,
@@ -436,6 +463,9 @@ def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
         block += parts * lanes
         jac += size * lanes
         mass += masses
+        places += body.nf * 3 * padded(masses)
+        spans += slopes * padded(masses)
+        inertias += 3 * padded(masses)
         dense += size**2 if slopes else 0
         inverse += size * padded(size) if slopes else 0
     return _records(BODY, values)
@@ -458,7 +488,7 @@ def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
             }
         )
         shape += marker.slope.size
-        bending += marker.slope.size**2 if bends else 0
+        bending += marker.slope.size * padded(marker.slope.size) if bends else 0
     return _records(MARKER, values)
 
 

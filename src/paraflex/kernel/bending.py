@@ -10,93 +10,98 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, NX, NY, OMEGA2, SLOPE
+from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, OMEGA2
 from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
 
-# Rows of Workspace.points: slopes at the Gauss points, their two derivatives, and the axial force carried there.
-W0, W1, W2, AXIAL = range(4)
+
+@routine
+def place_sums(p, i, vector, sums):
+    """Nx u, Ny u and slopes of all mass points of body i, of the flexible part of a system vector."""
+    body = p.bodies[i]
+    e, width = body.offset + 3, 3 * body.pitch
+    for block in range(0, width, LANES):
+        total, at = zeros(), body.places + block
+        for j in range(body.nf):
+            total = add_scaled(total, load(p.places, at), vector[e + j])
+            at += width
+        store(sums, block, total)
 
 
 @routine
 def bent_equations(p, i, q, v, a, f, points):
-    """M q'' + h + K u of body i, less its weight, into f; axial inertia forces at Gauss points into `points`."""
+    """M q'' + h + K u of body i, less its weight, into f; axial inertia forces at Gauss points into points.axial."""
     body = p.bodies[i]
-    o, n = body.offset, body.nf
+    o, n, pitch = body.offset, body.nf, body.pitch
     e = o + 3
     c, s = cos(q[o + 2]), sin(q[o + 2])
     w, dw = v[o + 2], a[o + 2]
     gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
+    place_sums(p, i, q, points.q)
+    place_sums(p, i, v, points.v)
+    place_sums(p, i, a, points.a)
+    fx, fy, lever_y, lever_x, turning = zeros(), zeros(), zeros(), zeros(), zeros()
+    for block in range(0, pitch, LANES):
+        y, slope, mass = pitch + block, 2 * pitch + block, load(p.inertias, body.inertias + pitch + block)
+        sx, vx, bx = shortened(p, i, block, points)
+        sy, vy, by = load(points.q, y), load(points.v, y), load(points.a, y)
+        relative = add_scaled(add_scaled(add_scaled(bx, sy, -dw), sx, -w * w), vy, -2.0 * w)
+        mx = add_product(add_scaled(zeros(), mass, ax), mass, relative)
+        relative = add_scaled(add_scaled(add_scaled(by, sx, dw), sy, -w * w), vx, 2.0 * w)
+        my = add_product(add_scaled(zeros(), mass, ay), mass, relative)
+        inertia = load(p.inertias, body.inertias + 2 * pitch + block)
+        turn = add_product(add_scaled(zeros(), inertia, dw), inertia, load(points.a, slope))
+        store(points.shares, block, mx)
+        store(points.shares, y, my)
+        store(points.shares, slope, turn)
+        fx, fy, turning = add_scaled(fx, mx, 1.0), add_scaled(fy, my, 1.0), add_scaled(turning, turn, 1.0)
+        lever_x, lever_y = add_product(lever_x, sx, my), add_product(lever_y, sy, mx)
     for j in range(body.slopes):
-        h = p.masses[body.mass + j].shape
-        s0, s1, s2 = 0.0, 0.0, 0.0
-        for l in range(n):
-            slope = p.mass_shape[SLOPE, h + l]
-            s0 += slope * q[e + l]
-            s1 += slope * v[e + l]
-            s2 += slope * a[e + l]
-        points[W0, j], points[W1, j], points[W2, j], points[AXIAL, j] = s0, s1, s2, 0.0
-    for l in range(n):
-        f[e + l] = p.modal[OMEGA2, body.flex + l] * q[e + l] + p.modal[DAMPING, body.flex + l] * v[e + l]
-    fx, fy, torque = 0.0, 0.0, 0.0
-    for k in range(body.mass, body.mass_end):
-        point = p.masses[k]
-        h = point.shape
-        sx, sy, vx, vy, bx, by, turn = point.x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for l in range(n):
-            Nx, Ny = p.mass_shape[NX, h + l], p.mass_shape[NY, h + l]
-            sx += Nx * q[e + l]
-            sy += Ny * q[e + l]
-            vx += Nx * v[e + l]
-            vy += Ny * v[e + l]
-            bx += Nx * a[e + l]
-            by += Ny * a[e + l]
-        for j in range(point.reach):
-            weight = p.mass_weights[point.weights + j]
-            s0, s1 = points[W0, j], points[W1, j]
-            sx -= 0.5 * weight * s0 * s0
-            vx -= weight * s0 * s1
-            bx -= weight * (s1 * s1 + s0 * points[W2, j])
-        mx = point.mass * (ax + bx - dw * sy - w * w * sx - 2.0 * w * vy)
-        my = point.mass * (ay + by + dw * sx - w * w * sy + 2.0 * w * vx)
-        if point.inertia > 0.0:
-            turn = dw
-            for l in range(n):
-                turn += p.mass_shape[SLOPE, h + l] * a[e + l]
-            turn *= point.inertia
-            for l in range(n):
-                f[e + l] += p.mass_shape[SLOPE, h + l] * turn
-        for l in range(n):
-            f[e + l] += p.mass_shape[NX, h + l] * mx + p.mass_shape[NY, h + l] * my
-        for j in range(point.reach):
-            points[AXIAL, j] += p.mass_weights[point.weights + j] * mx
-        fx += mx
-        fy += my
-        torque += sx * my - sy * mx + turn
-    for j in range(body.slopes):
-        h = p.masses[body.mass + j].shape
-        force = points[W0, j] * points[AXIAL, j]
-        for l in range(n):
-            f[e + l] -= p.mass_shape[SLOPE, h + l] * force
-    f[o] = c * fx - s * fy
-    f[o + 1] = s * fx + c * fy
-    f[o + 2] = torque
+        axial = zeros()
+        for block in range(0, pitch, LANES):
+            axial = add_product(axial, load(p.spans, body.spans + j * pitch + block), load(points.shares, block))
+        points.axial[j] = summed(axial)
+        points.shares[2 * pitch + j] -= points.q[2 * pitch + j] * points.axial[j]
+    for j in range(n):
+        total = zeros()
+        for block in range(0, 3 * pitch, LANES):
+            total = add_product(total, load(p.places, body.places + 3 * pitch * j + block), load(points.shares, block))
+        f[e + j] = p.modal[OMEGA2, body.flex + j] * q[e + j] + p.modal[DAMPING, body.flex + j] * v[e + j]
+        f[e + j] += summed(total)
+    f[o] = c * summed(fx) - s * summed(fy)
+    f[o + 1] = s * summed(fx) + c * summed(fy)
+    f[o + 2] = summed(lever_x) - summed(lever_y) + summed(turning)
+
+
+@inlined
+def shortened(p, i, block, points):
+    """Eight mass points' s_x with two derivatives in the body frame, less what bending takes, by their sums."""
+    body = p.bodies[i]
+    pitch = body.pitch
+    sx = add_scaled(load(p.inertias, body.inertias + block), load(points.q, block), 1.0)
+    vx, bx, at = load(points.v, block), load(points.a, block), body.spans + block
+    for j in range(2 * pitch, 2 * pitch + body.slopes):
+        s0, s1 = points.q[j], points.v[j]
+        weight = load(p.spans, at)
+        sx = add_scaled(sx, weight, -0.5 * s0 * s0)
+        vx = add_scaled(vx, weight, -s0 * s1)
+        bx = add_scaled(bx, weight, -s1 * s1 - s0 * points.a[j])
+        at += pitch
+    return sx, vx, bx
 
 
 @routine
 def bent_shortening(p, i, q, points):
     """Sum of m f/2 over the mass points of body i: by how much bending shifts its first moment along it."""
     body = p.bodies[i]
+    pitch, total = body.pitch, 0.0
+    place_sums(p, i, q, points.q)
     for j in range(body.slopes):
-        h = p.masses[body.mass + j].shape
-        points[W0, j] = 0.0
-        for l in range(body.nf):
-            points[W0, j] += p.mass_shape[SLOPE, h + l] * q[body.offset + 3 + l]
-    total = 0.0
-    for k in range(body.mass, body.mass_end):
-        point = p.masses[k]
-        for j in range(point.reach):
-            total += 0.5 * point.mass * p.mass_weights[point.weights + j] * points[W0, j] * points[W0, j]
+        weight = zeros()
+        for block in range(0, pitch, LANES):
+            mass = load(p.inertias, body.inertias + pitch + block)
+            weight = add_product(weight, load(p.spans, body.spans + j * pitch + block), mass)
+        total += 0.5 * summed(weight) * points.q[2 * pitch + j] * points.q[2 * pitch + j]
     return total
 
 
@@ -104,108 +109,132 @@ def bent_shortening(p, i, q, points):
 def bent_energy(p, i, q, v, points):
     """Kinetic and strain energy of body i."""
     body = p.bodies[i]
-    o, n = body.offset, body.nf
+    o, n, pitch = body.offset, body.nf, body.pitch
     e = o + 3
     c, s = cos(q[o + 2]), sin(q[o + 2])
     w = v[o + 2]
     rx, ry = c * v[o] + s * v[o + 1], c * v[o + 1] - s * v[o]
-    for j in range(body.slopes):
-        h = p.masses[body.mass + j].shape
-        s0, s1 = 0.0, 0.0
-        for l in range(n):
-            s0 += p.mass_shape[SLOPE, h + l] * q[e + l]
-            s1 += p.mass_shape[SLOPE, h + l] * v[e + l]
-        points[W0, j], points[W1, j] = s0, s1
-    kinetic, strain = 0.0, 0.0
-    for k in range(body.mass, body.mass_end):
-        point = p.masses[k]
-        h = point.shape
-        sx, sy, vx, vy, turn = point.x, 0.0, rx, ry, w
-        for l in range(n):
-            Nx, Ny = p.mass_shape[NX, h + l], p.mass_shape[NY, h + l]
-            sx += Nx * q[e + l]
-            sy += Ny * q[e + l]
-            vx += Nx * v[e + l]
-            vy += Ny * v[e + l]
-            turn += p.mass_shape[SLOPE, h + l] * v[e + l]
-        for j in range(point.reach):
-            weight = p.mass_weights[point.weights + j]
-            sx -= 0.5 * weight * points[W0, j] * points[W0, j]
-            vx -= weight * points[W0, j] * points[W1, j]
-        vx -= w * sy
-        vy += w * sx
-        kinetic += point.mass * (vx * vx + vy * vy) + point.inertia * turn * turn
+    place_sums(p, i, q, points.q)
+    place_sums(p, i, v, points.v)
+    place_sums(p, i, v, points.a)
+    # Twice the energy: of the origin's motion, of motion against it, and of the two together.
+    total, together_x, together_y, square = zeros(), zeros(), zeros(), zeros()
+    for block in range(0, pitch, LANES):
+        y, slope, at = pitch + block, 2 * pitch + block, body.inertias + block
+        mass, inertia = load(p.inertias, at + pitch), load(p.inertias, at + 2 * pitch)
+        sx, vx, _ = shortened(p, i, block, points)
+        vx, vy = add_scaled(vx, load(points.q, y), -w), add_scaled(load(points.v, y), sx, w)
+        square = add_product(add_product(zeros(), vx, vx), vy, vy)
+        total = add_product(total, mass, square)
+        together_x, together_y = add_product(together_x, mass, vx), add_product(together_y, mass, vy)
+        turn = load(points.v, slope)
+        total = add_product(total, inertia, add_product(add_scaled(zeros(), turn, 2.0 * w), turn, turn))
+        total = add_scaled(add_scaled(total, inertia, w * w), mass, rx * rx + ry * ry)
+    kinetic = summed(total) + 2.0 * (rx * summed(together_x) + ry * summed(together_y))
+    strain = 0.0
     for l in range(n):
         strain += p.modal[OMEGA2, body.flex + l] * q[e + l] * q[e + l]
     return 0.5 * kinetic, 0.5 * strain
 
 
 @routine
-def bent_mass(p, i, q, ws):
-    """Mass matrix of body i in its own frame into ws.mass, all of it: the sum of m J^T J, J = [1, E s, ds/du]."""
+def bent_mass(p, i, q, ws, points):
+    """Mass matrix of body i in its own frame into ws.mass, all of it: the sum of m J^T J, J = [1, E s, ds/du].
+
+    `points` is ws.scratch.points.
+    """
     body = p.bodies[i]
-    e, n, width, at = body.offset + 3, body.nf, 3 + body.nf, body.dense
-    for j in range(body.slopes):
-        h = p.masses[body.mass + j].shape
-        s0 = 0.0
-        for l in range(n):
-            s0 += p.mass_shape[SLOPE, h + l] * q[e + l]
-        ws.scratch.points[W0, j] = s0
+    n, width, at, pitch = body.nf, 3 + body.nf, body.dense, body.pitch
+    place_sums(p, i, q, points.q)
+    place_sums(p, i, q, points.v)
+    place_sums(p, i, q, points.a)
+    m, first_x, first_y, second = zeros(), zeros(), zeros(), zeros()
+    for block in range(0, pitch, LANES):
+        mass, inertia = (
+            load(p.inertias, body.inertias + pitch + block),
+            load(p.inertias, body.inertias + 2 * pitch + block),
+        )
+        sx, _, _ = shortened(p, i, block, points)
+        sy = load(points.q, pitch + block)
+        store(points.shares, block, sx)
+        m = add_scaled(m, mass, 1.0)
+        first_x, first_y = add_product(first_x, mass, sx), add_product(first_y, mass, sy)
+        second = add_product(second, mass, add_product(add_product(zeros(), sx, sx), sy, sy))
+        second = add_scaled(second, inertia, 1.0)
     for j in range(width * width):
         ws.mass[at + j] = 0.0
-    # Row x of a point's J; row y is (0, 1, sx, Ny).
-    row = ws.scratch.rigid
-    for k in range(body.mass, body.mass_end):
-        point = p.masses[k]
-        h = point.shape
-        sx, sy = point.x, 0.0
-        for l in range(n):
-            Nx = p.mass_shape[NX, h + l]
-            row[3 + l] = Nx
-            sx += Nx * q[e + l]
-            sy += p.mass_shape[NY, h + l] * q[e + l]
-        for j in range(point.reach):
-            force = p.mass_weights[point.weights + j] * ws.scratch.points[W0, j]
-            sx -= 0.5 * force * ws.scratch.points[W0, j]
-            g = p.masses[body.mass + j].shape
-            for l in range(n):
-                row[3 + l] -= force * p.mass_shape[SLOPE, g + l]
-        m, J = point.mass, point.inertia
-        ws.mass[at] += m
-        ws.mass[at + width + 1] += m
-        ws.mass[at + 2 * width] -= m * sy
-        ws.mass[at + 2 * width + 1] += m * sx
-        ws.mass[at + 2 * width + 2] += m * (sx * sx + sy * sy) + J
-        for l in range(n):
-            Nx, Ny, slope = row[3 + l], p.mass_shape[NY, h + l], p.mass_shape[SLOPE, h + l]
-            r = at + (3 + l) * width
-            ws.mass[r] += m * Nx
-            ws.mass[r + 1] += m * Ny
-            ws.mass[r + 2] += m * (sx * Ny - sy * Nx) + J * slope
-            for d in range(l + 1):
-                ws.mass[r + 3 + d] += (
-                    m * (Nx * row[3 + d] + Ny * p.mass_shape[NY, h + d]) + J * slope * p.mass_shape[SLOPE, h + d]
-                )
+    ws.mass[at] = ws.mass[at + width + 1] = summed(m)
+    ws.mass[at + 2 * width], ws.mass[at + 2 * width + 1] = -summed(first_y), summed(first_x)
+    ws.mass[at + 2 * width + 2] = summed(second)
+    for l in range(n):
+        bent_mass_row(p, i, l, ws.mass, points)
     for r in range(width):
         for d in range(r):
             ws.mass[at + d * width + r] = ws.mass[at + r * width + d]
 
 
 @routine
-def note_axial_forces(p, i, q, v, a, lam, ws):
-    """Geometric stiffness of body i into ws.geometric: of its inertia forces and of its joints' forces along it."""
+def bent_mass_row(p, i, l, mass, points):
+    """The row of flexible coordinate l up to its diagonal; s_x of the points is in points.shares, s_y in points.q."""
     body = p.bodies[i]
-    n, at = body.nf, body.square
+    pitch, width = body.pitch, 3 + body.nf
+    row, place = body.dense + (3 + l) * width, body.places + 3 * pitch * l
+    mx, my, lever = zeros(), zeros(), zeros()
+    for block in range(0, pitch, LANES):
+        x, y = load(p.places, place + block), load(p.places, place + pitch + block)
+        for j in range(body.slopes):
+            scale = -points.q[2 * pitch + j] * p.places[place + 2 * pitch + j]
+            x = add_scaled(x, load(p.spans, body.spans + j * pitch + block), scale)
+        m, inertia = (
+            load(p.inertias, body.inertias + pitch + block),
+            load(p.inertias, body.inertias + 2 * pitch + block),
+        )
+        store(points.rows, 2 * pitch * l + block, x)
+        m_x, m_y = add_product(zeros(), m, x), add_product(zeros(), m, y)
+        store(points.rows, 2 * pitch * l + pitch + block, m_x)
+        mx, my = add_scaled(mx, m_x, 1.0), add_scaled(my, m_y, 1.0)
+        lever = add_product(lever, load(points.shares, block), m_y)
+        against = add_product(zeros(), load(points.q, pitch + block), m_x)
+        lever = add_scaled(lever, against, -1.0)
+        lever = add_product(lever, inertia, load(p.places, place + 2 * pitch + block))
+    mass[row], mass[row + 1], mass[row + 2] = summed(mx), summed(my), summed(lever)
+    for d in range(l + 1):
+        total, other = zeros(), body.places + 3 * pitch * d
+        for block in range(0, pitch, LANES):
+            m, inertia = (
+                load(p.inertias, body.inertias + pitch + block),
+                load(p.inertias, body.inertias + 2 * pitch + block),
+            )
+            total = add_product(
+                total, load(points.rows, 2 * pitch * l + pitch + block), load(points.rows, 2 * pitch * d + block)
+            )
+            m_y = add_product(zeros(), m, load(p.places, place + pitch + block))
+            total = add_product(total, m_y, load(p.places, other + pitch + block))
+            turn = add_product(zeros(), inertia, load(p.places, place + 2 * pitch + block))
+            total = add_product(total, turn, load(p.places, other + 2 * pitch + block))
+        mass[row + 3 + d] = summed(total)
+
+
+@routine
+def note_axial_forces(p, i, q, v, a, lam, ws, points, geometric):
+    """Geometric stiffness of body i into ws.geometric: of its inertia forces and of its joints' forces along it.
+
+    `points` and `geometric` are those of ws.
+    """
+    body = p.bodies[i]
+    n, at, pitch = body.nf, body.square, body.pitch
     # Only the axial forces at the Gauss points are wanted.
-    bent_equations(p, i, q, v, a, ws.f, ws.scratch.points)
-    for j in range(n * n):
-        ws.geometric[at + j] = 0.0
-    for j in range(body.slopes):
-        h = p.masses[body.mass + j].shape
-        force = ws.scratch.points[AXIAL, j]
-        for l in range(n):
-            for d in range(n):
-                ws.geometric[at + l * n + d] -= force * p.mass_shape[SLOPE, h + l] * p.mass_shape[SLOPE, h + d]
+    bent_equations(p, i, q, v, a, ws.f, points)
+    for j in range(body.slopes, pitch):
+        points.axial[j] = 0.0
+    for l in range(n):
+        slopes = body.places + 3 * pitch * l + 2 * pitch
+        for d in range(n):
+            total, other = zeros(), body.places + 3 * pitch * d + 2 * pitch
+            for block in range(0, pitch, LANES):
+                bent = add_product(zeros(), load(p.places, slopes + block), load(p.places, other + block))
+                total = add_product(total, load(points.axial, block), bent)
+            geometric[at + l * n + d] = -summed(total)
     c, s = cos(q[body.offset + 2]), sin(q[body.offset + 2])
     for k in range(body.port, body.port_end):
         port = p.ports[k]
@@ -216,8 +245,9 @@ def note_axial_forces(p, i, q, v, a, lam, ws):
             force = port.sign * lam[port.row] * (c * ws.axes[port.axis, 0] + s * ws.axes[port.axis, 1])
         else:
             force = port.sign * (c * lam[port.row] + s * lam[port.row + 1])
-        for j in range(n * n):
-            ws.geometric[at + j] -= force * p.bending[bending + j]
+        for l in range(n):
+            for d in range(n):
+                geometric[at + l * n + d] -= force * p.bending[bending + l * body.stride + d]
 
 
 @kernel
@@ -227,7 +257,7 @@ def note_all_axial_forces(p, q, v, a, lam, ws, geometric):
         return
     for i in range(p.bodies.size):
         if p.bodies[i].slopes > 0:
-            note_axial_forces(p, i, q, v, a, lam, ws)
+            note_axial_forces(p, i, q, v, a, lam, ws, ws.scratch.points, geometric)
 
 
 @routine
@@ -257,7 +287,7 @@ def factor_bent(p, i, b, q, ws, dense):
         return False
     n, width, at = body.nf, 3 + body.nf, body.dense
     g = sqrt(b)
-    bent_mass(p, i, q, ws)
+    bent_mass(p, i, q, ws, ws.scratch.points)
     for attempt in range(2):
         for j in range(width * width):
             ws.dense[at + j] = ws.mass[at + j]

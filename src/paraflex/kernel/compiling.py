@@ -23,7 +23,7 @@ _OPTIONS: dict[str, Any] = {
 }
 
 # Without the entry from Python, which takes as long to compile as the function itself.
-_INNER_OPTIONS = {**_OPTIONS, "no_cpython_wrapper": True}
+_INNER_OPTIONS: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True}
 
 # Called from Python.
 kernel = njit(**_OPTIONS)

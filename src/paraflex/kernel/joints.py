@@ -14,6 +14,7 @@ from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPING, FRICTION, NX, NY, SLOPE, SPRING
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.sums import body_sums, clear_shares, hand_on
+from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 
 @inlined
@@ -41,7 +42,7 @@ def marker_shortening(p, bending, marker, q, v, a):
     e, n = body.offset + 3, body.nf
     if marker.bending >= 0:
         for j in range(n):
-            row = marker.bending + j * n
+            row = marker.bending + j * body.stride
             bq, bv = 0.0, 0.0
             for l in range(n):
                 bq += bending[row + l] * q[e + l]
@@ -68,16 +69,17 @@ def marker_motion(p, marker, q, v, a):
     """Position, velocity and acceleration of a marker in the ground frame, and its s there: (p, p', p'', R s)."""
     angle = q[p.bodies[marker.body].offset + 2]
     shapes = marker_shape(p, marker, q), marker_shape(p, marker, v), marker_shape(p, marker, a)
-    return point_motion(p, marker, cos(angle), sin(angle), shapes, q, v, a)
+    shortening = marker_shortening(p, p.bending, marker, q, v, a)
+    return point_motion(p, marker, cos(angle), sin(angle), shapes, shortening, q, v, a)
 
 
 @inlined
-def point_motion(p, marker, c, s, shapes, q, v, a):
-    """What `marker_motion` returns, by N u, N u' and N u'' and the cosine and sine of the body's angle."""
+def point_motion(p, marker, c, s, shapes, shortening, q, v, a):
+    """What `marker_motion` returns, by N u and its rates, halves of f and its, cosine and sine of the body's angle."""
     o = p.bodies[marker.body].offset
     w, dw = v[o + 2], a[o + 2]
     (sx, sy), (ux, uy), (bx, by) = shapes
-    f0, f1, f2 = marker_shortening(p, p.bending, marker, q, v, a)
+    f0, f1, f2 = shortening
     sx += marker.x - f0
     sy += marker.y
     ux -= f1
@@ -124,7 +126,7 @@ def shorten(p, bending, marker, q, scale, x, at):
     body = p.bodies[marker.body]
     e, n = body.offset + 3, body.nf
     for j in range(n):
-        row = marker.bending + j * n
+        row = marker.bending + j * body.stride
         total = 0.0
         for l in range(n):
             total += bending[row + l] * q[e + l]
@@ -297,7 +299,45 @@ def motion_by_sums(p, marker, q, v, a, scratch):
     x = marker.column
     y = x + 1
     shapes = (scratch.q[x], scratch.q[y]), (scratch.v[x], scratch.v[y]), (scratch.a[x], scratch.a[y])
-    return point_motion(p, marker, scratch.turn[0], scratch.turn[1], shapes, q, v, a)
+    shortening = shortening_by_products(p, p.bending, marker, q, v, a, scratch.points)
+    return point_motion(p, marker, scratch.turn[0], scratch.turn[1], shapes, shortening, q, v, a)
+
+
+@inlined
+def shortening_by_products(p, bending, marker, q, v, a, points):
+    """What `marker_shortening` returns; bending u stays in points.B_q. Both are None for linear geometry."""
+    f0, f1, f2 = 0.0, 0.0, 0.0
+    if bending is None:
+        return f0, f1, f2
+    body = p.bodies[marker.body]
+    e = body.offset + 3
+    if marker.bending >= 0:
+        for block in range(0, body.stride, LANES):
+            B_q, B_v, at = zeros(), zeros(), marker.bending + block
+            for l in range(body.nf):
+                # The matrix is symmetric.
+                column = load(bending, at)
+                B_q = add_scaled(B_q, column, q[e + l])
+                B_v = add_scaled(B_v, column, v[e + l])
+                at += body.stride
+            store(points.B_q, block, B_q)
+            store(points.B_v, block, B_v)
+        for j in range(body.nf):
+            f0 += 0.5 * q[e + j] * points.B_q[j]
+            f1 += v[e + j] * points.B_q[j]
+            f2 += a[e + j] * points.B_q[j] + v[e + j] * points.B_v[j]
+    return f0, f1, f2
+
+
+@inlined
+def shorten_by_products(p, bending, marker, scale, f, points):
+    """Add scale times the derivative of a marker's f/2 to f, just after `shortening_by_products`."""
+    if bending is None:
+        return
+    if marker.bending >= 0:
+        body = p.bodies[marker.body]
+        for j in range(body.nf):
+            f[body.offset + 3 + j] += scale * points.B_q[j]
 
 
 @inlined
@@ -324,7 +364,7 @@ def add_joints(p, i, q, v, a, lam, weights, scratch, f, rows):
             f[o + 2] += rx * fy - ry * fx
             scratch.shares[x] += bx
             scratch.shares[x + 1] += by
-            shorten(p, p.bending, marker, q, -bx, f, o + 3)
+            shorten_by_products(p, p.bending, marker, -bx, f, scratch.points)
 
 
 @inlined

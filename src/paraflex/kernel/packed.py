@@ -48,6 +48,10 @@ BODY = np.dtype(
         ("mass", np.int64),  # its mass points, of second-order geometry: mass .. mass_end, none of linear
         ("mass_end", np.int64),
         ("slopes", np.int64),  # the first so many of them are Gauss points
+        ("pitch", np.int64),  # the number of its mass points, padded
+        ("places", np.int64),  # first entry of its nf x 3 pitch matrix in `places`
+        ("spans", np.int64),  # and of its slopes x pitch matrix in `spans`
+        ("inertias", np.int64),  # and of its 3 x pitch matrix in `inertias`
         ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace
         ("inverse", np.int64),  # and of that with rows padded
         ("m", np.float64),
@@ -179,10 +183,15 @@ class PackedSystem(NamedTuple):
     columns: NDArray[np.float64]
     products: NDArray[np.float64]
     # Of second-order geometry; without it there is no `bending`, and kernels are compiled without all that needs it.
-    bending: NDArray[np.float64] | None  # nf x nf of every marker that bending moves: f = u . bending u
+    bending: NDArray[np.float64] | None  # nf x stride of every marker that bending moves: f = u . bending u
     masses: NDArray[np.void]
     mass_shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every mass point
     mass_weights: NDArray[np.float64]
+    # The same for vectors: Nx, Ny and N2' of all points by coordinate; weights of all by Gauss point; x, mass and
+    # moment of inertia.
+    places: NDArray[np.float64]
+    spans: NDArray[np.float64]
+    inertias: NDArray[np.float64]
     total_mass: float
     gravity: NDArray[np.float64]  # (2,) in the ground frame
 
@@ -193,6 +202,19 @@ class Signals(NamedTuple):
     start: NDArray[np.int64]  # first break of each signal; one more at the end
     breaks: NDArray[np.float64]
     coefficients: NDArray[np.float64]  # (breaks, 6), ascending powers of t - break; the last piece of a signal unused
+
+
+class PointScratch(NamedTuple):
+    """What the terms of one body of second-order geometry write besides, by mass point."""
+
+    q: NDArray[np.float64]  # (3 pitch,) Nx u, Ny u and slopes
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    shares: NDArray[np.float64]  # (3 pitch,) what works on each
+    axial: NDArray[np.float64]  # (pitch,) axial forces at the Gauss points
+    rows: NDArray[np.float64]  # (2 nf pitch,) ds/du: x and y of all points by coordinate
+    B_q: NDArray[np.float64]  # (stride,) a marker's bending matrix times u
+    B_v: NDArray[np.float64]
 
 
 class Scratch(NamedTuple):
@@ -208,7 +230,7 @@ class Scratch(NamedTuple):
     lanes: NDArray[np.float64]  # (most lanes,)
     rigid: NDArray[np.float64]  # (3 + max nf, padded)
     turn: NDArray[np.float64]  # (2,) cosine and sine of the body's angle
-    points: NDArray[np.float64] | None  # (4, max mass points of a body); None for linear geometry
+    points: PointScratch | None  # None for linear geometry
 
 
 class Workspace(NamedTuple):
@@ -277,7 +299,10 @@ def make_scratch(p: PackedSystem) -> Scratch:
     width, stride, lanes = (int(p.bodies[name].max(initial=0)) for name in ("width", "stride", "lanes"))
     points = None
     if p.bending is not None:
-        points = np.zeros((4, int((p.bodies["mass_end"] - p.bodies["mass"]).max(initial=0))))
+        pitch = int(p.bodies["pitch"].max(initial=0))
+        q, v, a, shares = (np.zeros(3 * pitch) for _ in range(4))
+        rows = np.zeros(2 * pitch * int(p.bodies["nf"].max(initial=0)))
+        points = PointScratch(q, v, a, shares, np.zeros(pitch), rows, np.zeros(stride), np.zeros(stride))
     q, v, a, shares = (np.zeros(width) for _ in range(4))
     G2_q, G2_v, I2_q = (np.zeros(stride) for _ in range(3))
     rigid = np.zeros(padded(3 + int(p.bodies["nf"].max(initial=0))))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from paraflex.kernel.bending import AXIAL, W0, W1, W2
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.packed import DAMPING, GJ, I1, NX, NY, OMEGA2, S2X, S2Y, SLOPE
 
-# Rows of Tangent.points: those of Workspace.points, and the changes of these.
-DW0, DW1, DW2, DAXIAL = range(4, 8)
+# Rows of Tangent.points: slopes at the Gauss points, their two derivatives, the axial force carried there; and changes
+# of these.
+W0, W1, W2, AXIAL, DW0, DW1, DW2, DAXIAL = range(8)
 
 
 @inlined

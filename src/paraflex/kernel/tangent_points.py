@@ -19,7 +19,7 @@ def shortening_tangent(p, bending, marker, q, v, a, d):
     e, n = body.offset + 3, body.nf
     if marker.bending >= 0:
         for j in range(n):
-            row = marker.bending + j * n
+            row = marker.bending + j * body.stride
             bq, b_dq, b_dv = 0.0, 0.0, 0.0
             for l in range(n):
                 bq += bending[row + l] * q[e + l]
@@ -100,7 +100,7 @@ def shorten_tangent(p, bending, marker, q, force, d_force, d):
     body = p.bodies[marker.body]
     e, n = body.offset + 3, body.nf
     for j in range(n):
-        row = marker.bending + j * n
+        row = marker.bending + j * body.stride
         for l in range(n):
             d.f[e + j] -= bending[row + l] * (d_force * q[e + l] + force * d.q[e + l])
 
