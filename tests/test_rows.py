@@ -126,8 +126,8 @@ def test_a_motor_works_through_a_singular_position():
     np.testing.assert_allclose(run.kinetic_energy, 1.5 * (1.0 + 3.0 * run.t) ** 2, rtol=1e-5)
     in_line = (np.sqrt(1.0 + 3.0 * np.pi) - 1.0) / 3.0
     missing = np.isnan(run.multipliers).any(axis=1)
-    # A step may straddle the pole; one that ends beside it is told.
-    assert missing.any() == bool(run.singular_positions)
+    # A step may straddle the pole; one that ends beside it is told, and may be shorter than the samples are apart.
+    assert run.singular_positions or not missing.any()
     np.testing.assert_allclose(run.singular_positions, in_line, rtol=0, atol=1e-3)
     assert np.all(np.abs(run.t[missing] - in_line) < 5e-3)
 

@@ -14,7 +14,7 @@ from paraflex.dynamics import (
 )
 from paraflex.dynamics.start import point_rows, static_shape
 from paraflex.dynamics.state import mass_matrix, point_position
-from paraflex.errors import InputError
+from paraflex.errors import AssemblyError, InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import library_file, load
 from paraflex.integrators import IntegrationOptions
@@ -421,3 +421,18 @@ def test_a_path_and_a_start_do_not_go_together(tmp_path):
     done = paraflex("run", "-m", str(file), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
     assert f"error: {file}: start: a path says where and how the mechanism starts; drop the [start]" in done.stderr
+
+
+def test_a_loop_is_not_closed_by_stretching_a_link_to_twice_its_length():
+    """In linear theory a beam of 0.2 m reaches from one pin to another 0.5 m away; no one means that."""
+    points = {"O": 0.0, "P": 0.2}
+    beam = FlexibleBeam("beam", 0.2, Section.rectangle(0.02, 0.004), Material(70e9, 2700.0), points=points)
+    mechanism = Mechanism(
+        name="short",
+        ground={"O": (0.0, 0.0), "P": (0.5, 0.0)},
+        bodies=(beam,),
+        joints=tuple(RevoluteJoint(k, PointRef("ground", k), PointRef("beam", k)) for k in points),
+        assemblies=(Assembly("along", {"beam": 0.0}),),
+    )
+    with pytest.raises(AssemblyError, match=r"a gap of 0\.3 remains in P"):
+        consistent_state(build_system(mechanism), mechanism.assembly())

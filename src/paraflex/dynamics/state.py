@@ -17,7 +17,7 @@ from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
 from paraflex.kernel.stage import equations
-from paraflex.mechanism import GROUND, Assembly, PointJoint
+from paraflex.mechanism import GROUND, Assembly, PointJoint, PointRef
 from paraflex.mechanism.poses import approximate_poses
 
 _MAX_ITERATIONS = 50
@@ -119,7 +119,9 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     for _ in range(_MAX_ITERATIONS):
         phi, _ = system.constraints(signals, t, q, zero)
         if np.max(np.abs(phi), initial=0.0) < CLOSED:
-            return q
+            if _keeps_shape(system, q):
+                return q
+            break
         q -= least_change(system, q, phi, stiffness=_POSITION_STIFFNESS)
     closest = _closest(system, signals, t, start)
     gaps = joint_gaps(system, system.constraints(signals, t, closest, zero)[0])
@@ -127,6 +129,20 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     raise AssemblyError(
         f"the loops do not close: a gap of {max(gaps.values()):.3g} remains in {where}", Moment(t, 0), partial=closest
     )
+
+
+def _keeps_shape(system: System, q: NDArray[np.float64]) -> bool:
+    """Whether no link is deflected by more than its own size: in linear theory any loop closes by stretching."""
+    for body in system.bodies:
+        if body.nf == 0:
+            continue
+        markers = [system.marker(PointRef(body.name, point)) for point in body.shape.points]
+        places = np.array([marker.x0 for marker in markers])
+        deflected = np.array([marker.place(q[body.flexible]) for marker in markers]) - places
+        size = np.max(np.linalg.norm(places - places[:1], axis=1), initial=0.0)
+        if size > 0.0 and np.max(np.linalg.norm(deflected, axis=1)) > size:
+            return False
+    return True
 
 
 def _closest(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
