@@ -14,20 +14,25 @@ from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, OMEGA2
 from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
 
 
-@routine
-def place_sums(p, i, vector, sums):
-    """Nx u, Ny u and slopes of all mass points of body i, of the flexible part of a system vector."""
+@inlined
+def place_sums(p, i, q, v, a, points):
+    """Nx u, Ny u and slopes of all mass points of body i, and the same of u' and u''."""
     body = p.bodies[i]
     e, width = body.offset + 3, 3 * body.pitch
     for block in range(0, width, LANES):
-        total, at = zeros(), body.places + block
+        of_q, of_v, of_a, at = zeros(), zeros(), zeros(), body.places + block
         for j in range(body.nf):
-            total = add_scaled(total, load(p.places, at), vector[e + j])
+            column = load(p.places, at)
+            of_q = add_scaled(of_q, column, q[e + j])
+            of_v = add_scaled(of_v, column, v[e + j])
+            of_a = add_scaled(of_a, column, a[e + j])
             at += width
-        store(sums, block, total)
+        store(points.q, block, of_q)
+        store(points.v, block, of_v)
+        store(points.a, block, of_a)
 
 
-@routine
+@inlined
 def bent_equations(p, i, q, v, a, f, points):
     """M q'' + h + K u of body i, less its weight, into f; axial inertia forces at Gauss points into points.axial."""
     body = p.bodies[i]
@@ -37,9 +42,7 @@ def bent_equations(p, i, q, v, a, f, points):
     w, dw = v[o + 2], a[o + 2]
     gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
-    place_sums(p, i, q, points.q)
-    place_sums(p, i, v, points.v)
-    place_sums(p, i, a, points.a)
+    place_sums(p, i, q, v, a, points)
     fx, fy, lever_y, lever_x, turning = zeros(), zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
         y, slope, mass = pitch + block, 2 * pitch + block, load(p.inertias, body.inertias + pitch + block)
@@ -95,7 +98,7 @@ def bent_shortening(p, i, q, points):
     """Sum of m f/2 over the mass points of body i: by how much bending shifts its first moment along it."""
     body = p.bodies[i]
     pitch, total = body.pitch, 0.0
-    place_sums(p, i, q, points.q)
+    place_sums(p, i, q, q, q, points)
     for j in range(body.slopes):
         weight = zeros()
         for block in range(0, pitch, LANES):
@@ -105,7 +108,7 @@ def bent_shortening(p, i, q, points):
     return total
 
 
-@routine
+@inlined
 def bent_energy(p, i, q, v, points):
     """Kinetic and strain energy of body i."""
     body = p.bodies[i]
@@ -114,9 +117,7 @@ def bent_energy(p, i, q, v, points):
     c, s = cos(q[o + 2]), sin(q[o + 2])
     w = v[o + 2]
     rx, ry = c * v[o] + s * v[o + 1], c * v[o + 1] - s * v[o]
-    place_sums(p, i, q, points.q)
-    place_sums(p, i, v, points.v)
-    place_sums(p, i, v, points.a)
+    place_sums(p, i, q, v, v, points)
     # Twice the energy: of the origin's motion, of motion against it, and of the two together.
     total, together_x, together_y, square = zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
@@ -145,9 +146,7 @@ def bent_mass(p, i, q, ws, points):
     """
     body = p.bodies[i]
     n, width, at, pitch = body.nf, 3 + body.nf, body.dense, body.pitch
-    place_sums(p, i, q, points.q)
-    place_sums(p, i, q, points.v)
-    place_sums(p, i, q, points.a)
+    place_sums(p, i, q, q, q, points)
     m, first_x, first_y, second = zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
         mass, inertia = (
@@ -173,7 +172,7 @@ def bent_mass(p, i, q, ws, points):
             ws.mass[at + d * width + r] = ws.mass[at + r * width + d]
 
 
-@routine
+@inlined
 def bent_mass_row(p, i, l, mass, points):
     """The row of flexible coordinate l up to its diagonal; s_x of the points is in points.shares, s_y in points.q."""
     body = p.bodies[i]
