@@ -100,8 +100,8 @@ def call_checks(count, p, signals, t, q, v, ws):
     """Energy and constraints of an accepted step."""
     total = 0.0
     for _ in range(count):
-        constraint_values(p, signals, t, q, v, ws.rows, ws.mu)
-        kinetic, strain = system_energy(p, q, v, ws.points)
+        constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
+        kinetic, strain = system_energy(p, q, v, ws.scratch)
         total += kinetic + strain
     return total
 

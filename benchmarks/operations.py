@@ -48,8 +48,8 @@ def _port(p: PackedSystem, port: np.void, n: int) -> int:
         return 8 * n + 6
     bent = 0
     if p.bending is not None and p.markers[port["marker"]]["bending"] >= 0:
-        # f, f' and f'' from B u and B u'; then B u once more, in the force.
-        bent = 4 * n**2 + 9 * n + 2 * n**2 + 2 * n
+        # f, f' and f'' from B u and B u'; the force works on B u.
+        bent = 4 * n**2 + 9 * n + 2 * n
     return 12 * n + 46 + 12 + 4 * n + 12 + bent
 
 

@@ -1,4 +1,7 @@
-"""Kernels run as Python on numbers that count: what floating-point operations their own source asks for."""
+"""Kernels run as Python on numbers that count: what floating-point operations their own source asks for.
+
+Of vectors only what is done with entries that are not zero counts: they are padded with zeros.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import math
 import types
 
 import numpy as np
+
+from paraflex.kernel import vectors
 
 
 class Counted(float):
@@ -55,6 +60,30 @@ class Array:
         self.values[index] = value
 
 
+def _add_product(total, a, b):
+    Counted.operations += np.count_nonzero(a * b) + np.count_nonzero((total != 0.0) & (a * b != 0.0))
+    return total + a * b
+
+
+def _store(array, index, vector):
+    array.values[index : index + vectors.LANES] = vector
+
+
+def _summed(vector):
+    Counted.operations += max(np.count_nonzero(vector) - 1, 0)
+    return Counted(vector.sum())
+
+
+_VECTORS = {
+    vectors.zeros: lambda: np.zeros(vectors.LANES),
+    vectors.load: lambda array, index: array.values[index : index + vectors.LANES].copy(),
+    vectors.store: _store,
+    vectors.add_scaled: lambda total, vector, scale: _add_product(total, vector, float(scale)),
+    vectors.add_product: _add_product,
+    vectors.summed: _summed,
+}
+
+
 def _number(value):
     return Counted(value) if isinstance(value, np.floating) else int(value)
 
@@ -86,4 +115,6 @@ def _as_python(kernel, known):
                 names[name] = _as_python(value, known)
             elif value in (math.sin, math.cos, math.sqrt):
                 names[name] = _counted(value)
+            elif callable(value) and value in _VECTORS:
+                names[name] = _VECTORS[value]
     return known[kernel]

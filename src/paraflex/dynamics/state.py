@@ -134,9 +134,9 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
 def _keeps_shape(system: System, q: NDArray[np.float64]) -> bool:
     """Whether no link is deflected by more than its own size: in linear theory any loop closes by stretching."""
     for body in system.bodies:
-        if body.nf == 0:
+        markers = [system.marker(PointRef(body.name, point)) for point in system.mechanism.points[body.name]]
+        if body.nf == 0 or not markers:
             continue
-        markers = [system.marker(PointRef(body.name, point)) for point in body.shape.points]
         places = np.array([marker.x0 for marker in markers])
         deflected = np.array([marker.place(q[body.flexible]) for marker in markers]) - places
         size = np.max(np.linalg.norm(places - places[:1], axis=1), initial=0.0)

@@ -115,7 +115,7 @@ def add_weights(p, q, points):
     return total
 
 
-@inlined
+@kernel
 def body_energy(p, i, q, v, scratch):
     """Kinetic and strain energy of body i."""
     body = p.bodies[i]

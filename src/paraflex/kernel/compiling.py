@@ -25,12 +25,14 @@ _OPTIONS: dict[str, Any] = {
 # Without the entry from Python, which takes as long to compile as the function itself.
 _INNER_OPTIONS: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True}
 
+_COUNTING_OPTIONS: dict[str, Any] = {**_OPTIONS, "_nrt": True}
+
 # Called from Python.
 kernel = njit(**_OPTIONS)
 # And makes arrays of its own: not for the time loop.
-allocating = njit(**{**_OPTIONS, "_nrt": True})
+allocating = njit(**_COUNTING_OPTIONS)
 # Called from kernels only: called from Python it would crash the process.
 routine = njit(**_INNER_OPTIONS)
 # For what is called once a body in a hot loop: passing the packed system, some seventy machine words, costs as much
 # as the arithmetic. Not for more, because every copy is compiled again.
-inlined = njit(forceinline=True, **_OPTIONS)
+inlined = njit(forceinline=True, **_INNER_OPTIONS)
