@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import ActuationError, Moment, SingularActuationError
+from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
 from paraflex.kinematics import RigidMotion
@@ -48,7 +49,7 @@ class Effort:
 def required_effort(motion: RigidMotion) -> Effort:
     """Effort and actuation matrix of a rigid motion, under gravity, loads, springs, dampers and friction."""
     system = motion.system
-    forces = np.zeros_like(motion.q)
+    forces = apart(motion.q.shape)
     motion_forces(system.packed, motion.q, motion.v, motion.a, forces, make_scratch(system.packed))
     _add_springs_and_dampers(motion, forces)
     transposed = np.swapaxes(motion.basis, 1, 2)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics import State, System
 from paraflex.errors import InputError
 from paraflex.integrators.stretches import jump_times
+from paraflex.kernel.arrays import apart
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import Samples
 
@@ -147,12 +148,8 @@ def make_problem(system: System, signals: Signals, initial: State, times: Array,
 
 def empty_samples(times: Array, system: System) -> Samples:
     """Samples to be filled."""
-    k = times.size
-    return Samples(
-        times=times,
-        q=np.full((k, system.n), np.nan),
-        v=np.full((k, system.n), np.nan),
-        a=np.full((k, system.n), np.nan),
-        lam=np.full((k, system.m), np.nan),
-        energy=np.full((k, 3), np.nan),
-    )
+    widths = {"q": system.n, "v": system.n, "a": system.n, "lam": system.m, "energy": 3}
+    arrays = {name: apart((times.size, width)) for name, width in widths.items()}
+    for array in arrays.values():
+        array.fill(np.nan)
+    return Samples(times=times, **arrays)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from paraflex.kernel.arrays import copy, fill, largest
+from paraflex.kernel.arrays import copy, fill, largest, matrix_apart, vector_apart
 from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.compiling import allocating, routine
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
@@ -32,7 +30,7 @@ CLOSED, NO_CONVERGENCE, TOO_COARSE, SINGULAR = range(4)
 @allocating
 def task_values(p, marker, coordinates, q, v, a):
     """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker: (3, tasks)."""
-    out = np.empty((3, coordinates.size))
+    out = matrix_apart(3, coordinates.size)
     px, py, vx, vy, ax, ay, _, _ = marker_motion(p, marker, q, v, a)
     for i in range(coordinates.size):
         if coordinates[i] == 0:
@@ -106,13 +104,13 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
     """
     n, m, tasks = q.shape[1], p.rows.size, coordinates.size
     marker = p.markers[marker_index]
-    jacobian = np.zeros((n, n))
-    single, zero, guess = np.zeros((n, 1)), np.zeros(n), np.zeros(n)
-    phi, dphi, lam = np.zeros(m), np.zeros(m), np.zeros(m)
+    jacobian = matrix_apart(n, n)
+    single, zero, guess = matrix_apart(n, 1), vector_apart(n), vector_apart(n)
+    phi, dphi, lam = vector_apart(m), vector_apart(m), vector_apart(m)
     # Motors do not matter here, but those along an axis read their force.
-    unused, idle = np.zeros(n), np.zeros(signals.start.size)
-    right = np.zeros((n, 1 + tasks))
-    before, change = np.zeros((n, n)), np.zeros((n, n))
+    unused, idle = vector_apart(n), vector_apart(signals.start.size)
+    right = matrix_apart(n, 1 + tasks)
+    before, change = matrix_apart(n, n), matrix_apart(n, n)
     for k in range(times.size):
         t = times[k]
         if k > 0:

@@ -43,9 +43,11 @@ def solve_dense(matrix, right):
                 for j in range(columns):
                     right[r, j] -= factor * right[i, j]
     for i in range(n - 1, -1, -1):
+        for r in range(i + 1, n):
+            factor = matrix[i, r]
+            if factor != 0.0:
+                for j in range(columns):
+                    right[i, j] -= factor * right[r, j]
         for j in range(columns):
-            total = right[i, j]
-            for r in range(i + 1, n):
-                total -= matrix[i, r] * right[r, j]
-            right[i, j] = total / matrix[i, i]
+            right[i, j] /= matrix[i, i]
     return smallest / largest

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.kernel.arrays import apart
 from paraflex.kernel.vectors import padded
 
 # Rows of PackedSystem.modal.
@@ -270,27 +271,29 @@ def make_workspace(p: PackedSystem) -> Workspace:
     inverse = int(sum((3 + body["nf"]) * padded(3 + body["nf"]) for body in bent))
     lanes = int(sum((3 + body["nf"]) * body["lanes"] for body in p.bodies))
     envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(p.rows)))
+    compliance = apart(m)
+    compliance[:] = p.rows["compliance"]
     return Workspace(
-        f=np.zeros(n),
-        x=np.zeros(n),
-        rows=np.zeros(m),
-        mu=np.zeros(m),
-        q=np.zeros(n),
-        v=np.zeros(n),
+        f=apart(n),
+        x=apart(n),
+        rows=apart(m),
+        mu=apart(m),
+        q=apart(n),
+        v=apart(n),
         scratch=make_scratch(p),
-        step=np.zeros(1),
-        axes=np.zeros((p.axes.size, 4)),
-        compliance=p.rows["compliance"].copy(),
-        frame=np.zeros((p.bodies.size, 12)),
-        flex=np.zeros((2, p.modal.shape[1])),
-        jac=np.zeros(lanes),
-        response=np.zeros(lanes),
-        blocks=np.zeros(int(np.sum(p.bodies["parts"] * p.bodies["lanes"]))),
-        schur=np.zeros(envelope),
-        mass=None if p.bending is None else np.zeros(dense),
-        dense=None if p.bending is None else np.zeros(dense),
-        inverse=None if p.bending is None else np.zeros(inverse),
-        geometric=None if p.bending is None else np.zeros(p.I2.size),
+        step=apart(1),
+        axes=apart((p.axes.size, 4)),
+        compliance=compliance,
+        frame=apart((p.bodies.size, 12)),
+        flex=apart((2, p.modal.shape[1])),
+        jac=apart(lanes),
+        response=apart(lanes),
+        blocks=apart(int(np.sum(p.bodies["parts"] * p.bodies["lanes"]))),
+        schur=apart(envelope),
+        mass=None if p.bending is None else apart(dense),
+        dense=None if p.bending is None else apart(dense),
+        inverse=None if p.bending is None else apart(inverse),
+        geometric=None if p.bending is None else apart(p.I2.size),
     )
 
 
@@ -300,10 +303,10 @@ def make_scratch(p: PackedSystem) -> Scratch:
     points = None
     if p.bending is not None:
         pitch = int(p.bodies["pitch"].max(initial=0))
-        q, v, a, shares = (np.zeros(3 * pitch) for _ in range(4))
-        rows = np.zeros(2 * pitch * int(p.bodies["nf"].max(initial=0)))
-        points = PointScratch(q, v, a, shares, np.zeros(pitch), rows, np.zeros(stride), np.zeros(stride))
-    q, v, a, shares = (np.zeros(width) for _ in range(4))
-    G2_q, G2_v, I2_q = (np.zeros(stride) for _ in range(3))
-    rigid = np.zeros(padded(3 + int(p.bodies["nf"].max(initial=0))))
-    return Scratch(q, v, a, shares, G2_q, G2_v, I2_q, np.zeros(lanes), rigid, np.zeros(2), points)
+        q, v, a, shares = (apart(3 * pitch) for _ in range(4))
+        rows = apart(2 * pitch * int(p.bodies["nf"].max(initial=0)))
+        points = PointScratch(q, v, a, shares, apart(pitch), rows, apart(stride), apart(stride))
+    q, v, a, shares = (apart(width) for _ in range(4))
+    G2_q, G2_v, I2_q = (apart(stride) for _ in range(3))
+    rigid = apart(padded(3 + int(p.bodies["nf"].max(initial=0))))
+    return Scratch(q, v, a, shares, G2_q, G2_v, I2_q, apart(lanes), rigid, apart(2), points)

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.kernel.arrays import apart
+
 # Singular positions kept of a run.
 MOST_PASSAGES = 1000
 # Why `march` returned.
@@ -100,27 +102,27 @@ class Samples(NamedTuple):
 
 def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGARTE) -> March:
     """Allocate the state of a run with n coordinates and m constraint rows."""
-    stage_v = np.zeros((stages, n))
+    stage_v = apart((stages, n))
     return March(
-        clock=np.zeros(12),
-        counts=np.zeros(9, dtype=np.int64),
-        q=np.zeros(n),
-        v=np.zeros(n),
-        stage_t=np.zeros((2, stages)),
-        stage_q=np.zeros((stages, n)),
+        clock=apart(12),
+        counts=apart(9, np.int64),
+        q=apart(n),
+        v=apart(n),
+        stage_t=apart((2, stages)),
+        stage_q=apart((stages, n)),
         stage_v=stage_v,
-        stage_d=np.zeros((stages, n)) if treatment == GGL else stage_v,
-        shift=np.zeros(n if treatment == GGL else 0),
-        stage_a=np.zeros((2, stages, n)),
-        stage_lam=np.zeros((stages, m)),
-        power=np.zeros(stages),
-        qs=np.zeros(n),
-        vs=np.zeros(n),
-        eq=np.zeros(n),
-        ev=np.zeros(n),
-        torques=np.zeros(motors),
-        algorithmic=np.zeros((2, n)),
-        passages=np.zeros((2, MOST_PASSAGES)),
-        guess_t=np.zeros(3),
-        guess_s=np.zeros((3, 2), dtype=np.int64),
+        stage_d=apart((stages, n)) if treatment == GGL else stage_v,
+        shift=apart(n if treatment == GGL else 0),
+        stage_a=apart((2, stages, n)),
+        stage_lam=apart((stages, m)),
+        power=apart(stages),
+        qs=apart(n),
+        vs=apart(n),
+        eq=apart(n),
+        ev=apart(n),
+        torques=apart(motors),
+        algorithmic=apart((2, n)),
+        passages=apart((2, MOST_PASSAGES)),
+        guess_t=apart(3),
+        guess_s=apart((3, 2), np.int64),
     )

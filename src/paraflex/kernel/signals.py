@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from paraflex.kernel.arrays import matrix_apart
 from paraflex.kernel.compiling import allocating, kernel
 
 
@@ -30,7 +29,7 @@ def evaluate_signal(s, k, t):
 def sample_signals(s, times):
     """Values of all signals at all times: (times, signals)."""
     n = s.start.size - 1
-    out = np.empty((times.size, n))
+    out = matrix_apart(times.size, n)
     for i in range(times.size):
         for k in range(n):
             out[i, k] = evaluate_signal(s, k, times[i])[0]

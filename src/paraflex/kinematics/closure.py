@@ -17,6 +17,7 @@ from paraflex.dynamics import (
     reference_pose,
 )
 from paraflex.errors import InputError, Moment, UnreachablePathError
+from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, SINGULAR, close_path, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals, make_scratch
 from paraflex.kinematics.paths import Path, PathMotion
@@ -208,8 +209,8 @@ class _Closure:
     def run(self, times: NDArray[np.float64], target: NDArray[np.float64], pose: NDArray[np.float64]):
         """Closure along targets; status, index, residual, and what was computed."""
         k, n = times.size, self.system.n
-        q, v, a = np.zeros((3, k, n))
-        basis = np.zeros((k, n, self.coordinates.size))
+        q, v, a = apart((3, k, n))
+        basis = apart((k, n, self.coordinates.size))
         q[0] = pose
         status, index, residual = close_path(
             self.packed,
