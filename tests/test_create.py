@@ -1,6 +1,7 @@
 """A newcomer's way: a file to start from, edited, checked, run; and the schema editors check it by."""
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -37,7 +38,10 @@ def test_the_page_for_newcomers_tells_what_happens(tmp_path):
     assert "10.4 and 20.1 Hz" in page
     done = paraflex("run", "--mechanism", "my_fivebar.toml", "--json", "--out", "results", cwd=tmp_path)
     error = json.loads(done.stdout)["modes"]["++"]["tracking_rms"]
-    assert f"by {1e3 * error:.3f} mm" in page.replace("\n", " ")
+    told = re.search(r"by (0\.\d{3}) mm", page.replace("\n", " "))
+    assert told is not None
+    # The run is within its tolerance of 0.1 mm, not to the last digit on any machine.
+    assert 1e3 * error == pytest.approx(float(told[1]), abs=2e-3)
     file.write_text(file.read_text().replace("base = 0.100 ", "base = 0.600 "))
     info = paraflex("info", "my_fivebar.toml", cwd=tmp_path).stdout
     complaint = next(line for line in info.splitlines() if line.startswith("not sound"))
