@@ -1,6 +1,6 @@
 """Do all methods find the same motion? RAParM-I, ++++, all 104 coordinates, each at tight settings.
 
-    python benchmarks/agreement.py [METHOD ...] [--json]
+    python benchmarks/agreement.py [METHOD ...]
 
 The largest distance of the end-effector's path from a converged one, found by ESDIRK 5(4) and held against ESDIRK 4(3).
 Takes about ten minutes, most of them for Newmark of order 1 and the explicit methods.
@@ -8,11 +8,11 @@ Takes about ten minutes, most of them for Newmark of order 1 and the explicit me
 
 from __future__ import annotations
 
-import json
 import sys
 import warnings
 
 import numpy as np
+from common import single_thread, write_json
 from numpy.typing import NDArray
 
 import paraflex as pf
@@ -42,6 +42,7 @@ SETTINGS = {
 
 
 def main() -> None:
+    single_thread()
     model = pf.load("raparm_i")
     case = tracking_case(pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7), "++++")
 
@@ -52,11 +53,12 @@ def main() -> None:
     def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
         return float(np.max(np.linalg.norm(a - b, axis=-1)))
 
-    chosen = [name for name in sys.argv[1:] if not name.startswith("-")] or list(SETTINGS)
+    chosen = sys.argv[1:] or list(SETTINGS)
     warnings.simplefilter("ignore", StiffnessWarning)
     converged, _ = run(method="esdirk5", tolerance=1e-8)
     check, _ = run(method="esdirk4", tolerance=1e-8)
-    print(f"converged path, two methods apart {distance(converged, check):.1e} m")
+    apart = distance(converged, check)
+    print(f"converged path, two methods apart {apart:.1e} m")
     print(f"{'method':>20} {'tolerance':>10} {'distance':>9} {'energy':>9} {'steps':>8} {'time':>9}")
     rows = []
     for name in chosen:
@@ -79,8 +81,7 @@ def main() -> None:
     missing = sorted(set(METHODS) - {name.split(",")[0] for name in chosen})
     if missing:
         print(f"not run: {', '.join(missing)}")
-    if "--json" in sys.argv:
-        print(json.dumps(rows, indent=2))
+    write_json("agreement", {"apart": apart, "methods": rows})
 
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ import pytest
 
 import paraflex as pf
 from counting import operations_of
-from paraflex.kernel.linear import mass_norm, solve_system
+from paraflex.kernel.linear import solve_system
+from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.stage import equations
 from paraflex.mechanism import Geometry, RigidBody, proportional_segments
 

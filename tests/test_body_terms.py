@@ -9,7 +9,9 @@ import twins
 from conftest import make_linkage
 from paraflex.dynamics import build_system
 from paraflex.kernel.bodies import body_energy, body_terms, system_energy
-from paraflex.kernel.linear import factor_bodies, factor_system, mass_norm, orient, solve_system
+from paraflex.kernel.factor import factor_bodies
+from paraflex.kernel.linear import factor_system, orient, solve_system
+from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.packed import OMEGA2, make_scratch
 from paraflex.kernel.stage import equations
 from paraflex.mechanism import (

@@ -14,7 +14,8 @@ from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import body_terms, system_energy
 from paraflex.kernel.joints import body_joints, start_rows
-from paraflex.kernel.linear import factor_system, mass_norm, solve_system
+from paraflex.kernel.linear import factor_system, solve_system
+from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.packed import INDEX_1, OMEGA2, make_scratch
 from paraflex.mechanism import (
     Assembly,

@@ -1,24 +1,19 @@
-"""A system's joints, motors and bodies as the records the kernels read; which row is which joint's."""
+"""A system's constraints, motors and bodies as the records the kernels read; which row is which joint's."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
 
+from paraflex.dynamics.constraints import Constraint, axis_of
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
 from paraflex.kernel.packed import (
-    ANGLE,
     AXIS,
     AXIS_RECORD,
     BODY,
-    CONSTRAINT,
-    DAMPER,
     EFFORT,
-    FRICTION,
     LINE,
     LOAD,
     MARKER,
@@ -26,7 +21,6 @@ from paraflex.kernel.packed import (
     POINT,
     PORT,
     ROW,
-    SPRING,
     TRACK,
     PackedSystem,
 )
@@ -38,118 +32,8 @@ from paraflex.mechanism import (
     Load,
     Mechanism,
     PointForce,
-    PointJoint,
     PointRef,
-    PrismaticJoint,
-    SlidingJoint,
-    WeldJoint,
 )
-
-
-@dataclass(frozen=True)
-class Constraint:
-    """A joint or part of one, a prescribed motion, a spring, damper or friction before packing.
-
-    A spring is a compliant constraint: value - rest = compliance * multiplier; so is a damper, of the value's rate.
-
-    Attributes
-    ----------
-    name : str
-    kind : int
-        Of its ports: POINT, ANGLE or AXIS.
-    a, b : PointRef
-    labels : tuple of str
-        One a row.
-    signal : int
-        Where it is driven in time, else -1.
-    row : int
-        Kind of its rows: CONSTRAINT, SPRING, DAMPER or FRICTION.
-    compliance, limit : float
-    rest : float
-        What the value is compared with: of a spring at rest, of an angle held.
-    direction : float
-        Of an axis against body a [rad].
-    carrier : str
-        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
-        origin on.
-    """
-
-    name: str
-    kind: int
-    a: PointRef
-    b: PointRef
-    labels: tuple[str, ...]
-    signal: int = -1
-    row: int = CONSTRAINT
-    compliance: float = 0.0
-    limit: float = 0.0
-    rest: float = 0.0
-    direction: float = 0.0
-    carrier: str = "material"
-
-
-def _joint_constraints(joint: Joint) -> list[Constraint]:
-    """What a joint holds."""
-    name, a, b = joint.name, joint.a, joint.b
-    parts = []
-    if isinstance(joint, PointJoint):
-        parts.append(Constraint(name, POINT, a, b, (f"{name} x", f"{name} y")))
-    if isinstance(joint, AxisJoint):
-        normal, carrier = joint.direction + 0.5 * np.pi, "track" if isinstance(joint, SlidingJoint) else "material"
-        parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier))
-    if isinstance(joint, PrismaticJoint | WeldJoint):
-        parts.append(Constraint(name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
-    return parts
-
-
-def _axis_of(joint: AxisJoint) -> dict[str, Any]:
-    """Direction and carrier of the axis that a joint's travel is measured on."""
-    return {"direction": joint.direction, "carrier": "frame" if isinstance(joint, SlidingJoint) else "material"}
-
-
-def _along(joint: Joint, name: str, **keywords) -> Constraint:
-    """A compliant or driven row of a joint's coordinate."""
-    if isinstance(joint, AxisJoint):
-        keywords |= _axis_of(joint)
-        return Constraint(name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
-    return Constraint(name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
-
-
-def _constraints(mechanism: Mechanism) -> list[Constraint]:
-    constraints = [part for joint in mechanism.joints for part in _joint_constraints(joint)]
-    # Signals are the motors' torques first, then the prescribed motions.
-    for k, prescribed in enumerate(mechanism.prescribed):
-        joint = mechanism.joint(prescribed.joint)
-        constraints.append(_along(joint, prescribed.name, signal=len(mechanism.motors) + k))
-    for spring in mechanism.springs:
-        joint = mechanism.joint(spring.joint)
-        constraints.append(_along(joint, spring.name, row=SPRING, compliance=1.0 / spring.stiffness, rest=spring.rest))
-    for damper in mechanism.dampers:
-        joint = mechanism.joint(damper.joint)
-        constraints.append(_along(joint, damper.name, row=DAMPER, compliance=1.0 / damper.coefficient))
-    for friction in mechanism.frictions:
-        joint = mechanism.joint(friction.joint)
-        slope = friction.limit / friction.speed
-        constraints.append(_along(joint, friction.name, row=FRICTION, compliance=1.0 / slope, limit=friction.limit))
-    return constraints
-
-
-def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
-    """Constraints in an order that keeps the envelope of the Schur complement small (reverse Cuthill-McKee)."""
-    constraints = _constraints(mechanism)
-    if not constraints:
-        return []
-    touched = [
-        (i, index[ref.body])
-        for i, constraint in enumerate(constraints)
-        for ref in (constraint.a, constraint.b)
-        if not ref.on_ground
-    ]
-    rows, columns = zip(*touched, strict=True)
-    incidence = scipy.sparse.csr_matrix((np.ones(len(touched)), (rows, columns)), (len(constraints), len(index)))
-    graph = scipy.sparse.csr_matrix(incidence @ incidence.T)
-    order = scipy.sparse.csgraph.reverse_cuthill_mckee(graph, symmetric_mode=True)
-    return [constraints[i] for i in order]
 
 
 def pack_system(
@@ -287,7 +171,7 @@ class _Packer:
 
     def add_motor(self, joint: Joint, signal: int) -> None:
         if isinstance(joint, AxisJoint):
-            self.add_axis(joint.a, joint.b, signal=signal, **_axis_of(joint))
+            self.add_axis(joint.a, joint.b, signal=signal, **axis_of(joint))
             return
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
             if not ref.on_ground:

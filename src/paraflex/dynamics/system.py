@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.dynamics.constraints import row_order
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
-from paraflex.dynamics.packing import pack_system, row_order
+from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.mechanism import Mechanism, PointRef

@@ -11,25 +11,15 @@ from math import cos, sin, sqrt
 
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, OMEGA2
-from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
+from paraflex.kernel.sums import column_sums, row_product
+from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, padded, store, summed, zeros
 
 
 @inlined
 def place_sums(p, i, q, v, a, points):
     """Nx u, Ny u and slopes of all mass points of body i, and the same of u' and u''."""
     body = p.bodies[i]
-    e, width = body.offset + 3, 3 * body.pitch
-    for block in range(0, width, LANES):
-        of_q, of_v, of_a, at = zeros(), zeros(), zeros(), body.places + block
-        for j in range(body.nf):
-            column = load(p.places, at)
-            of_q = add_scaled(of_q, column, q[e + j])
-            of_v = add_scaled(of_v, column, v[e + j])
-            of_a = add_scaled(of_a, column, a[e + j])
-            at += width
-        store(points.q, block, of_q)
-        store(points.v, block, of_v)
-        store(points.a, block, of_a)
+    column_sums(p.places, body.places, 3 * body.pitch, body.nf, body.offset + 3, q, v, a, points)
 
 
 @inlined
@@ -60,17 +50,11 @@ def bent_equations(p, i, q, v, a, f, points):
         fx, fy, turning = add_scaled(fx, mx, 1.0), add_scaled(fy, my, 1.0), add_scaled(turning, turn, 1.0)
         lever_x, lever_y = add_product(lever_x, sx, my), add_product(lever_y, sy, mx)
     for j in range(body.slopes):
-        axial = zeros()
-        for block in range(0, pitch, LANES):
-            axial = add_product(axial, load(p.spans, body.spans + j * pitch + block), load(points.shares, block))
-        points.axial[j] = summed(axial)
+        points.axial[j] = row_product(p.spans, body.spans + j * pitch, pitch, points.shares)
         points.shares[2 * pitch + j] -= points.q[2 * pitch + j] * points.axial[j]
     for j in range(n):
-        total = zeros()
-        for block in range(0, 3 * pitch, LANES):
-            total = add_product(total, load(p.places, body.places + 3 * pitch * j + block), load(points.shares, block))
         f[e + j] = p.modal[OMEGA2, body.flex + j] * q[e + j] + p.modal[DAMPING, body.flex + j] * v[e + j]
-        f[e + j] += summed(total)
+        f[e + j] += row_product(p.places, body.places + 3 * pitch * j, 3 * pitch, points.shares)
     f[o] = c * summed(fx) - s * summed(fy)
     f[o + 1] = s * summed(fx) + c * summed(fy)
     f[o + 2] = summed(lever_x) - summed(lever_y) + summed(turning)
@@ -342,7 +326,7 @@ def respond_bent(p, i, ws, dense, inverse):
     for block in range(0, body.lanes, LANES):
         solve_bent(p, i, dense, ws.jac, ws.response, body.jac + block, body.lanes)
     width = 3 + body.nf
-    pitch = -(-width // LANES) * LANES
+    pitch = padded(width)
     for r in range(width):
         for l in range(pitch):
             inverse[body.inverse + r * pitch + l] = 1.0 if r == l else 0.0
@@ -360,15 +344,12 @@ def inverse_times(p, i, inverse, y, x):
         return
     body = p.bodies[i]
     width, o = 3 + body.nf, body.offset
-    pitch = -(-width // LANES) * LANES
+    pitch = padded(width)
     for j in range(pitch):
         y[j] = x[o + j] if j < width else 0.0
     at = body.inverse
     for r in range(width):
-        total = zeros()
-        for block in range(0, pitch, LANES):
-            total = add_product(total, load(inverse, at + block), load(y, block))
-        x[o + r] = summed(total)
+        x[o + r] = row_product(inverse, at, pitch, y)
         at += pitch
 
 

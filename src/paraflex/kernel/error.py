@@ -9,15 +9,8 @@ from paraflex.kernel.arrays import fill
 from paraflex.kernel.bending import subtract_geometric
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import note_friction
-from paraflex.kernel.linear import (
-    factor_system,
-    jacobian_times,
-    mass_norm,
-    mass_times,
-    solve_system,
-    to_body_frame,
-    to_ground_frame,
-)
+from paraflex.kernel.linear import factor_system, jacobian_times, solve_system, to_body_frame, to_ground_frame
+from paraflex.kernel.metric import mass_norm, mass_times
 from paraflex.kernel.packed import OMEGA2
 from paraflex.kernel.run_state import LAST_STEP, STEPS
 

@@ -1,11 +1,7 @@
-"""The linear system of one iteration: bodies eliminated first, then the multipliers.
+"""The linear system of one iteration: bodies eliminated first (`kernel.factor`), then the multipliers.
 
-A body's iteration matrix is an arrow: diag(1 + b omega^2) bordered by three rigid rows, so factoring it costs
-O(nf). In the body's own frame only s, M_phiphi and M_phif depend on its coordinates, through its deformation: bodies
-are factored in their frames, and turned to where they stand anew at every step, which costs a sixth of it and keeps
-an old factor good. The Schur complement of the
-multipliers, S = sum J M^-1 J^T, is symmetric positive definite where Phi_q has full rank; it is stored and factored
-within its envelope, rows ordered once when the system is built.
+The Schur complement of the multipliers, S = sum J M^-1 J^T, is symmetric positive definite where Phi_q has full rank;
+it is stored and factored within its envelope, rows ordered once when the system is built.
 """
 
 from __future__ import annotations
@@ -13,175 +9,16 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from paraflex.kernel.arrays import fill
-from paraflex.kernel.axes import add_track, turn_axes
-from paraflex.kernel.bending import bent_mass_square, bent_mass_times, factor_bent, inverse_times, respond_bent
+from paraflex.kernel.axes import turn_axes
+from paraflex.kernel.bending import inverse_times
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import marker_shape, marker_shortening, shorten
-from paraflex.kernel.packed import (
-    ANGLE,
-    AXIS,
-    CONSTRAINT,
-    DAMPING,
-    DINV,
-    GJ,
-    MPF,
-    NX,
-    NY,
-    OMEGA2,
-    POINT,
-    S2X,
-    S2Y,
-    SLOPE,
-    SPRING,
-)
-from paraflex.kernel.sums import I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums
-from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
+from paraflex.kernel.factor import factor_bodies, solve_rigid
+from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DINV, POINT, SPRING
+from paraflex.kernel.sums import row_product
+from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 # A pivot smaller than this fraction of its diagonal entry marks a constraint row that depends on those before it.
 DEPENDENT_ROW = 1e-12
-# Springs divide by b: where it is zero (accelerations at an instant), by this instead.
-SMALLEST_B = 1e-18
-
-
-@inlined
-def factor_body(p, i, b, q, ws):
-    """Factor M + g D + b K of body i at q, g^2 = b: the arrow with its 3 x 3 rigid block."""
-    body = p.bodies[i]
-    n, k = body.nf, body.flex
-    fr, scratch = ws.frame[i], ws.scratch
-    g = sqrt(b)
-    body_sums(p, i, q, q, q, scratch)
-    body_products(p, i, q, q, scratch)
-    sx, sy = body.S1x + scratch.q[S2X_SUM], body.S1y + scratch.q[S2Y_SUM]
-    inertia = body.I0 + 2.0 * scratch.q[I1_SUM]
-    a00, a10, a11, a20, a21, a22 = body.m, 0.0, body.m, 0.0, 0.0, 0.0
-    for j in range(n):
-        inertia += scratch.I2_q[j] * q[body.offset + 3 + j]
-        S2x, S2y = p.modal[S2X, k + j], p.modal[S2Y, k + j]
-        mpf = p.modal[GJ, k + j] - scratch.G2_q[j]
-        d = 1.0 / (1.0 + g * p.modal[DAMPING, k + j] + b * p.modal[OMEGA2, k + j])
-        ws.flex[MPF, k + j] = mpf
-        ws.flex[DINV, k + j] = d
-        a00 -= S2x * S2x * d
-        a10 -= S2y * S2x * d
-        a11 -= S2y * S2y * d
-        a20 -= mpf * S2x * d
-        a21 -= mpf * S2y * d
-        a22 -= mpf * mpf * d
-    a20 -= sy
-    a21 += sx
-    a22 += inertia
-    l00 = sqrt(a00)
-    l10 = a10 / l00
-    l11 = sqrt(a11 - l10 * l10)
-    l20 = a20 / l00
-    l21 = (a21 - l20 * l10) / l11
-    l22 = sqrt(a22 - l20 * l20 - l21 * l21)
-    fr[2], fr[3], fr[4] = sx, sy, inertia
-    fr[5], fr[6], fr[7], fr[8], fr[9], fr[10] = 1.0 / l00, l10, 1.0 / l11, l20, l21, 1.0 / l22
-
-
-@inlined
-def solve_rigid(fr, r0, r1, r2):
-    """Solve with the factored 3 x 3 rigid block of a body."""
-    r0 = r0 * fr[5]
-    r1 = (r1 - fr[6] * r0) * fr[7]
-    r2 = (r2 - fr[8] * r0 - fr[9] * r1) * fr[10] * fr[10]
-    r1 = (r1 - fr[9] * r2) * fr[7]
-    return (r0 - fr[6] * r1 - fr[8] * r2) * fr[5], r1, r2
-
-
-@routine
-def respond(p, i, ws):
-    """Response of body i to its constraint rows, (M + b K)^-1 J^T, and to its rigid coordinates, into ws.response."""
-    body = p.bodies[i]
-    n, k, lanes, fr = body.nf, body.flex, body.lanes, ws.frame[i]
-    for block in range(0, lanes, LANES):
-        at = body.jac + block
-        r0, r1, r2 = load(ws.jac, at), load(ws.jac, at + lanes), load(ws.jac, at + 2 * lanes)
-        for j in range(n):
-            row, d = load(ws.jac, at + (3 + j) * lanes), ws.flex[DINV, k + j]
-            r0 = add_scaled(r0, row, -d * p.modal[S2X, k + j])
-            r1 = add_scaled(r1, row, -d * p.modal[S2Y, k + j])
-            r2 = add_scaled(r2, row, -d * ws.flex[MPF, k + j])
-        # As `solve_rigid`, eight at once.
-        r0 = add_scaled(zeros(), r0, fr[5])
-        r1 = add_scaled(zeros(), add_scaled(r1, r0, -fr[6]), fr[7])
-        r2 = add_scaled(zeros(), add_scaled(add_scaled(r2, r0, -fr[8]), r1, -fr[9]), fr[10] * fr[10])
-        r1 = add_scaled(zeros(), add_scaled(r1, r2, -fr[9]), fr[7])
-        r0 = add_scaled(zeros(), add_scaled(add_scaled(r0, r1, -fr[6]), r2, -fr[8]), fr[5])
-        store(ws.response, at, r0)
-        store(ws.response, at + lanes, r1)
-        store(ws.response, at + 2 * lanes, r2)
-        for j in range(n):
-            d = ws.flex[DINV, k + j]
-            x = add_scaled(zeros(), load(ws.jac, at + (3 + j) * lanes), d)
-            x = add_scaled(add_scaled(x, r0, -d * p.modal[S2X, k + j]), r1, -d * p.modal[S2Y, k + j])
-            store(ws.response, at + (3 + j) * lanes, add_scaled(x, r2, -d * ws.flex[MPF, k + j]))
-    rigid = body.jac + body.parts
-    for r in range(3):
-        for l in range(3):
-            ws.response[rigid + r * lanes + l] = 1.0 if r == l else 0.0
-    for j in range(n):
-        d, at = ws.flex[DINV, k + j], rigid + (3 + j) * lanes
-        ws.response[at] = -d * p.modal[S2X, k + j]
-        ws.response[at + 1] = -d * p.modal[S2Y, k + j]
-        ws.response[at + 2] = -d * ws.flex[MPF, k + j]
-
-
-@inlined
-def body_jacobian(p, i, q, ws):
-    """The parts of body i's constraint rows in its own frame, [1, E s, N] and [0, 1, N2'], into the lanes of ws.jac.
-
-    The lane after them holds M_phif.
-    """
-    body = p.bodies[i]
-    n, lanes, scratch = body.nf, body.lanes, ws.scratch
-    at = body.jac
-    for j in range((3 + n) * lanes):
-        ws.jac[at + j] = 0.0
-    for k in range(body.port, body.port_end):
-        port = p.ports[k]
-        marker = p.markers[port.marker]
-        x, h = at + port.local, marker.shape
-        if port.kind == ANGLE:
-            ws.jac[x + 2 * lanes] = 1.0
-            for j in range(n):
-                ws.jac[x + (3 + j) * lanes] = p.shape[SLOPE, h + j]
-            continue
-        ux, uy = marker_shape(p, marker, q)
-        ux -= marker_shortening(p, p.bending, marker, q, q, q)[0]
-        ws.jac[x], ws.jac[x + 2 * lanes] = 1.0, -(marker.y + uy)
-        ws.jac[x + 1 + lanes], ws.jac[x + 1 + 2 * lanes] = 1.0, marker.x + ux
-        fill(scratch.rigid, 0.0)
-        shorten(p, p.bending, marker, q, -1.0, scratch.rigid, 0)
-        for j in range(n):
-            ws.jac[x + (3 + j) * lanes] = p.shape[NX, h + j] + scratch.rigid[j]
-            ws.jac[x + 1 + (3 + j) * lanes] = p.shape[NY, h + j]
-        if port.parts > 2:
-            ws.jac[x + 2 + 2 * lanes] = 1.0
-            for j in range(n):
-                ws.jac[x + 2 + (3 + j) * lanes] = p.shape[SLOPE, h + j]
-        if port.parts > 3:
-            fill(scratch.rigid, 0.0)
-            add_track(p, port.axis, ws.axes[port.axis, 3], 1.0, scratch.rigid, 0)
-            for j in range(n):
-                ws.jac[x + 3 + (3 + j) * lanes] = scratch.rigid[j]
-    for j in range(n):
-        ws.jac[at + body.parts + (3 + j) * lanes] = ws.flex[MPF, body.flex + j]
-
-
-@inlined
-def body_block(p, i, ws):
-    """J M^-1 J^T of body i in its frame, into ws.blocks."""
-    body = p.bodies[i]
-    lanes = body.lanes
-    for r in range(body.parts):
-        for block in range(0, lanes, LANES):
-            total = zeros()
-            for x in range(body.jac, body.jac + (3 + body.nf) * lanes, lanes):
-                total = add_scaled(total, load(ws.jac, x + block), ws.response[x + r])
-            store(ws.blocks, body.block + r * lanes + block, total)
 
 
 @inlined
@@ -299,22 +136,6 @@ def solve_schur(p, ws, x):
             x[k] -= ws.schur[start + k] * x[i]
 
 
-@kernel
-def factor_bodies(p, b, q, ws):
-    """Factor every body's M + b K at its deformation in q, in its own frame."""
-    ws.step[0] = max(b, SMALLEST_B)
-    turn_axes(p, q, ws.axes)
-    for i in range(p.bodies.size):
-        if factor_bent(p, i, b, q, ws, ws.dense):
-            body_jacobian(p, i, q, ws)
-            respond_bent(p, i, ws, ws.dense, ws.inverse)
-        else:
-            factor_body(p, i, b, q, ws)
-            body_jacobian(p, i, q, ws)
-            respond(p, i, ws)
-        body_block(p, i, ws)
-
-
 @inlined
 def row_scale(p, r, ws, scale):
     """What makes the iteration matrix symmetric: scale for a constraint, 1/b for a spring, else 1/g."""
@@ -397,7 +218,7 @@ def add_lanes(p, i, ws, scale, spring_scale, damper_scale, rows):
 
 @inlined
 def jacobian_times(p, i, ws, x, scale, spring_scale, damper_scale, rows):
-    """Add J x of body i to rows, times the scale of their kind; x in the body frame. M_phif x is left in scratch."""
+    """Add J x of body i to rows, times the scale of their kind; x in the body frame."""
     lanes_times(p, i, ws.jac, x, ws.scratch)
     add_lanes(p, i, ws, scale, spring_scale, damper_scale, rows)
 
@@ -426,10 +247,7 @@ def reactions(p, i, ws, mu):
 def lanes_of(p, i, j, ws):
     """The sum of scratch.lanes as coordinate j of body i feels them."""
     body = p.bodies[i]
-    total, at = zeros(), body.jac + j * body.lanes
-    for block in range(0, body.lanes, LANES):
-        total = add_product(total, load(ws.response, at + block), load(ws.scratch.lanes, block))
-    return summed(total)
+    return row_product(ws.response, body.jac + j * body.lanes, body.lanes, ws.scratch.lanes)
 
 
 @kernel
@@ -481,62 +299,3 @@ def right_hand_side(p, ws, scale):
         ws.x[j] = -ws.f[j]
     for r in range(ws.rows.size):
         ws.mu[r] = -ws.rows[r] * row_scale(p, r, ws, scale)
-
-
-@inlined
-def mass_times(p, i, ws, mass, x):
-    """M x of body i in place, with the mass matrix of the factor; x in the body frame.
-
-    `mass` is ws.mass, None for linear geometry.
-    """
-    body = p.bodies[i]
-    if mass is not None:
-        if body.slopes > 0:
-            bent_mass_times(p, i, mass, ws.scratch.rigid, x)
-            return
-    o, n, k = body.offset, body.nf, body.flex
-    e = o + 3
-    sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
-    x0, x1, x2 = x[o], x[o + 1], x[o + 2]
-    y0 = body.m * x0 - sy * x2
-    y1 = body.m * x1 + sx * x2
-    y2 = sx * x1 - sy * x0 + inertia * x2
-    for j in range(n):
-        z = x[e + j]
-        S2x, S2y, mpf = p.modal[S2X, k + j], p.modal[S2Y, k + j], ws.flex[MPF, k + j]
-        y0 += S2x * z
-        y1 += S2y * z
-        y2 += mpf * z
-        x[e + j] = z + S2x * x0 + S2y * x1 + mpf * x2
-    x[o], x[o + 1], x[o + 2] = y0, y1, y2
-
-
-@inlined
-def mass_square(p, i, ws, mass, x):
-    """x^T M x of body i for a ground-frame vector; `mass` as for `mass_times`."""
-    body = p.bodies[i]
-    o, k = body.offset, body.flex
-    c, s = ws.frame[i, 0], ws.frame[i, 1]
-    x0, x1, x2 = c * x[o] + s * x[o + 1], c * x[o + 1] - s * x[o], x[o + 2]
-    if mass is not None:
-        if body.slopes > 0:
-            return bent_mass_square(p, i, mass, x, x0, x1)
-    sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
-    fx, fy, fp, ff = 0.0, 0.0, 0.0, 0.0
-    for j in range(body.nf):
-        z = x[o + 3 + j]
-        fx += p.modal[S2X, k + j] * z
-        fy += p.modal[S2Y, k + j] * z
-        fp += ws.flex[MPF, k + j] * z
-        ff += z * z
-    square = body.m * (x0 * x0 + x1 * x1) + inertia * x2 * x2 + ff
-    return square + 2.0 * (x0 * (fx - sy * x2) + x1 * (fy + sx * x2) + x2 * fp)
-
-
-@kernel
-def mass_norm(p, ws, x):
-    """sqrt(x^T M x / m_total) of a ground-frame vector: metres for a displacement, whatever the coordinates."""
-    total = 0.0
-    for i in range(p.bodies.size):
-        total += mass_square(p, i, ws, ws.mass, x)
-    return sqrt(max(total, 0.0) / p.total_mass)

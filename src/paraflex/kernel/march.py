@@ -8,8 +8,9 @@ from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
+from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
-from paraflex.kernel.linear import factor_bodies, orient, right_hand_side, solve_system
+from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.newmark import restart_algorithmic
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.projection import project

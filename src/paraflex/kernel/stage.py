@@ -29,7 +29,8 @@ from paraflex.kernel.joints import (
     start_compliant_rows,
     start_rows,
 )
-from paraflex.kernel.linear import mass_norm, right_hand_side, solve_system
+from paraflex.kernel.linear import right_hand_side, solve_system
+from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.projection import least_change
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.sums import hand_on

@@ -15,8 +15,9 @@ from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import dissipated_power, note_friction
 from paraflex.kernel.error import embedded_error, filtered_error, history_error
+from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
-from paraflex.kernel.linear import factor_bodies, orient
+from paraflex.kernel.linear import orient
 from paraflex.kernel.newmark import newmark_end, newmark_start
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (

@@ -18,23 +18,37 @@ FIRST_MARKER = 4
 
 
 @inlined
+def column_sums(matrix, first, width, n, e, q, v, a, out):
+    """Sums of n coordinates from e on by the columns of a matrix (n, width) that begins at `first`: of q, v and a."""
+    for block in range(0, width, LANES):
+        of_q, of_v, of_a, at = zeros(), zeros(), zeros(), first + block
+        for j in range(e, e + n):
+            column = load(matrix, at)
+            of_q = add_scaled(of_q, column, q[j])
+            of_v = add_scaled(of_v, column, v[j])
+            of_a = add_scaled(of_a, column, a[j])
+            at += width
+        store(out.q, block, of_q)
+        store(out.v, block, of_v)
+        store(out.a, block, of_a)
+
+
+@inlined
+def row_product(matrix, at, width, vector):
+    """The product of a row of a matrix, `width` entries from `at` on, and a vector."""
+    total = zeros()
+    for block in range(0, width, LANES):
+        total = add_product(total, load(matrix, at + block), load(vector, block))
+    return summed(total)
+
+
+@inlined
 def body_sums(p, i, q, v, a, scratch):
-    """Every sum of body i, of u, u' and u'', into scratch."""
+    """Every sum of body i, of u, u' and u'', into scratch; cosine and sine of its angle as well."""
     body = p.bodies[i]
     e = body.offset + 3
     scratch.turn[0], scratch.turn[1] = cos(q[e - 1]), sin(q[e - 1])
-    for block in range(0, body.width, LANES):
-        of_q, of_v, of_a = zeros(), zeros(), zeros()
-        at = body.columns + block
-        for j in range(body.nf):
-            column = load(p.columns, at)
-            of_q = add_scaled(of_q, column, q[e + j])
-            of_v = add_scaled(of_v, column, v[e + j])
-            of_a = add_scaled(of_a, column, a[e + j])
-            at += body.width
-        store(scratch.q, block, of_q)
-        store(scratch.v, block, of_v)
-        store(scratch.a, block, of_a)
+    column_sums(p.columns, body.columns, body.width, body.nf, e, q, v, a, scratch)
 
 
 @inlined
@@ -69,8 +83,5 @@ def hand_on(p, i, scratch, f):
     body = p.bodies[i]
     e, at = body.offset + 3, body.columns
     for j in range(body.nf):
-        part = zeros()
-        for block in range(0, body.width, LANES):
-            part = add_product(part, load(p.columns, at + block), load(scratch.shares, block))
-        f[e + j] += summed(part)
+        f[e + j] += row_product(p.columns, at, body.width, scratch.shares)
         at += body.width
