@@ -31,7 +31,7 @@ for module in pkgutil.walk_packages(paraflex.__path__, "paraflex."):
     if not module.name.endswith("__main__"):
         importlib.import_module(module.name)
 kernels = [f for module in list(sys.modules.values()) if module.__name__.startswith("paraflex.kernel")
-           for f in vars(module).values() if hasattr(f, "signatures")]
+           for f in vars(module).values() if hasattr(f, "signatures") and not isinstance(f, type)]
 print(len(kernels), sum(len(f.signatures) for f in kernels))
 """
 

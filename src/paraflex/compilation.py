@@ -1,12 +1,11 @@
 """Compile the kernels beforehand, once after an installation or a change: `python -m paraflex.compilation`.
 
-Numba does so by itself when a kernel is first called, one after the other. But it links what it compiles with what this
-process has compiled before, and what it loads from the cache with its own copies: the sums of the very first run would
-round differently from those of all later ones. So other processes compile, two at a time, and this one only loads.
+Numba does so by itself when a kernel is first called, one after the other; here two processes do it at once.
 """
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import subprocess
 import sys
@@ -82,7 +81,7 @@ def _drop_outdated() -> None:
 
 def _folder() -> Path:
     """Where Numba keeps the machine code: beside the sources, or elsewhere if it may not write there."""
-    return Path(str(march.stats.cache_path))
+    return Path(march.cache_path)
 
 
 def _stamp(geometry: Geometry) -> Path:
@@ -130,6 +129,8 @@ _PARTS = {"time-loop": _call_time_loop, "rest": _call_the_rest}
 
 if __name__ == "__main__":
     if len(sys.argv) == 3:
+        # Nothing that compiling makes is garbage before the end.
+        gc.disable()
         _PARTS[sys.argv[2]](Geometry(sys.argv[1]))
     else:
         for each in Geometry:

@@ -6,9 +6,15 @@ with it, by atomic operations that cost more than the arithmetic. Kernels make n
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import update_wrapper
+from types import FunctionType
 from typing import Any
 
-from numba import njit
+from numba import njit, types
+from numba.extending import typeof_impl
+
+from paraflex.kernel.machine_code import SeparateCode
 
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
@@ -19,20 +25,66 @@ _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": FAST_MATH,
     "no_cfunc_wrapper": True,
+    "pipeline_class": SeparateCode,
     "_nrt": False,
 }
 
-# Without the entry from Python, which takes as long to compile as the function itself.
-_INNER_OPTIONS: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True}
+# Without the entry from Python.
+_INNER: dict[str, Any] = {"no_cpython_wrapper": True}
+_COUNTING: dict[str, Any] = {"_nrt": True}
 
-_COUNTING_OPTIONS: dict[str, Any] = {**_OPTIONS, "_nrt": True}
-
-# Called from Python.
-kernel = njit(**_OPTIONS)
-# And makes arrays of its own: not for the time loop.
-allocating = njit(**_COUNTING_OPTIONS)
 # Called from kernels only: called from Python it would crash the process.
-routine = njit(**_INNER_OPTIONS)
-# For what is called once a body in a hot loop: passing the packed system, some seventy machine words, costs as much
-# as the arithmetic. Not for more, because every copy is compiled again.
-inlined = njit(forceinline=True, **_INNER_OPTIONS)
+routine = njit(**_OPTIONS, **_INNER)
+# For what is called once a body in a hot loop.
+inlined = njit(**_OPTIONS, **_INNER, forceinline=True)
+
+
+class Kernel:
+    """A function that Python calls, and other kernels may: compiled for each when it first does.
+
+    Attributes
+    ----------
+    from_python, inner : numba dispatchers
+    """
+
+    def __init__(self, function: FunctionType, **options: Any) -> None:
+        update_wrapper(self, function)
+        entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
+        # The cache goes by this name.
+        entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
+        self.from_python = njit(**{**_OPTIONS, **options})(entry)
+        self.inner = njit(**{**_OPTIONS, **options, **_INNER})(function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it from Python."""
+        return self.from_python(*arguments)
+
+    @property
+    def py_func(self) -> Any:
+        """The Python function."""
+        return self.inner.py_func
+
+    @property
+    def signatures(self) -> list[Any]:
+        """What it has been compiled for."""
+        return [*self.from_python.signatures, *self.inner.signatures]
+
+    @property
+    def cache_path(self) -> str:
+        """Where it is cached."""
+        return str(self.from_python.stats.cache_path)
+
+
+@typeof_impl.register(Kernel)
+def _inner(value: Kernel, _: object) -> types.Dispatcher:
+    return types.Dispatcher(value.inner)
+
+
+def kernel(function: Callable[..., Any]) -> Kernel:
+    """Make a kernel of a function."""
+    return Kernel(function)
+
+
+def allocating(function: Callable[..., Any]) -> Kernel:
+    """Make a kernel of a function that makes arrays of its own: not for the time loop."""
+    return Kernel(function, **_COUNTING)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart
+from paraflex.kernel.records import by_reference
 from paraflex.kernel.vectors import padded
 
 # Rows of PackedSystem.modal.
@@ -162,6 +163,7 @@ ROW = np.dtype(
 )
 
 
+@by_reference
 class PackedSystem(NamedTuple):
     """Constants of a system."""
 
@@ -197,6 +199,7 @@ class PackedSystem(NamedTuple):
     gravity: NDArray[np.float64]  # (2,) in the ground frame
 
 
+@by_reference
 class Signals(NamedTuple):
     """Functions of time as piecewise quintics: motor torques first, then prescribed values."""
 
@@ -205,6 +208,7 @@ class Signals(NamedTuple):
     coefficients: NDArray[np.float64]  # (breaks, 6), ascending powers of t - break; the last piece of a signal unused
 
 
+@by_reference
 class PointScratch(NamedTuple):
     """What the terms of one body of second-order geometry write besides, by mass point."""
 
@@ -218,6 +222,7 @@ class PointScratch(NamedTuple):
     B_v: NDArray[np.float64]
 
 
+@by_reference
 class Scratch(NamedTuple):
     """What the terms of one body write: sums of u, u' and u'' and what follows from them."""
 
@@ -234,6 +239,7 @@ class Scratch(NamedTuple):
     points: PointScratch | None  # None for linear geometry
 
 
+@by_reference
 class Workspace(NamedTuple):
     """Everything the kernels write, made once a run."""
 

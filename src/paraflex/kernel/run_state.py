@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart
+from paraflex.kernel.records import by_reference
 
 # Singular positions kept of a run.
 MOST_PASSAGES = 1000
@@ -25,6 +26,7 @@ BAUMGARTE, PROJECTION, GGL, POSITION = range(4)
 ALPHA_M, ALPHA_F, BETA, GAMMA, THETA = range(5)
 
 
+@by_reference
 class Tableau(NamedTuple):
     """A scheme: of the ESDIRK family A, c and what else Runge-Kutta methods have; of the Newmark family its numbers.
 
@@ -40,6 +42,7 @@ class Tableau(NamedTuple):
     newmark: NDArray[np.float64]  # alpha_m, alpha_f, beta, gamma, theta; empty for ESDIRK
 
 
+@by_reference
 class Controls(NamedTuple):
     """What the user chooses of a run.
 
@@ -61,6 +64,7 @@ class Controls(NamedTuple):
     dependent_part: float  # a row with less than this of its diagonal left when others are eliminated depends on them
 
 
+@by_reference
 class March(NamedTuple):
     """The state of a run between calls, and its scratch."""
 
@@ -89,6 +93,7 @@ class March(NamedTuple):
     guess_s: NDArray[np.int64]  # (3, 2) and where they stand in stage_a
 
 
+@by_reference
 class Samples(NamedTuple):
     """Dense output: times asked for and what stood there."""
 
