@@ -29,6 +29,8 @@ _ASIDE = 1e-2
 CLOSED = 1e-12
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
 _POSITION_STIFFNESS = 1.0
+# Links that must be deflected by more than this part of their size for loops to close do not fit together.
+_LARGEST_DEFLECTION = 0.1
 # The same for a start in motion: rates of deflection are to be none beside those of links.
 _VELOCITY_STIFFNESS = 1e3
 
@@ -132,7 +134,7 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
 
 
 def _keeps_shape(system: System, q: NDArray[np.float64]) -> bool:
-    """Whether no link is deflected by more than its own size: in linear theory any loop closes by stretching."""
+    """Whether no link is bent out of shape: in linear theory any loop closes by stretching."""
     for body in system.bodies:
         markers = [system.marker(PointRef(body.name, point)) for point in system.mechanism.points[body.name]]
         if body.nf == 0 or not markers:
@@ -140,7 +142,7 @@ def _keeps_shape(system: System, q: NDArray[np.float64]) -> bool:
         places = np.array([marker.x0 for marker in markers])
         deflected = np.array([marker.place(q[body.flexible]) for marker in markers]) - places
         size = np.max(np.linalg.norm(places - places[:1], axis=1), initial=0.0)
-        if size > 0.0 and np.max(np.linalg.norm(deflected, axis=1)) > size:
+        if size > 0.0 and np.max(np.linalg.norm(deflected, axis=1)) > _LARGEST_DEFLECTION * size:
             return False
     return True
 

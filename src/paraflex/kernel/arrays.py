@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.kernel.compiling import allocating, routine
+from paraflex.kernel.compiling import routine
 
 # Entries before and behind an array that nobody uses: more than a loop does at once.
 ROOM = 128
@@ -21,18 +21,6 @@ def apart(shape: int | tuple[int, ...], dtype: type = float) -> NDArray[Any]:
     """Zeros of a shape, far from any other array."""
     count = int(np.prod(shape))
     return np.zeros(count + 2 * ROOM, dtype)[ROOM : ROOM + count].reshape(shape)
-
-
-@allocating
-def vector_apart(count):
-    """Zeros, far from any other array."""
-    return np.zeros(count + 2 * ROOM)[ROOM : ROOM + count]
-
-
-@allocating
-def matrix_apart(rows, columns):
-    """Zeros (rows, columns), far from any other array."""
-    return vector_apart(rows * columns).reshape((rows, columns))
 
 
 @routine

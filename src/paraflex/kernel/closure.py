@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from paraflex.kernel.arrays import copy, fill, largest, matrix_apart, vector_apart
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.kernel.arrays import apart, copy, fill, largest
 from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.compiling import allocating, routine
+from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
-from paraflex.kernel.dense import solve_dense
+from paraflex.kernel.dense import factor_dense, solve_factored
 from paraflex.kernel.joints import (
     apply_force,
     apply_torque,
@@ -15,9 +20,12 @@ from paraflex.kernel.joints import (
     marker_motion,
     start_rows,
 )
-from paraflex.kernel.packed import INDEX_1
+from paraflex.kernel.packed import INDEX_1, PackedSystem, Scratch, make_scratch
+from paraflex.kernel.records import by_reference
 
 MAX_ITERATIONS = 20
+# So many of them with the factors of the instant before.
+CHORDS = 8
 # Newton has converged when no coordinate moves by more than this [m, rad].
 SMALLEST_MOVE = 1e-13
 # A body that turns or shifts this much against its prediction may have jumped to another assembly [rad, m].
@@ -27,10 +35,45 @@ SINGULAR_PIVOT = 1e-11
 CLOSED, NO_CONVERGENCE, TOO_COARSE, SINGULAR = range(4)
 
 
-@allocating
-def task_values(p, marker, coordinates, q, v, a):
-    """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker: (3, tasks)."""
-    out = matrix_apart(3, coordinates.size)
+@by_reference
+class ClosureScratch(NamedTuple):
+    """What closing loops writes besides the motion."""
+
+    single: NDArray[np.float64]  # (n, 1) residual of positions, then what they move by; the same of accelerations
+    right: NDArray[np.float64]  # (n, 1 + tasks) of velocities and the basis
+    jacobian: NDArray[np.float64]  # (n, n) at this instant
+    before: NDArray[np.float64]  # and at the instant before
+    factors: NDArray[np.float64]  # of `before`
+    order: NDArray[np.int64]
+    fresh: NDArray[np.float64]  # factors at the pose reached
+    fresh_order: NDArray[np.int64]
+    change: NDArray[np.float64]  # (n, n)
+    here: NDArray[np.float64]  # (3, tasks) task coordinates, their rates and accelerations
+    phi: NDArray[np.float64]  # (m,)
+    dphi: NDArray[np.float64]
+    lam: NDArray[np.float64]  # zero, as all that follows
+    zero: NDArray[np.float64]  # (n,)
+    idle: NDArray[np.float64]  # (signals,) motors do not matter here, but those along an axis read their force
+    unused: NDArray[np.float64]  # (n,) not zero: forces nobody asks for
+    body: Scratch
+
+
+def make_closure_scratch(p: PackedSystem, tasks: int, signals: int) -> ClosureScratch:
+    """Allocate what `close_path` needs."""
+    n, m = int(sum(3 + body["nf"] for body in p.bodies)), p.rows.size
+    jacobian, before, factors, fresh, change = (apart((n, n)) for _ in range(5))
+    order, fresh_order = apart(n, np.int64), apart(n, np.int64)
+    phi, dphi, lam = (apart(m) for _ in range(3))
+    return ClosureScratch(
+        single=apart((n, 1)), right=apart((n, 1 + tasks)), jacobian=jacobian, before=before, factors=factors,
+        order=order, fresh=fresh, fresh_order=fresh_order, change=change, here=apart((3, tasks)), phi=phi, dphi=dphi,
+        lam=lam, zero=apart(n), idle=apart(signals), unused=apart(n), body=make_scratch(p),
+    )  # fmt: skip
+
+
+@kernel
+def task_values(p, marker, coordinates, q, v, a, out):
+    """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker, into out (3, tasks)."""
     px, py, vx, vy, ax, ay, _, _ = marker_motion(p, marker, q, v, a)
     for i in range(coordinates.size):
         if coordinates[i] == 0:
@@ -41,7 +84,6 @@ def task_values(p, marker, coordinates, q, v, a):
             out[0, i] = marker_angle(p, marker, q)
             out[1, i] = marker_angle(p, marker, v)
             out[2, i] = marker_angle(p, marker, a)
-    return out
 
 
 @routine
@@ -61,40 +103,107 @@ def closure_jacobian(p, marker, coordinates, q, jacobian):
 
 
 @routine
-def relative_change(before, now, change):
-    """Norm of before^-1 (now - before): below one, no matrix between the two is singular. Destroys before.
+def relative_change(ws):
+    """Norm of before^-1 (jacobian - before): below one, no matrix between the two is singular.
 
     Assemblies meet where the Jacobian is singular, and a step over that may end in another one; a step that is short
     enough does not, and no step is short enough that passes a singularity. A determinant would not tell: two loops may
     be singular at once, as are an arm and the parallelogram beside it.
     """
-    n = now.shape[0]
-    for i in range(n):
-        for j in range(n):
-            change[i, j] = now[i, j] - before[i, j]
-    solve_dense(before, change)
+    n, columns = ws.jacobian.shape[0], 0
+    for j in range(n):
+        moves = False
+        for i in range(n):
+            ws.change[i, columns] = ws.jacobian[i, j] - ws.before[i, j]
+            moves = moves or ws.change[i, columns] != 0.0
+        # Most columns are the same in every position.
+        if moves:
+            columns += 1
+    change = ws.change[:, :columns]
+    solve_factored(ws.factors, ws.order, change)
     norm = 0.0
     for i in range(n):
         total = 0.0
-        for j in range(n):
+        for j in range(columns):
             total += abs(change[i, j])
         norm = max(norm, total)
     return norm
 
 
-@allocating
-def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, basis, scratch):
+@routine
+def close_loops(p, signals, marker, coordinates, t, goal, known, q, ws):
+    """Close the loops at one instant by Newton's method, from the pose in q; whether they close, and what gap is left.
+
+    `known` says that ws.factors hold those of a pose nearby, which serve as long as they do it quickly.
+    """
+    gap = 0.0
+    for iteration in range(MAX_ITERATIONS):
+        constraint_values(p, signals, t, q, ws.zero, ws.body, ws.phi, ws.dphi)
+        task_values(p, marker, coordinates, q, ws.zero, ws.zero, ws.here)
+        for r in range(ws.phi.size):
+            ws.single[r, 0] = ws.phi[r]
+        for i in range(coordinates.size):
+            ws.single[ws.phi.size + i, 0] = ws.here[0, i] - goal[i]
+        gap = largest(ws.single[:, 0])
+        if known and iteration < CHORDS:
+            solve_factored(ws.factors, ws.order, ws.single)
+        else:
+            closure_jacobian(p, marker, coordinates, q, ws.fresh)
+            if factor_dense(ws.fresh, ws.fresh_order) < SINGULAR_PIVOT:
+                return SINGULAR, gap
+            solve_factored(ws.fresh, ws.fresh_order, ws.single)
+        for j in range(q.size):
+            q[j] -= ws.single[j, 0]
+        if largest(ws.single[:, 0]) < SMALLEST_MOVE * (1.0 + largest(q)):
+            return CLOSED, gap
+    return NO_CONVERGENCE, gap
+
+
+@routine
+def move_loops(p, signals, marker, coordinates, t, target, q, v, a, basis, ws):
+    """Velocities, accelerations and basis of closed loops, with the factors at their pose."""
+    m, tasks = ws.phi.size, coordinates.size
+    constraint_values(p, signals, t, q, ws.zero, ws.body, ws.phi, ws.dphi)
+    for r in range(q.size):
+        fill(ws.right[r], 0.0)
+    for r in range(m):
+        ws.right[r, 0] = -ws.dphi[r]
+    for i in range(tasks):
+        ws.right[m + i, 0] = target[1, i]
+        ws.right[m + i, 1 + i] = 1.0
+    solve_factored(ws.factors, ws.order, ws.right)
+    for j in range(q.size):
+        v[j] = ws.right[j, 0]
+        for i in range(tasks):
+            basis[j, i] = ws.right[j, 1 + i]
+    # The part of Phi'' and of the task's acceleration that does not depend on the accelerations.
+    start_rows(p, signals, t, INDEX_1, ws.phi)
+    for i in range(p.bodies.size):
+        body_joints(p, i, q, v, ws.zero, ws.lam, INDEX_1, ws.body, ws.unused, ws.phi)
+    apply_axes(p, q, v, ws.zero, ws.lam, INDEX_1, ws.idle, ws.unused, ws.phi)
+    task_values(p, marker, coordinates, q, v, ws.zero, ws.here)
+    for r in range(m):
+        ws.single[r, 0] = -ws.phi[r]
+    for i in range(tasks):
+        ws.single[m + i, 0] = target[2, i] - ws.here[2, i]
+    solve_factored(ws.factors, ws.order, ws.single)
+    for j in range(q.size):
+        a[j] = ws.single[j, 0]
+
+
+@kernel
+def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, basis, ws):
     """Close the loops along a path, each instant starting from the one before.
 
     Parameters
     ----------
-    target : (3, times, tasks) array
+    target : (times, 3, tasks) array
         Task coordinates, their rates and accelerations.
     q, v, a : (times, n) arrays
         Written; q[0] holds the pose to start from.
     basis : (times, n, tasks) array
         Written: coordinates' change per change of the task coordinates, the null space of Phi_q in task terms.
-    scratch : Scratch
+    ws : ClosureScratch
 
     Returns
     -------
@@ -102,76 +211,26 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
         Where it stopped and the residual left there, for a status other than CLOSED: NO_CONVERGENCE, SINGULAR, or
         TOO_COARSE where a singular position may lie between this instant and the one before.
     """
-    n, m, tasks = q.shape[1], p.rows.size, coordinates.size
     marker = p.markers[marker_index]
-    jacobian = matrix_apart(n, n)
-    single, zero, guess = matrix_apart(n, 1), vector_apart(n), vector_apart(n)
-    phi, dphi, lam = vector_apart(m), vector_apart(m), vector_apart(m)
-    # Motors do not matter here, but those along an axis read their force.
-    unused, idle = vector_apart(n), vector_apart(signals.start.size)
-    right = matrix_apart(n, 1 + tasks)
-    before, change = matrix_apart(n, n), matrix_apart(n, n)
     for k in range(times.size):
-        t = times[k]
         if k > 0:
-            dt = t - times[k - 1]
-            for j in range(n):
+            dt = times[k] - times[k - 1]
+            for j in range(q.shape[1]):
                 q[k, j] = q[k - 1, j] + dt * (v[k - 1, j] + 0.5 * dt * a[k - 1, j])
-        copy(q[k], guess)
-        closed = False
-        size = 0.0
-        for _ in range(MAX_ITERATIONS):
-            constraint_values(p, signals, t, q[k], zero, scratch, phi, dphi)
-            here = task_values(p, marker, coordinates, q[k], zero, zero)
-            for r in range(m):
-                single[r, 0] = phi[r]
-            for i in range(tasks):
-                single[m + i, 0] = here[0, i] - target[0, k, i]
-            size = largest(single[:, 0])
-            closure_jacobian(p, marker, coordinates, q[k], jacobian)
-            if solve_dense(jacobian, single) < SINGULAR_PIVOT:
-                return SINGULAR, k, size
-            for j in range(n):
-                q[k, j] -= single[j, 0]
-            if largest(single[:, 0]) < SMALLEST_MOVE * (1.0 + largest(q[k])):
-                closed = True
-                break
-        if not closed:
-            return NO_CONVERGENCE, k, size
-        for j in range(n):
-            if k > 0 and abs(q[k, j] - guess[j]) > LARGEST_JUMP:
-                return TOO_COARSE, k, size
-        # Velocities, and with them the basis: one right-hand side each.
-        constraint_values(p, signals, t, q[k], zero, scratch, phi, dphi)
-        for r in range(n):
-            fill(right[r], 0.0)
-        for r in range(m):
-            right[r, 0] = -dphi[r]
-        for i in range(tasks):
-            right[m + i, 0] = target[1, k, i]
-            right[m + i, 1 + i] = 1.0
-        closure_jacobian(p, marker, coordinates, q[k], jacobian)
-        if k > 0 and relative_change(before, jacobian, change) >= 1.0:
-            return TOO_COARSE, k, size
-        for j in range(n):
-            copy(jacobian[j], before[j])
-        solve_dense(jacobian, right)
-        for j in range(n):
-            v[k, j] = right[j, 0]
-            for i in range(tasks):
-                basis[k, j, i] = right[j, 1 + i]
-        # The part of Phi'' and of the task's acceleration that does not depend on the accelerations.
-        start_rows(p, signals, t, INDEX_1, phi)
-        for i in range(p.bodies.size):
-            body_joints(p, i, q[k], v[k], zero, lam, INDEX_1, scratch, unused, phi)
-        apply_axes(p, q[k], v[k], zero, lam, INDEX_1, idle, unused, phi)
-        here = task_values(p, marker, coordinates, q[k], v[k], zero)
-        for r in range(m):
-            single[r, 0] = -phi[r]
-        for i in range(tasks):
-            single[m + i, 0] = target[2, k, i] - here[2, i]
-        closure_jacobian(p, marker, coordinates, q[k], jacobian)
-        solve_dense(jacobian, single)
-        for j in range(n):
-            a[k, j] = single[j, 0]
+        copy(q[k], ws.unused)
+        status, gap = close_loops(p, signals, marker, coordinates, times[k], target[k, 0], k > 0, q[k], ws)
+        if status != CLOSED:
+            return status, k, gap
+        for j in range(q.shape[1]):
+            if k > 0 and abs(q[k, j] - ws.unused[j]) > LARGEST_JUMP:
+                return TOO_COARSE, k, gap
+        closure_jacobian(p, marker, coordinates, q[k], ws.jacobian)
+        if k > 0 and relative_change(ws) >= 1.0:
+            return TOO_COARSE, k, gap
+        for j in range(q.shape[1]):
+            copy(ws.jacobian[j], ws.before[j])
+            copy(ws.jacobian[j], ws.factors[j])
+        if factor_dense(ws.factors, ws.order) < SINGULAR_PIVOT:
+            return SINGULAR, k, gap
+        move_loops(p, signals, marker, coordinates, times[k], target[k], q[k], v[k], a[k], basis[k], ws)
     return CLOSED, times.size, 0.0

@@ -31,7 +31,6 @@ _OPTIONS: dict[str, Any] = {
 
 # Without the entry from Python.
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True}
-_COUNTING: dict[str, Any] = {"_nrt": True}
 
 # Called from kernels only: called from Python it would crash the process.
 routine = njit(**_OPTIONS, **_INNER)
@@ -47,13 +46,13 @@ class Kernel:
     from_python, inner : numba dispatchers
     """
 
-    def __init__(self, function: FunctionType, **options: Any) -> None:
+    def __init__(self, function: FunctionType) -> None:
         update_wrapper(self, function)
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         # The cache goes by this name.
         entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
-        self.from_python = njit(**{**_OPTIONS, **options})(entry)
-        self.inner = njit(**{**_OPTIONS, **options, **_INNER})(function)
+        self.from_python = njit(**_OPTIONS)(entry)
+        self.inner = routine(function)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
@@ -82,9 +81,5 @@ def _inner(value: Kernel, _: object) -> types.Dispatcher:
 
 def kernel(function: Callable[..., Any]) -> Kernel:
     """Make a kernel of a function."""
+    assert isinstance(function, FunctionType)
     return Kernel(function)
-
-
-def allocating(function: Callable[..., Any]) -> Kernel:
-    """Make a kernel of a function that makes arrays of its own: not for the time loop."""
-    return Kernel(function, **_COUNTING)

@@ -6,16 +6,21 @@ from paraflex.kernel.compiling import kernel
 
 
 @kernel
-def solve_dense(matrix, right):
-    """Solve matrix x = right in place of right (n, k), by elimination with partial pivoting; matrix is destroyed.
+def factor_dense(matrix, order):
+    """Factors of a matrix in its place, L below the diagonal and U, by elimination with partial pivoting.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+    order : (n,) array of int
+        Written: the row that stands in place of each at its elimination.
 
     Returns
     -------
     float
-        The smallest pivot as a fraction of the largest entry: zero for a singular matrix, of which right then holds
-        no solution.
+        The smallest pivot as a fraction of the largest entry: zero for a singular matrix, which has no factors.
     """
-    n, columns = right.shape
+    n = matrix.shape[0]
     largest, smallest = 0.0, 0.0
     for i in range(n):
         for j in range(n):
@@ -29,25 +34,38 @@ def solve_dense(matrix, right):
         if not size > 0.0:
             return 0.0
         smallest = size if i == 0 else min(smallest, size)
+        order[i] = pivot
         if pivot != i:
-            for j in range(i, n):
+            for j in range(n):
                 matrix[i, j], matrix[pivot, j] = matrix[pivot, j], matrix[i, j]
-            for j in range(columns):
-                right[i, j], right[pivot, j] = right[pivot, j], right[i, j]
         for r in range(i + 1, n):
-            factor = matrix[r, i] / matrix[i, i]
             # Constraint Jacobians are mostly zeros.
-            if factor != 0.0:
+            if matrix[r, i] != 0.0:
+                factor = matrix[r, i] / matrix[i, i]
+                matrix[r, i] = factor
                 for j in range(i + 1, n):
                     matrix[r, j] -= factor * matrix[i, j]
+    return smallest / largest
+
+
+@kernel
+def solve_factored(factors, order, right):
+    """Solve matrix x = right in place of right (n, k), with what `factor_dense` left."""
+    n, columns = right.shape
+    for i in range(n):
+        pivot = order[i]
+        if pivot != i:
+            for j in range(columns):
+                right[i, j], right[pivot, j] = right[pivot, j], right[i, j]
+    for i in range(n):
+        for r in range(i):
+            if factors[i, r] != 0.0:
                 for j in range(columns):
-                    right[r, j] -= factor * right[i, j]
+                    right[i, j] -= factors[i, r] * right[r, j]
     for i in range(n - 1, -1, -1):
         for r in range(i + 1, n):
-            factor = matrix[i, r]
-            if factor != 0.0:
+            if factors[i, r] != 0.0:
                 for j in range(columns):
-                    right[i, j] -= factor * right[r, j]
+                    right[i, j] -= factors[i, r] * right[r, j]
         for j in range(columns):
-            right[i, j] /= matrix[i, i]
-    return smallest / largest
+            right[i, j] /= factors[i, i]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from paraflex.kernel.arrays import matrix_apart
-from paraflex.kernel.compiling import allocating, kernel
+from paraflex.kernel.compiling import kernel
 
 
 @kernel
@@ -23,14 +22,3 @@ def evaluate_signal(s, k, t):
     rate = c[1] + x * (2.0 * c[2] + x * (3.0 * c[3] + x * (4.0 * c[4] + x * 5.0 * c[5])))
     acceleration = 2.0 * c[2] + x * (6.0 * c[3] + x * (12.0 * c[4] + x * 20.0 * c[5]))
     return value, rate, acceleration
-
-
-@allocating
-def sample_signals(s, times):
-    """Values of all signals at all times: (times, signals)."""
-    n = s.start.size - 1
-    out = matrix_apart(times.size, n)
-    for i in range(times.size):
-        for k in range(n):
-            out[i, k] = evaluate_signal(s, k, times[i])[0]
-    return out

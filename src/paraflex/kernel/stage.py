@@ -53,8 +53,20 @@ def equations(p, signals, t, weights, q, v, a, lam, torques, ws):
 
     The latter are w_a Phi'' + w_v Phi' + w_q Phi for weights (w_a, w_v, w_q).
     """
+    note_torques(signals, t, torques)
+    residuals(p, signals, t, weights, q, v, a, lam, torques, ws)
+
+
+@inlined
+def note_torques(signals, t, torques):
+    """Torques of the motors at a time."""
     for k in range(torques.size):
         torques[k] = evaluate_signal(signals, k, t)[0]
+
+
+@routine
+def residuals(p, signals, t, weights, q, v, a, lam, torques, ws):
+    """What `equations` find, with given torques."""
     start_rows(p, signals, t, weights, ws.rows)
     start_compliant_rows(p, lam, ws.rows)
     for i in range(p.bodies.size):
@@ -91,9 +103,10 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
     """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     previous = 0.0
+    note_torques(signals, t, torques)
     for iteration in range(1, MAX_ITERATIONS + 1):
         place(qs, vs, g, b, a, shift, ws)
-        equations(p, signals, t, weights, ws.q, ws.v, a, lam, torques, ws)
+        residuals(p, signals, t, weights, ws.q, ws.v, a, lam, torques, ws)
         right_hand_side(p, ws, scale)
         solve_system(p, ws, ws.x, ws.mu)
         add(ws.x, a)

@@ -18,8 +18,8 @@ from paraflex.dynamics import (
 )
 from paraflex.errors import InputError, Moment, UnreachablePathError
 from paraflex.kernel.arrays import apart
-from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, SINGULAR, close_path, task_values
-from paraflex.kernel.packed import MARKER, PackedSystem, Signals, make_scratch
+from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, SINGULAR, close_path, make_closure_scratch, task_values
+from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.mechanism import Assembly, Mechanism
 from paraflex.mechanism.mechanism import TASK_COORDINATES
@@ -194,17 +194,18 @@ class _Closure:
         return project_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
     def task(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        zero = np.zeros_like(q)
-        return task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero)[0]
+        zero, out = np.zeros_like(q), apart((3, self.coordinates.size))
+        task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero, out)
+        return out[0]
 
     def target(self, path: Path, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(3, times, tasks): the task coordinates chosen from x, y, angle."""
+        """(times, 3, tasks): the task coordinates chosen from x, y, angle."""
         motion, turning = path.evaluate(t), _turning(path, t)
         if turning is None:
             turning = np.zeros((3, t.size))
             turning[0] = self.orientation
         full = np.concatenate([np.stack(motion), turning[:, :, None]], axis=2)
-        return np.ascontiguousarray(full[:, :, self.coordinates])
+        return np.ascontiguousarray(full[:, :, self.coordinates].transpose(1, 0, 2))
 
     def run(self, times: NDArray[np.float64], target: NDArray[np.float64], pose: NDArray[np.float64]):
         """Closure along targets; status, index, residual, and what was computed."""
@@ -223,7 +224,7 @@ class _Closure:
             v,
             a,
             basis,
-            make_scratch(self.packed),
+            make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size),
         )
         return status, int(index), residual, (q, v, a, basis)
 
@@ -234,8 +235,8 @@ class _Closure:
         residual = 0.0
         for steps in _APPROACHES:
             fractions = np.linspace(0.0, 1.0, steps + 1)
-            target = np.zeros((3, steps + 1, goal.size))
-            target[0] = here + fractions[:, None] * (goal - here)
+            target = np.zeros((steps + 1, 3, goal.size))
+            target[:, 0] = here + fractions[:, None] * (goal - here)
             status, _, residual, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
             if status == CLOSED:
                 return q[-1]
@@ -270,7 +271,7 @@ class _Closure:
         what = (
             f"the path is out of reach (a gap of {gap:.3g} remains)" if gap else "the path passes a Type I singularity"
         )
-        moment = Moment(float(grid[index]), motion.t.size, tuple(target[0, index]))
+        moment = Moment(float(grid[index]), motion.t.size, tuple(target[index, 0]))
         raise UnreachablePathError(what, moment, partial=motion)
 
 
