@@ -450,7 +450,7 @@ def test_a_turned_modal_body_has_the_chord_of_the_beam():
     turn = 0.7
     beam = replace(stiff(quintic()), **TIP)
     body = as_modal(beam, turn)
-    options = IntegrationOptions(tolerance=1e-5)
+    options = IntegrationOptions(method="esdirk5", tolerance=1e-8, newton_fraction=1e-6)
     theirs = record(tracked(beam).simulate("+", options=options))
     turned = replace(arm(body), assemblies=(Assembly("up", {"rod": 0.4 - turn}),))
     mine = record(plan_tracking(turned, SWING, samples=16).simulate("+", options=options))
