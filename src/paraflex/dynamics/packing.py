@@ -210,7 +210,10 @@ def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
 
 def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix with columns of zeros up to whole vectors."""
-    return np.pad(matrix, ((0, 0), (0, padded(matrix.shape[1]) - matrix.shape[1])))
+    rows, columns = matrix.shape
+    out = np.zeros((rows, padded(columns)))
+    out[:, :columns] = matrix
+    return out
 
 
 def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[NDArray[np.float64]]:
@@ -288,11 +291,8 @@ def _mass_records(bodies: tuple[BodyCoordinates, ...]) -> NDArray[np.void]:
 
 
 def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
-    out = np.zeros(len(values), dtype=dtype)
-    for record, value in zip(out, values, strict=True):
-        for key, entry in value.items():
-            record[key] = entry
-    return out
+    blank = dict.fromkeys(dtype.names or (), 0)
+    return np.array([tuple((blank | value).values()) for value in values], dtype=dtype)
 
 
 def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:

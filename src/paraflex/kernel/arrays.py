@@ -6,6 +6,7 @@ differently. Small arrays lie close or not as it happens: runs would differ by r
 
 from __future__ import annotations
 
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ ROOM = 128
 
 def apart(shape: int | tuple[int, ...], dtype: type = float) -> NDArray[Any]:
     """Zeros of a shape, far from any other array."""
-    count = int(np.prod(shape))
+    count = shape if isinstance(shape, int) else prod(shape)
     return np.zeros(count + 2 * ROOM, dtype)[ROOM : ROOM + count].reshape(shape)
 
 
