@@ -8,7 +8,7 @@ differ (the linear shape, second order, exact beams, rigid segments), and none i
 are searched from coarse to fine; what counts is the median wall time of several runs of the first that is within the
 target together with the next finer one. Integration alone is timed, making and assembling the model is told beside it.
 
-Exudyn is tried with full and modified Newton, dense and sparse matrices and several numerical dampings; its torques are
+Ours are tried with error control and with fixed steps, as all others have. Exudyn is tried with full and modified Newton, dense and sparse matrices and several numerical dampings; its torques are
 set by a function of Python before each step, whose time is taken off in a column of its own. MuJoCo is tried with each
 of its integrators. What each chose is timed in turns, so that all see the same moods of the machine. Takes minutes.
 """
@@ -50,6 +50,9 @@ MODE, TARGET, DURATION, REPEATS = "++++", 1.2e-5, 0.7, 5
 # Leads to reach over Exudyn and MuJoCo, and times [s] of TR-BDF2 and of the best method.
 LEADS, GOALS = {"Exudyn": 10.0, "MuJoCo": 40.0}, {"TR-BDF2": 0.10, "the best method": 0.05}
 TOLERANCES = tuple(1e-3 * 10.0 ** (-k / 10.0) for k in range(36))
+# Fixed steps [s], coarse to fine, and what Newton's tolerance is then derived from [m].
+STEPS = tuple(3e-3 * 0.93**k for k in range(55))
+LEFT_TO_NEWTON = {"tr-bdf2": 1e-4, "esdirk5": 1e-3}
 CONVERGED = 1e-7
 
 
@@ -160,13 +163,14 @@ def _result(choice: Choice, runs: Sequence[Run]) -> Result:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """A method at a tolerance [m]."""
+    """A method at a tolerance [m], or with fixed steps [s]."""
 
     method: str
     tolerance: float
+    step: float | None = None
 
     def __str__(self) -> str:
-        return f"{self.method}, {self.tolerance:.2g} m"
+        return f"{self.method}, {self.tolerance:.2g} m" if self.step is None else f"{self.method}, {self.step:.2g} s"
 
 
 def run_paraflex(task: TrackingTask, geometry: Geometry, setting: Tolerance) -> Run:
@@ -174,7 +178,7 @@ def run_paraflex(task: TrackingTask, geometry: Geometry, setting: Tolerance) -> 
     began = time.perf_counter()
     case = tracking_case(task.remodelled(task.mechanism.with_geometry(geometry)), MODE)
     setup = time.perf_counter() - began
-    solution = case.solve(IntegrationOptions(method=setting.method, tolerance=setting.tolerance), None)
+    solution = case.solve(IntegrationOptions(**asdict(setting)), None)
     return Run(case.places(solution)[:, 0], solution.wall_time, setup, steps=solution.steps)
 
 
@@ -189,8 +193,11 @@ def our_choices(task: TrackingTask, target: float, *, with_scipy: bool = True) -
         path = run(fine).path
         converged = Converged(str(fine), path, distance(path, run(Tolerance("esdirk4", 5.0 * CONVERGED)).path))
         for method in ("tr-bdf2", "esdirk5"):
-            settings = [Tolerance(method, tolerance) for tolerance in TOLERANCES]
-            yield choose(f"paraflex {method}, {geometry.value}", settings, run, converged, target)
+            name = f"paraflex {method}, {geometry.value}"
+            controlled = [Tolerance(method, tolerance) for tolerance in TOLERANCES]
+            fixed = [Tolerance(method, LEFT_TO_NEWTON[method], step) for step in STEPS]
+            yield choose(name, controlled, run, converged, target)
+            yield choose(f"{name}, fixed steps", fixed, run, converged, target)
         if geometry is Geometry.LINEAR and with_scipy:
             settings = [Tolerance("radau", tolerance) for tolerance in TOLERANCES[::2]]
             yield choose("SciPy Radau on the ODE, linear", settings, run, converged, target)
