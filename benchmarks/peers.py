@@ -8,9 +8,10 @@ differ (the linear shape, second order, exact beams, rigid segments), and none i
 are searched from coarse to fine; what counts is the median wall time of several runs of the first that is within the
 target together with the next finer one. Integration alone is timed, making and assembling the model is told beside it.
 
-Ours are tried with error control and with fixed steps, as all others have. Exudyn is tried with full and modified Newton, dense and sparse matrices and several numerical dampings; its torques are
-set by a function of Python before each step, whose time is taken off in a column of its own. MuJoCo is tried with each
-of its integrators. What each chose is timed in turns, so that all see the same moods of the machine. Takes minutes.
+Ours are tried with error control and with fixed steps, as all others have. Exudyn is tried with full and modified
+Newton, dense and sparse matrices and several numerical dampings; its torques are set by a function of Python before
+each step, whose time is taken off in a column of its own. MuJoCo is tried with each of its integrators. What each chose
+is timed in turns, so that all see the same moods of the machine. Takes minutes.
 """
 
 from __future__ import annotations
