@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, copy, fill, largest
 from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.compiling import kernel, routine
+from paraflex.kernel.compiling import kernel, lasting, routine
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.dense import factor_dense, solve_factored
 from paraflex.kernel.joints import (
@@ -191,7 +191,7 @@ def move_loops(p, signals, marker, coordinates, t, target, q, v, a, basis, ws):
         a[j] = ws.single[j, 0]
 
 
-@kernel
+@lasting
 def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, basis, ws):
     """Close the loops along a path, each instant starting from the one before.
 

@@ -1,4 +1,4 @@
-"""How kernels are compiled: cached on disk, without the GIL, free to reorder sums, and without counting references.
+"""How kernels are compiled: cached on disk, free to reorder sums, and without counting references.
 
 Numba counts the references to every array that a local name stands for, one field of a workspace and all of its others
 with it, by atomic operations that cost more than the arithmetic. Kernels make no arrays: their caller owns them all.
@@ -21,7 +21,6 @@ FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
 
 _OPTIONS: dict[str, Any] = {
     "cache": True,
-    "nogil": True,
     "error_model": "numpy",
     "fastmath": FAST_MATH,
     "no_cfunc_wrapper": True,
@@ -46,12 +45,12 @@ class Kernel:
     from_python, inner : numba dispatchers
     """
 
-    def __init__(self, function: FunctionType) -> None:
+    def __init__(self, function: FunctionType, **options: Any) -> None:
         update_wrapper(self, function)
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         # The cache goes by this name.
         entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
-        self.from_python = njit(**_OPTIONS)(entry)
+        self.from_python = njit(**_OPTIONS, **options)(entry)
         self.inner = routine(function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -83,3 +82,12 @@ def kernel(function: Callable[..., Any]) -> Kernel:
     """Make a kernel of a function."""
     assert isinstance(function, FunctionType)
     return Kernel(function)
+
+
+def lasting(function: Callable[..., Any]) -> Kernel:
+    """Make a kernel that lets other threads run meanwhile: of a function that takes long.
+
+    One that soon returns would have to wait for them.
+    """
+    assert isinstance(function, FunctionType)
+    return Kernel(function, nogil=True)

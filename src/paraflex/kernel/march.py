@@ -6,7 +6,7 @@ from math import ceil
 
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.compiling import inlined, kernel, lasting, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
@@ -204,7 +204,7 @@ def accept(p, signals, tableau, controls, t, h, m, ws, out):
     note_constraints(p, signals, t + h, m, ws)
 
 
-@kernel
+@lasting
 def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
     """Advance by up to max_steps attempted steps, ending steps exactly at each of the times in `stops`.
 

@@ -10,6 +10,7 @@ import math
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -35,6 +36,8 @@ _AHEAD = 2
 _DEATHS = 2
 # Seconds in which a scheduler must answer, and between two counts of a cluster's workers.
 _REACHED_WITHIN, _RECOUNT = 10.0, 5.0
+# How long a thread waits for another's Python before it asks for its turn [s]: runs leave Python and come back often.
+_SWITCH = 2e-4
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -76,6 +79,8 @@ class Threads:
         self.workers = workers
         self._stop = threading.Event()
         self._pool = ThreadPoolExecutor(workers)
+        self._switching = sys.getswitchinterval()
+        sys.setswitchinterval(_SWITCH)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
         """See `Engine`."""
@@ -89,6 +94,7 @@ class Threads:
         if abandon:
             self._stop.set()
         self._pool.shutdown(cancel_futures=True)
+        sys.setswitchinterval(self._switching)
 
     def _watch(self, _: float) -> None:
         if self._stop.is_set():
