@@ -38,8 +38,8 @@ print(len(kernels), sum(len(f.signatures) for f in kernels))
 WHERE = """
 import numpy as np
 from paraflex import compilation
-from paraflex.kernel.dense import solve_dense
-solve_dense(np.eye(2), np.ones((2, 1)))
+from paraflex.kernel.dense import factor_dense
+factor_dense(np.eye(2), np.zeros(2, int))
 print(compilation._folder())
 print(compilation.are_compiled())
 compilation._drop_outdated()
