@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
 from paraflex.studies.optimisation.objective import Target
@@ -80,6 +79,8 @@ def fit(study: DesignStudy, evaluate: Evaluate, slopes: Slopes, start: Evaluated
     LimitReached
         As many designs as the study allows.
     """
+    from scipy.optimize import least_squares
+
     given = study.search.tolerance
     tolerance = _TOLERANCE if given is None else given
 

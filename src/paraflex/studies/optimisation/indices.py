@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
@@ -193,6 +191,9 @@ def sobol_indices(
     OutputError
         See `sweep`.
     """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     study = study if isinstance(study, IndicesStudy) else load_indices(study, metrics, samples, seed)
     done = sweep(study.sweep, folder, engine=engine, workers=workers, cluster=cluster, on_progress=on_progress, run=run)
     table = Path(folder) / TABLE
@@ -207,6 +208,8 @@ def sobol_indices(
 
 
 def _indices(study: IndicesStudy, table: Path) -> list[SobolIndices]:
+    import pyarrow.parquet as pq
+
     setting = study.sweep.setting
     shape = (len(study.sweep.designs), len(setting.paths), len(setting.modes))
     read = pq.read_table(table, columns=["status", *study.columns])

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
 
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.problem import Problem
@@ -65,6 +64,8 @@ def _slsqp(problem: Problem, start: Array) -> str:
 
 
 def _trust(problem: Problem, start: Array) -> str:
+    from scipy.optimize import NonlinearConstraint
+
     limits = NonlinearConstraint(problem.room, 0.0, np.inf, jac=problem.room_slope)  # pyright: ignore[reportArgumentType]
     constraints = [limits] if problem.objective.limits else []
     tolerance = _tolerance(problem)
@@ -77,11 +78,15 @@ def _lbfgsb(problem: Problem, start: Array) -> str:
 
 
 def _scipy(problem: Problem, start: Array, method: str, **given: Any) -> str:
+    from scipy.optimize import minimize
+
     bounds = [(0.0, 1.0)] * start.size
     return _told(minimize(problem.value, start, jac=problem.slope, method=method, bounds=bounds, **given))
 
 
 def _simplex(problem: Problem, start: Array) -> str:
+    from scipy.optimize import minimize
+
     # Edges point away from the nearer bound.
     corners = np.vstack([start, start + np.diag(np.where(start > 0.5, -_SIMPLEX, _SIMPLEX))])
     tolerance = _tolerance(problem)
@@ -94,6 +99,8 @@ def _simplex(problem: Problem, start: Array) -> str:
 
 
 def _evolution(problem: Problem, start: Array) -> str:
+    from scipy.optimize import differential_evolution
+
     return _told(
         differential_evolution(
             lambda population: np.array(problem.scores(list(np.atleast_2d(population.T)))),

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 _HELD = 1e-6
 # What a design costs that passes a limit, and one that does not run, in objectives of the start.
 _OUTSIDE, _FAILED = 1e2, 1e4
+# The same for methods with slopes, which accept nothing above the start: more would spoil what they learn of curvature.
+_REFUSED = 3.0
 
 
 class Problem:
@@ -61,11 +63,11 @@ class Problem:
         return [self._score(design) for design in self.evaluate([self.study.design(x) for x in places])]
 
     def value(self, x: Array) -> float:
-        """For methods with slopes: the objective, and far more beyond the designs that run."""
+        """For methods with slopes: the objective, and more than at the start beyond the designs that run."""
         design = self.at(x)
         if design.complete:
             return self.objective.value(design, self.scales)
-        return _FAILED * self.cost * (1.0 + float(np.linalg.norm(x - self._safe)))
+        return _REFUSED * self.cost * (1.0 + float(np.linalg.norm(x - self._safe)))
 
     def slope(self, x: Array) -> Array:
         """Derivatives of `value`, (parameters,)."""
@@ -74,7 +76,7 @@ class Problem:
             self._safe = np.array(x)
             return self.objective.slope(design, self.scales, self.slopes(design))
         away = x - self._safe
-        return _FAILED * self.cost * away / (float(np.linalg.norm(away)) or 1.0)
+        return _REFUSED * self.cost * away / (float(np.linalg.norm(away)) or 1.0)
 
     def room(self, x: Array) -> Array:
         """How far metrics are below their limits, (limits,); none where the design fails."""

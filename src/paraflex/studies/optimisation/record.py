@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
-from typing import Any
-
-import pyarrow as pa
-import pyarrow.parquet as pq
+from typing import TYPE_CHECKING, Any
 
 from paraflex.errors import OutputError
 from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.studies.sweeps.run import Row
 from paraflex.studies.sweeps.table import PARTS, RESULTS, PartsWriter, parts, read_rows, table_schema, whole_file
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 # Rows wait so long before they are written [s]: what a crash can cost.
 _SECONDS = 2.0
@@ -27,6 +27,8 @@ def slope_column(column: str, parameter: str) -> str:
 
 def record_schema(study: DesignStudy, *, slopes: bool) -> pa.Schema:
     """Columns of the table: a sweep's, and derivatives of the metrics that count where they are exact."""
+    import pyarrow as pa
+
     setting = study.setting
     schema = table_schema(setting.names, setting.whole, setting.metrics, study.base.motors)
     if slopes:
@@ -77,6 +79,9 @@ class Record:
 
     def finish(self) -> Path:
         """All rows in one table, in the order the designs were asked for; the parts go."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
         self.write()
         rows = sorted(self.rows.values(), key=lambda row: row["run"])
         columns = [pa.array([row.get(field.name) for row in rows], field.type) for field in self.schema]
@@ -101,6 +106,8 @@ def write_figures(file: Path, figures: dict[str, Any]) -> None:
 
 
 def _found(folder: Path) -> list[Row]:
+    import pyarrow as pa
+
     rows: list[Row] = []
     table = folder / RESULTS
     for file in [*([table] if table.exists() else []), *parts(folder)]:

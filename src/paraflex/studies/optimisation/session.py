@@ -140,7 +140,7 @@ def sampled_start(
     number, asked = study.search.samples, [study.start]
     if number:
         points = designs(study.parameters, SOBOL, number, study.search.seed)
-        asked += [tuple(point) for point in points.tolist()]
+        asked += [study.design(study.unit(point)) for point in points.tolist()]
     done = evaluate(asked)
     return best(done) or done[0]
 

@@ -105,7 +105,7 @@ class DesignStudy:
     def design(self, unit: Array) -> tuple[float, ...]:
         """Numbers of a point of the unit cube, which the ranges are mapped to: logarithmic ones by the logarithm."""
         inside = np.clip(unit, 0.0, 1.0)
-        return tuple(float(p.spread(x)) for p, x in zip(self.parameters, inside, strict=True))
+        return tuple(_rounded(p, float(p.spread(x))) for p, x in zip(self.parameters, inside, strict=True))
 
     def unit(self, design: Sequence[float]) -> Array:
         """Where a design is in the unit cube."""
@@ -172,8 +172,9 @@ def _load(file: str | FilePath, make: Any) -> DesignStudy:
 def _optimisation(table: StudyTable, folder: FilePath) -> DesignStudy:
     if table.objective is None:
         raise InputError("is missing", field="objective", remedy="say [objective] minimise = { tracking_rms = 1.0 }")
-    names = [*table.objective.minimise, *(each.metric for each in table.objective.at_most)]
-    base = _base(table, folder, names)
+    columns = {f"objective.minimise.{name}": name for name in table.objective.minimise}
+    columns |= {f"objective.at_most.{k}.metric": each.metric for k, each in enumerate(table.objective.at_most)}
+    base = _base(table, folder, columns)
     objective = _objective(table.objective, base)
     return DesignStudy(base, objective, (), _search(table.search))
 
@@ -186,20 +187,24 @@ def _identification(table: StudyTable, folder: FilePath) -> DesignStudy:
             "an identification is a problem of least squares", field="search.method", value=table.search.method,
             remedy="leave it out",
         )  # fmt: skip
-    base = _base(table, folder, [target.metric for target in table.target])
+    base = _base(table, folder, {f"target.{k}.metric": target.metric for k, target in enumerate(table.target)})
     targets = tuple(_target(entry, k, base) for k, entry in enumerate(table.target))
     return DesignStudy(base, None, targets, _search(table.search))
 
 
-def _base(table: StudyTable, folder: FilePath, columns: list[str]) -> SweepStudy:
-    """What is run, its one design the start; with the metrics that are kept anyway and those that count."""
+def _base(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> SweepStudy:
+    """What is run, its one design the start; with the metrics that are kept anyway and those that count, by field."""
     for name, entry in table.vary.items():
         _check_range(f"vary.{name}", entry)
-    metrics = list(dict.fromkeys([*table.metrics, *(_metric(name) for name in columns)])) if table.metrics else []
+    for field, column in columns.items():
+        name = _metric(column)
+        if name not in METRICS:
+            raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(METRICS)))
+    metrics = list(dict.fromkeys([*table.metrics, *map(_metric, columns.values())])) if table.metrics else []
     sampling = SamplingTable(kind=RANDOM, number=1)
     base = make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
-    for column in columns:
-        _check_column(column, base.motors)
+    for field, column in columns.items():
+        _check_column(field, column, base.motors)
     start = [
         _start(base.setting, places, p, table.vary[p.name].start)
         for p, places in zip(base.parameters, base.setting.places, strict=True)
@@ -221,16 +226,14 @@ def _metric(column: str) -> str:
     return column.partition(".")[0]
 
 
-def _check_column(column: str, motors: tuple[str, ...]) -> None:
+def _check_column(field: str, column: str, motors: tuple[str, ...]) -> None:
     """Nothing, if a metric is one number of each run."""
     name, _, motor = column.partition(".")
-    if name not in METRICS:
-        raise InputError("unknown metric", field="metric", value=column, remedy=suggestion(name, list(METRICS)))
     known = [f"{name}.{each}" for each in motors]
     if METRICS[name].per_motor and column not in known:
-        raise InputError("of which motor?", field="metric", value=column, remedy=suggestion(column, known))
+        raise InputError("of which motor?", field=field, value=column, remedy=suggestion(column, known))
     if motor and not METRICS[name].per_motor:
-        raise InputError("not a metric per motor", field="metric", value=column, remedy=f'say "{name}"')
+        raise InputError("not a metric per motor", field=field, value=column, remedy=f'say "{name}"')
 
 
 def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given: float | None) -> float:
@@ -248,7 +251,7 @@ def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given
             f"outside the bounds, {parameter.low:g} to {parameter.high:g}", field=field, value=start,
             remedy="give a start within, or other bounds",
         )  # fmt: skip
-    return start
+    return _rounded(parameter, start)
 
 
 def _number_at(data: Mapping[str, Any], place: Place) -> float:
@@ -266,6 +269,13 @@ def _share(parameter: Varied, value: float) -> float:
     if parameter.log:
         return float(np.log(value / parameter.low) / np.log(parameter.high / parameter.low))
     return (value - parameter.low) / (parameter.high - parameter.low)
+
+
+def _rounded(parameter: Varied, value: float) -> float:
+    """A value to twelve digits, within the bounds: the last ones would only keep equal designs apart."""
+    assert parameter.low is not None
+    assert parameter.high is not None
+    return min(max(float(f"{value:.12g}"), parameter.low), parameter.high)
 
 
 def _objective(table: ObjectiveTable, base: SweepStudy) -> Objective:
