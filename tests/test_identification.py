@@ -71,16 +71,17 @@ def linear_targets():
 
 def test_deviations_are_those_of_a_linear_model(tmp_path):
     """Solution and covariance s^2 (J^T J)^-1 from the normal equations."""
-    result = identify(study_of(tmp_path, *linear_targets()), tmp_path / "out", run=made_up(**METRICS))
-    jacobian = np.array([[4.0, 2.0], [3.0, -1.0], [1.0, 0.0]])
-    data = jacobian @ [0.25, 0.5] + [0.0, 0.0, 0.1]
+    more = TARGET % ("tracking_rms", float(line(0.0035, 10**-0.5)) - 0.2, "relative = false")
+    result = identify(study_of(tmp_path, *linear_targets(), more), tmp_path / "out", run=made_up(**METRICS))
+    jacobian = np.array([[4.0, 2.0], [3.0, -1.0], [1.0, 0.0], [4.0, 2.0]])
+    data = jacobian @ [0.25, 0.5] + [0.0, 0.0, 0.1, -0.2]
     unit = np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ data)
     left = data - jacobian @ unit
-    covariance = left @ left * np.linalg.inv(jacobian.T @ jacobian)
+    covariance = left @ left / 2.0 * np.linalg.inv(jacobian.T @ jacobian)
     values = [0.002 + 0.006 * unit[0], 0.1 * 10 ** unit[1]]
     assert list(result.values.values()) == pytest.approx(values, rel=1e-6)
     assert [each.residual for each in result.targets] == pytest.approx(-left, abs=1e-6)
-    assert result.residual == pytest.approx(np.sqrt(left @ left / 3.0), rel=1e-6)
+    assert result.residual == pytest.approx(np.sqrt(left @ left / 4.0), rel=1e-6)
     found = result.confidence
     assert found is not None
     scale = np.array([0.006, values[1] * np.log(10.0)])

@@ -20,8 +20,9 @@ from paraflex.plots import convergence
 from paraflex.studies import load_optimisation, optimise
 from paraflex.studies.optimisation.best import toml_text
 from paraflex.studies.optimisation.evaluate import Evaluate
+from paraflex.studies.optimisation.problem import Problem
 from paraflex.studies.optimisation.record import Record, record_schema
-from paraflex.studies.optimisation.slopes import differences
+from paraflex.studies.optimisation.slopes import differences, slopes_of
 from paraflex.studies.sweeps import open_engine, run_task
 
 OBJECTIVE = """
@@ -135,6 +136,25 @@ def test_designs_that_fail_do_not_end_it(tmp_path, method):
     table = pd.read_parquet(result.table)
     assert set(table["status"]) == {"complete", "failed"}
     assert (table[table["status"] == "failed"]["x"] < 0.0045).all()
+
+
+def test_where_nothing_runs_the_slope_leads_back(tmp_path):
+    """Value and slope beyond the designs that run fit each other and lie above the start."""
+
+    def slope(mode, x, y):
+        if x < 0.0045:
+            raise ValueError("out of reach")
+        return x / 0.005
+
+    study = study_of(tmp_path, OBJECTIVE)
+    evaluate = evaluate_of(study, tmp_path / "out", made_up(tracking_rms=slope))
+    problem = Problem(study, evaluate, slopes_of(study, evaluate))
+    problem.slope(problem.start)
+    x, step = np.array([0.1, 0.7]), np.diag([1e-4, 1e-4])
+    rise = [(problem.value(x + h) - problem.value(x - h)) / 2e-4 for h in step]
+    assert problem.value(x) > problem.value(problem.start)
+    assert problem.slope(x) == pytest.approx(rise, rel=1e-5)
+    assert problem.slope(x) @ (x - problem.start) > 0.0
 
 
 def test_a_metric_that_is_no_number_does_not_count(tmp_path):
