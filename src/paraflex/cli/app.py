@@ -37,6 +37,22 @@ MethodOption = Annotated[
     str | None, typer.Option(metavar="NAME", help="Method of integration: paraflex methods lists them.")
 ]
 AssemblyOption = Annotated[str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")]
+StudyArgument = Annotated[
+    str, typer.Argument(metavar="STUDY.toml", help="What is free within which bounds, what is run.")
+]
+OutputOption = Annotated[
+    str | None, typer.Option("--output", "--out", metavar="DIR", help="Folder for results. Default: results/STUDY.")
+]
+EngineOption = Annotated[
+    str, typer.Option("--engine", metavar="threads|processes|dask", help="Who computes; results are the same.")
+]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", metavar="N", help="How many. Default: one a processor.")
+]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="Of a Dask scheduler. Default: one on this machine."),
+]
 Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
 
 
@@ -269,8 +285,77 @@ def sweep(
     """
     from paraflex.cli.sweep import SweepRequest, sweep_command
 
-    chosen = "dask" if cluster is not None and engine == "threads" else engine
-    raise typer.Exit(sweep_command(SweepRequest(study, output, chosen, workers, cluster, limit, json)))
+    raise typer.Exit(
+        sweep_command(SweepRequest(study, output, _engine(engine, cluster), workers, cluster, limit, json))
+    )
+
+
+@app.command()
+@app.command("optimize", hidden=True)
+def optimise(
+    study: StudyArgument,
+    output: OutputOption = None,
+    engine: EngineOption = "threads",
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    json: Json = False,
+) -> None:
+    """Look for the design whose metrics are least; the same command goes on where it was stopped.
+
+    Writes result.json, best.toml, results.parquet and figures/.
+    """
+    from paraflex.cli.optimise import optimise_command
+    from paraflex.cli.search import SearchRequest
+
+    request = SearchRequest(study, output, _engine(engine, cluster), workers, cluster, json)
+    raise typer.Exit(optimise_command(request))
+
+
+@app.command()
+def identify(
+    study: StudyArgument,
+    output: OutputOption = None,
+    engine: EngineOption = "threads",
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    json: Json = False,
+) -> None:
+    """Look for the parameters that reproduce given metrics; the same command goes on where it was stopped.
+
+    Writes result.json, best.toml, results.parquet and figures/.
+    """
+    from paraflex.cli.identify import identify_command
+    from paraflex.cli.search import SearchRequest
+
+    request = SearchRequest(study, output, _engine(engine, cluster), workers, cluster, json)
+    raise typer.Exit(identify_command(request))
+
+
+@app.command()
+def indices(
+    study: StudyArgument,
+    metric: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="A metric; repeatable. Default: the study's.")
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option(metavar="N", help="Base samples, a power of two; (parameters + 2) N designs are run.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Of the samples. Default: the study's.")] = None,
+    output: OutputOption = None,
+    engine: EngineOption = "threads",
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    json: Json = False,
+) -> None:
+    """Tell which parameters metrics depend on: first-order and total Sobol indices over their ranges.
+
+    Writes indices.json, indices.parquet, results.parquet and figures/.
+    """
+    from paraflex.cli.indices import IndicesRequest, indices_command
+
+    chosen = _engine(engine, cluster)
+    request = IndicesRequest(study, output, metric or [], samples, seed, chosen, workers, cluster, json)
+    raise typer.Exit(indices_command(request))
 
 
 @app.command()
@@ -348,6 +433,11 @@ def main() -> None:
     except KeyboardInterrupt:
         typer.echo("interrupted", err=True)
         sys.exit(INTERRUPTED)
+
+
+def _engine(name: str, cluster: str | None) -> str:
+    """The engine asked for; a cluster is Dask's."""
+    return "dask" if cluster is not None and name == "threads" else name
 
 
 def _start_quickly() -> None:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from paraflex.errors import OutputError
 from paraflex.plots.agreement import compared_links, compared_paths, model_distances, prototype_pair
 from paraflex.plots.modes import motor_torques, tracking_errors
+from paraflex.plots.optimisation import convergence, sobol_bars, targets_reached
 from paraflex.plots.overview import motion_overview
 from paraflex.plots.phase import phase_diagrams
 from paraflex.plots.runs import default_mode
@@ -116,6 +117,32 @@ def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[
     if not any(run["status"] == "complete" for method in figures["methods"].values() for run in method["runs"]):
         return []
     return _save({"work_precision": partial(work_precision, figures)}, Path(folder))
+
+
+def save_search_figures(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
+    """Write the figures of an optimisation, an identification or of Sobol indices as PNG and SVG.
+
+    Parameters
+    ----------
+    figures : mapping
+        From the `figures` of its result, or read from `result.json` or `indices.json`. There are none of a search in
+        which no design ran, nor of metrics that do not vary.
+    folder : str or Path
+        Made if it is not there; files of the same names are written over.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    drawn: dict[str, Callable[[], Figure]] = {}
+    if any(value is not None for _, value, _ in figures.get("history", ())):
+        drawn["convergence"] = partial(convergence, figures)
+    if any(target["value"] != 0.0 for target in figures.get("targets", ())):
+        drawn["targets"] = partial(targets_reached, figures)
+    if any(row["first"] is not None for row in figures.get("indices", ())):
+        drawn["indices"] = partial(sobol_bars, figures)
+    return _save(drawn, Path(folder)) if drawn else []
 
 
 def _save(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:

@@ -4,6 +4,18 @@ from paraflex.studies.agreement import agreement
 from paraflex.studies.cases import Case, motion_case, tracking_case
 from paraflex.studies.compare import ComparisonOptions, compare_methods
 from paraflex.studies.comparison import Measurement, MethodComparison, Reference
+from paraflex.studies.optimisation import (
+    DesignStudy,
+    IdentificationResult,
+    IndicesResult,
+    OptimisationResult,
+    identify,
+    load_identification,
+    load_indices,
+    load_optimisation,
+    optimise,
+    sobol_indices,
+)
 from paraflex.studies.sweeps import SweepProgress, SweepResult, SweepStudy, load_sweep, sweep
 from paraflex.studies.tracking import Simulator, StudyResult, run_study
 from paraflex.studies.verification import (
@@ -21,9 +33,13 @@ __all__ = [
     "FIDELITIES",
     "Case",
     "ComparisonOptions",
+    "DesignStudy",
+    "IdentificationResult",
+    "IndicesResult",
     "Measurement",
     "MethodComparison",
     "ModelRuns",
+    "OptimisationResult",
     "Reference",
     "Refinement",
     "Simulator",
@@ -36,10 +52,16 @@ __all__ = [
     "agreement",
     "check_model",
     "compare_methods",
+    "identify",
+    "load_identification",
+    "load_indices",
+    "load_optimisation",
     "load_sweep",
     "motion_case",
+    "optimise",
     "reference_model",
     "run_study",
+    "sobol_indices",
     "sweep",
     "tracking_case",
     "verify",

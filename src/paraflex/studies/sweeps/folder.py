@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,23 @@ TRAJECTORIES = "trajectories"
 
 
 def claim(folder: Path, study: SweepStudy) -> None:
+    """Make a folder that of a sweep, or see that it is; see `claim_for`."""
+    told = {"name": study.name, "runs": study.runs, "sampling": study.kind}
+    claim_for(folder, study.content(), study.setting.versions, told)
+
+
+def claim_for(folder: Path, content: dict[str, Any], versions: Mapping[str, str], told: dict[str, Any]) -> None:
     """Make a folder that of a study, or see that it is.
+
+    Parameters
+    ----------
+    folder : Path
+    content : dict
+        What the study's results depend on, in plain values.
+    versions : mapping of str to str
+        Of packages.
+    told : dict
+        What `study.json` says besides.
 
     Raises
     ------
@@ -29,8 +46,7 @@ def claim(folder: Path, study: SweepStudy) -> None:
     OutputError
         It cannot be written.
     """
-    content = study.content()
-    said = {"content": digest(content), "versions": dict(study.setting.versions)}
+    said = {"content": digest(content), "versions": dict(versions)}
     file = folder / STUDY
     if file.exists():
         _check_same(folder, _read(file), said)
@@ -44,9 +60,10 @@ def claim(folder: Path, study: SweepStudy) -> None:
             f"the folder holds other files ({', '.join(sorted(others)[:3])})", field="--output", value=str(folder),
             remedy="name a new folder",
         )  # fmt: skip
-    told = said | {"format": 1, "name": study.name, "runs": study.runs, "sampling": study.kind, "study": content}
     with whole_file(file) as unfinished:
-        unfinished.write_text(json.dumps(told, indent=2, default=str) + "\n", encoding="utf-8")
+        unfinished.write_text(
+            json.dumps(said | {"format": 1} | told | {"study": content}, indent=2, default=str) + "\n", encoding="utf-8"
+        )
 
 
 @contextmanager

@@ -1,0 +1,27 @@
+"""`paraflex optimise`: the design whose metrics are least."""
+
+from __future__ import annotations
+
+from paraflex.cli.search import SearchRequest, parameter_table, plain_table, search_command
+from paraflex.cli.tables import plain_console
+from paraflex.studies import OptimisationResult, load_optimisation, optimise
+
+
+def optimise_command(request: SearchRequest) -> int:
+    """Do what is left of an optimisation; the exit code."""
+    return search_command(request, load_optimisation(request.study), optimise, _report, "objective")
+
+
+def _report(result: OptimisationResult) -> None:
+    console = plain_console()
+    console.print(parameter_table(result))
+    table = plain_table()
+    table.add_column("", no_wrap=True)
+    table.add_column("start", justify="right")
+    table.add_column("best", justify="right")
+    table.add_row("objective", f"{result.start_objective:.6g}", f"{result.objective:.6g}")
+    for name, value in result.metrics.items():
+        table.add_row(name, f"{result.start_metrics[name]:.6g}", f"{value:.6g}")
+    console.print(table)
+    if not result.holds_limits:
+        console.print("no design holds all limits; this one passes them least")

@@ -1,0 +1,115 @@
+"""What the commands that look for designs have in common: the request, the folder, the bar, the exit code."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+
+from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
+from paraflex.cli.tables import plain_console
+from paraflex.compilation import compile_kernels_for
+from paraflex.plots import save_search_figures
+from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
+from paraflex.studies.optimisation import Progress as SearchProgress
+
+R = TypeVar("R", OptimisationResult, IdentificationResult)
+
+
+@dataclass(frozen=True)
+class SearchRequest:
+    """What a command that looks for a design was asked for."""
+
+    study: str
+    output: str | None
+    engine: str
+    workers: int | None
+    cluster: str | None
+    json: bool
+
+    @property
+    def folder(self) -> Path:
+        """Where results go."""
+        return Path("results") / Path(self.study).stem if self.output is None else Path(self.output)
+
+
+def search_command(
+    request: SearchRequest, study: DesignStudy, look: Callable[..., R], report: Callable[[R], None], what: str
+) -> int:
+    """Do what is left of a search, write its figures and say what it found; the exit code."""
+    console = plain_console(stderr=True)
+    compile_kernels_for(study.base.model().mechanism, console.print)
+    result = _with_bar(console, study, request, look, what)
+    if result.interrupted and not result.values:
+        console.print("interrupted before the first design was done")
+        return INTERRUPTED
+    save_search_figures({"kind": _kind(result)} | result.figures(), request.folder / "figures")
+    if request.json:
+        print(json.dumps(result.figures() | {"folder": str(result.folder), "fresh": result.fresh}, indent=2))
+    else:
+        report(result)
+        _say_end(console, result, request.folder)
+    if result.interrupted:
+        return INTERRUPTED
+    return COMPLETE if result.values else TROUBLE
+
+
+def parameter_table(result: R, **columns: dict[str, str]) -> Table:
+    """The start and the best of every parameter, and more columns of text."""
+    table = plain_table()
+    table.add_column("parameter", no_wrap=True)
+    for heading in ("start", "best", *columns):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    for name, value in result.values.items():
+        more = [column.get(name, "") for column in columns.values()]
+        bound = result.bounds.get(name)
+        table.add_row(name, f"{result.start[name]:.6g}", f"{value:.6g}", *more, f"at its {bound}" if bound else "")
+    return table
+
+
+def plain_table(title: str | None = None) -> Table:
+    """A table without frames."""
+    return Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
+
+
+def _kind(result: OptimisationResult | IdentificationResult) -> str:
+    return "optimisation" if isinstance(result, OptimisationResult) else "identification"
+
+
+def _with_bar(console: Console, study: DesignStudy, request: SearchRequest, look: Callable[..., R], what: str) -> R:
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.completed} designs, at most {task.total}"),
+        TextColumn("{task.fields[told]}", markup=False),
+    )
+    with Progress(*columns, console=console, transient=not console.is_terminal, refresh_per_second=4) as progress:
+        bar = progress.add_task(study.name, total=study.search.evaluations, told="")
+
+        def tell(at: SearchProgress) -> None:
+            told = "" if at.best is None else f"{what} {at.best:.4g}"
+            progress.update(bar, completed=at.evaluations, told=told)
+
+        given: dict[str, Any] = {"engine": request.engine, "workers": request.workers, "cluster": request.cluster}
+        return look(study, request.folder, on_progress=tell, **given)
+
+
+def _say_end(console: Console, result: OptimisationResult | IdentificationResult, folder: Path) -> None:
+    out = plain_console()
+    failed = f", {result.failed} of them not running" if result.failed else ""
+    out.print(f"{result.evaluations} designs{failed}; {result.stopped}")
+    for reason in result.reasons[:1]:
+        console.print(f"a design that does not run: {reason}", soft_wrap=True)
+    console.print(f"{result.fresh} designs in {result.seconds:.1f} s now")
+    if result.interrupted:
+        console.print(f"so far: {result.table}; the same command goes on from there", soft_wrap=True)
+    else:
+        console.print(f"every run: {result.table}; the best mechanism: {folder / 'best.toml'}", soft_wrap=True)

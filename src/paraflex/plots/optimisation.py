@@ -1,0 +1,171 @@
+"""How a search came down, what an identification reached, and which parameters a metric depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import mode_label
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panels
+from paraflex.plots.style import BLUE, VERMILLION, ZERO, journal_style
+
+_FAINT = "0.6"
+# Heights of a panel, and of a line of one that is a list [mm].
+_PANEL, _LINE = 50.0, 5.5
+# Far above the best a design says nothing of how the search came down; it is drawn at the upper edge.
+_HIGHEST = 3.0
+
+
+@journal_style()
+def convergence(figures: Mapping[str, Any]) -> Figure:
+    """The objective, or root mean square residual, of every design, and the least until then.
+
+    Designs that do not run stand below the axis, those that pass a limit are crosses.
+
+    Parameters
+    ----------
+    figures : mapping
+        From `OptimisationResult.figures` or `IdentificationResult.figures`, or read from `result.json`.
+
+    Raises
+    ------
+    InputError
+        No design ran.
+    """
+    history = [(number + 1, value, held) for number, value, held in figures["history"]]
+    ran = [each for each in history if each[1] is not None]
+    if not ran:
+        raise InputError("no design ran", field="figures", remedy="see the reasons in them")
+    figure, axes = panels(1, 1, width=ONE_COLUMN)
+    panel = axes[0, 0]
+    first = next((value for _, value, held in ran if held), ran[0][1])
+    low = min(value for _, value, _ in ran)
+    top = first + (_HIGHEST - 1.0) * max(first - low, 0.1 * abs(first))
+    for held, marker, label in ((True, "o", "designs"), (False, "x", "passing a limit")):
+        points = [(number, min(value, top)) for number, value, each in ran if each == held]
+        if points:
+            panel.plot(*np.transpose(points), marker, color=_FAINT, markersize=2.2, markeredgewidth=0.6, label=label)
+    _draw_best(panel, ran, len(history))
+    failed = [number for number, value, _ in history if value is None]
+    low, high = panel.get_ylim()
+    if failed:
+        low -= 0.08 * (high - low)
+        panel.plot(failed, np.full(len(failed), low), "|", color=VERMILLION, markersize=4.0, label="not running")
+    panel.set_ylim(low - 0.02 * (high - low), high)
+    panel.set_xlim(0.0, len(history) + 1.0)
+    panel.set_xlabel("design")
+    panel.set_ylabel("objective" if figures["kind"] == "optimisation" else "root mean square residual")
+    return lay_out(figure, axes, panel_height=_PANEL)
+
+
+@journal_style()
+def targets_reached(figures: Mapping[str, Any]) -> Figure:
+    """Every target: what the start and the best design make of it, as a multiple of it.
+
+    Parameters
+    ----------
+    figures : mapping
+        From `IdentificationResult.figures`, or read from `result.json`.
+
+    Raises
+    ------
+    InputError
+        There are no targets, or all of them are zero.
+    """
+    targets = [each for each in figures["targets"] if each["value"] != 0.0]
+    if not targets:
+        raise InputError("no targets to compare with", field="figures", remedy="give figures of an identification")
+    figure, axes = panels(1, 1, width=ONE_COLUMN)
+    panel = axes[0, 0]
+    lines = np.arange(len(targets))
+    for key, marker, colour, label in (("start", "o", _FAINT, "start"), ("reached", "D", BLUE, "best")):
+        ratios = [each[key] / each["value"] for each in targets]
+        panel.plot(ratios, lines, marker, color=colour, markersize=3.5, label=label)
+    panel.axvline(1.0, color=VERMILLION, linewidth=0.7, zorder=0.7, label="target")
+    for line in lines:
+        panel.axhline(line, **ZERO)
+    _list_lines(panel, [_target_name(each, targets) for each in targets])
+    panel.margins(x=0.08)
+    panel.set_xlabel("reached / target")
+    return lay_out(figure, axes, panel_height=_LINE * len(targets) + 2.0)
+
+
+@journal_style()
+def sobol_bars(figures: Mapping[str, Any]) -> Figure:
+    """First-order and total indices of every parameter with their intervals of 95 %; a panel a metric, path and mode.
+
+    Parameters
+    ----------
+    figures : mapping
+        From `IndicesResult.figures`, or read from `indices.json`.
+
+    Raises
+    ------
+    InputError
+        No metric varies.
+    """
+    panels_of: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for row in figures["indices"]:
+        if row["first"] is not None:
+            panels_of.setdefault((row["metric"], row["path"], row["mode"]), []).append(row)
+    if not panels_of:
+        raise InputError("no metric varies", field="figures", remedy="widen the ranges, or choose another metric")
+    columns = min(len(panels_of), 2)
+    rows = -(-len(panels_of) // columns)
+    figure, axes = panels(rows, columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)
+    for panel, (name, parameters) in zip(axes.flat, panels_of.items(), strict=False):
+        _draw_bars(panel, parameters)
+        panel.set_title(_panel_name(name, list(panels_of)), loc="left")
+    for panel in axes.flat[len(panels_of) :]:
+        panel.set_visible(False)
+    for column in axes.T:
+        [panel for panel in column if panel.get_visible()][-1].set_xlabel("share of the variance")
+    most = max(len(parameters) for parameters in panels_of.values())
+    return lay_out(figure, axes, panel_height=1.6 * _LINE * most + 2.0)
+
+
+def _draw_best(panel: Axes, ran: list, last: int) -> None:
+    """The least of the designs that hold all limits, as a line of steps."""
+    numbers, least = [], []
+    for number, value, held in ran:
+        if held and (not least or value < least[-1]):
+            numbers.append(number)
+            least.append(value)
+    if least:
+        panel.step([*numbers, last], [*least, least[-1]], where="post", color=BLUE, label="least until then")
+
+
+def _draw_bars(panel: Axes, rows: list[Mapping[str, Any]]) -> None:
+    lines = np.arange(len(rows))
+    for shift, key, colour, label in ((-0.19, "first", BLUE, "first order"), (0.19, "total", VERMILLION, "total")):
+        values = [row[key] for row in rows]
+        panel.barh(lines + shift, values, height=0.34, color=colour, label=label, linewidth=0.0)
+        panel.errorbar(
+            values, lines + shift, xerr=[row[f"{key}_confidence"] for row in rows], fmt="none", ecolor="black",
+            elinewidth=0.6, capsize=1.5, capthick=0.6,
+        )  # fmt: skip
+    panel.axvline(0.0, **ZERO)
+    _list_lines(panel, [row["parameter"] for row in rows])
+    panel.margins(x=0.05)
+
+
+def _list_lines(panel: Axes, names: list[str]) -> None:
+    panel.set_yticks(range(len(names)), [name.replace("$", r"\$") for name in names])
+    panel.set_ylim(len(names) - 0.4, -0.6)
+
+
+def _target_name(target: Mapping[str, Any], targets: list) -> str:
+    """What tells a target from the others: its mode, and path and metric where they differ."""
+    differing = [key for key in ("metric", "path") if len({each[key] for each in targets}) > 1]
+    return " ".join([mode_label(target["mode"]), *(target[key] for key in differing)])
+
+
+def _panel_name(name: tuple[str, ...], names: list[tuple[str, ...]]) -> str:
+    metric, path, mode = name
+    paths = {each[1] for each in names}
+    return ", ".join([metric, *([path] if len(paths) > 1 else []), mode_label(mode)]).replace("$", r"\$")

@@ -1,0 +1,179 @@
+"""Designs evaluated: each once, all at a time in parallel, every one a few rows of the table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.studies.optimisation.record import Record
+from paraflex.studies.optimisation.study import DesignStudy
+from paraflex.studies.sweeps.engines import Engine, LostWorker, outcomes
+from paraflex.studies.sweeps.run import COMPLETE, Outcome, Row, Task, lost, run_id, run_task
+from paraflex.studies.sweeps.study import Setting
+
+Array = NDArray[np.float64]
+Design = tuple[float, ...]
+RunTask = Callable[..., Outcome]
+
+
+class LimitReached(Exception):
+    """As many designs have been evaluated as the study allows."""
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A design and what became of it.
+
+    Attributes
+    ----------
+    number : int
+        In the order designs were asked for.
+    design : tuple of float
+        Its numbers.
+    rows : tuple of dict
+        Of all its runs: paths, and modes of each.
+    counting : tuple of str
+        Columns that must be numbers.
+    """
+
+    number: int
+    design: Design
+    rows: tuple[Row, ...]
+    counting: tuple[str, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """Why it does not count; empty where all runs are complete."""
+        for row in self.rows:
+            if row["status"] != COMPLETE:
+                return f'{row["path"]}, mode "{row["mode"]}": {row["reason"]}'
+            for column in self.counting:
+                if not _is_finite(row.get(column)):
+                    return f'{row["path"]}, mode "{row["mode"]}": {column} is no number'
+        return ""
+
+    @property
+    def complete(self) -> bool:
+        """Whether all its runs are."""
+        return not self.reason
+
+    def metric(self, column: str) -> Array:
+        """A metric of every run, (runs,)."""
+        return np.array([row[column] for row in self.rows], dtype=float)
+
+
+class Evaluate:
+    """Evaluates designs; what a folder has rows of is read, not computed.
+
+    Parameters
+    ----------
+    study : DesignStudy
+    record : Record
+    engine : Engine
+    run : callable
+        What is done for a task: `run_task` but for exact gradients and in tests.
+    on_evaluated : callable, optional
+        Told each design as it is done.
+    """
+
+    def __init__(
+        self,
+        study: DesignStudy,
+        record: Record,
+        engine: Engine,
+        run: RunTask = run_task,
+        on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
+    ) -> None:
+        self.study, self.record, self.engine, self.run, self.on_evaluated = study, record, engine, run, on_evaluated
+        self.known: dict[Design, Evaluated] = {}
+        self.fresh = 0
+        self._numbers: dict[Design, int] = {}
+        self._single = {mode: replace(study.setting, modes=(mode,)) for mode in study.setting.modes}
+
+    @property
+    def history(self) -> list[Evaluated]:
+        """All that were asked for and are there, in that order."""
+        return sorted(self.known.values(), key=lambda each: each.number)
+
+    def __call__(self, designs: Sequence[Design]) -> list[Evaluated]:
+        """Designs with their rows, in the order given.
+
+        Raises
+        ------
+        LimitReached
+            Not all of them are within the limit; those that are have been evaluated.
+        """
+        for design in designs:
+            self._numbers.setdefault(design, len(self._numbers))
+        limit = self.study.search.evaluations
+        within = [design for design in dict.fromkeys(designs) if self._numbers[design] < limit]
+        lacking = [design for design in within if design not in self.known and not self._read(design)]
+        for design, rows in self._compute(lacking):
+            self.record.add(rows)
+            self.fresh += 1
+            self._keep(design, rows)
+        if len(within) < len(set(designs)):
+            raise LimitReached
+        return [self.known[design] for design in designs]
+
+    def _read(self, design: Design) -> bool:
+        setting = self.study.setting
+        tasks = [Task(0, 0, design, path) for path in setting.paths]
+        rows = self.record.find([run_id(setting, task, mode) for task in tasks for mode in setting.modes])
+        if rows is not None:
+            self._keep(design, rows)
+        return rows is not None
+
+    def _keep(self, design: Design, rows: tuple[Row, ...]) -> None:
+        done = Evaluated(self._numbers[design], design, rows, self.study.columns)
+        self.known[design] = done
+        if self.on_evaluated is not None:
+            self.on_evaluated(self, done)
+
+    def _compute(self, designs: list[Design]) -> Iterator[tuple[Design, tuple[Row, ...]]]:
+        """Designs and all their rows, as they become complete."""
+        setting = self.study.setting
+        rows: dict[Design, dict[tuple[str, str], Row]] = {design: {} for design in designs}
+        for job, outcome in outcomes(self.engine, partial(_do, self.run), self._jobs(designs)):
+            if isinstance(outcome, LostWorker):
+                outcome = lost(job.setting, job.task, str(outcome))
+            design = job.task.values
+            rows[design] |= {(row["path"], row["mode"]): row for row in outcome.rows}
+            if len(rows[design]) == self.study.runs:
+                ordered = [rows[design][path, mode] for path in setting.paths for mode in setting.modes]
+                yield design, self._numbered(design, ordered)
+
+    def _numbered(self, design: Design, rows: list[Row]) -> tuple[Row, ...]:
+        number = self._numbers[design]
+        first = number * self.study.runs
+        return tuple(row | {"run": first + k, "design": number} for k, row in enumerate(rows))
+
+    def _jobs(self, designs: list[Design]) -> Iterator[Job]:
+        """One a design and path; one a mode where that leaves workers without any. Rows do not depend on it."""
+        setting = self.study.setting
+        apart = len(designs) * len(setting.paths) < self.engine.workers
+        for design in designs:
+            for number, path in enumerate(setting.paths):
+                task = Task(number, self._numbers[design], design, path)
+                yield from (Job(each, task) for each in (self._single.values() if apart else (setting,)))
+
+
+class Job(NamedTuple):
+    """A task, and in which modes."""
+
+    setting: Setting
+    task: Task
+
+
+def _do(run: RunTask, job: Job, *watch: Any) -> Outcome:
+    return run(job.setting, job.task, *watch)
+
+
+def _is_finite(value: Any) -> bool:
+    return value is not None and math.isfinite(value)

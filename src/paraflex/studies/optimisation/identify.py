@@ -1,0 +1,235 @@
+"""The parameters that reproduce given metrics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from paraflex.studies.optimisation.best import write_best
+from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
+from paraflex.studies.optimisation.fit import (
+    Confidence,
+    closest,
+    confidence,
+    fit,
+    residual_slopes,
+    root_mean_square,
+)
+from paraflex.studies.optimisation.objective import Target
+from paraflex.studies.optimisation.optimise import at_bounds, failures
+from paraflex.studies.optimisation.problem import running_start
+from paraflex.studies.optimisation.record import RESULT, write_figures
+from paraflex.studies.optimisation.session import INTERRUPTED, Progress, Session, Workers, sampled_start, search
+from paraflex.studies.optimisation.slopes import slopes_of
+from paraflex.studies.optimisation.study import DesignStudy, load_identification
+from paraflex.studies.sweeps.engines import THREADS, Engine
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A target and what the best design makes of it.
+
+    Attributes
+    ----------
+    target : Target
+    reached, start : float
+        The metric at the best design and at the start.
+    residual : float
+        weight (reached - value) / value, or without the division.
+    """
+
+    target: Target
+    reached: float
+    start: float
+    residual: float
+
+    def told(self) -> dict[str, Any]:
+        """In plain values."""
+        return self.target.told() | {"reached": self.reached, "start": self.start, "residual": self.residual}
+
+
+@dataclass(frozen=True)
+class IdentificationResult:
+    """Where an identification stands after a session.
+
+    Attributes
+    ----------
+    folder, table : Path
+        Where all is, and all runs as pandas reads them.
+    values, start : mapping of str to float
+        The numbers found, and those of the start.
+    residual, start_residual : float or None
+        Root mean square of all residuals; None before the start has run.
+    targets : tuple of Reached
+    confidence : Confidence or None
+        None where the search ended before derivatives at the best design were known.
+    bounds : mapping of str to str
+        "low" or "high" for parameters at a bound.
+    evaluations, fresh, failed : int
+        Designs, of these in this session, and those that do not run.
+    reasons : tuple of str
+        Why some of them do not.
+    stopped : str
+        Why it ended.
+    interrupted : bool
+        Whether the user stopped it.
+    seconds : float
+        The session took.
+    history : tuple of (int, float or None, bool)
+        Number, root mean square residual (None where it failed) and True, of every design.
+    """
+
+    folder: Path
+    table: Path
+    values: Mapping[str, float]
+    start: Mapping[str, float]
+    residual: float | None
+    start_residual: float | None
+    targets: tuple[Reached, ...]
+    confidence: Confidence | None
+    bounds: Mapping[str, str]
+    evaluations: int
+    fresh: int
+    failed: int
+    reasons: tuple[str, ...]
+    stopped: str
+    interrupted: bool
+    seconds: float
+    history: tuple[tuple[int, float | None, bool], ...] = field(repr=False, default=())
+
+    def figures(self) -> dict[str, Any]:
+        """In plain values; without times and counts of a session, which are no results."""
+        out = {name: value for name, value in vars(self).items() if name not in ("fresh", "seconds", "folder", "table")}
+        return out | {
+            "targets": [each.told() for each in self.targets],
+            "confidence": None if self.confidence is None else _told(self.confidence),
+            "history": [list(each) for each in self.history],
+            "reasons": list(self.reasons),
+        }
+
+
+def identify(
+    study: DesignStudy | str | Path,
+    folder: str | Path,
+    *,
+    engine: str | Engine = THREADS,
+    workers: int | None = None,
+    cluster: str | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+    run: RunTask | None = None,
+) -> IdentificationResult:
+    """Look for the parameters that reproduce the targets of a study, by least squares within bounds.
+
+    Parameters
+    ----------
+    study : DesignStudy, str or Path
+        A study, or its file.
+    folder : str or Path
+        For the table of all runs, `result.json` and `best.toml`; one that another session left is gone on with.
+    engine, workers, cluster, on_progress, run
+        See `optimise`.
+
+    Returns
+    -------
+    IdentificationResult
+        A KeyboardInterrupt ends the session with what is there, marked so.
+
+    Raises
+    ------
+    InputError
+        The study cannot be, its start cannot be run, the folder is another's, or the engine cannot be had.
+    OutputError
+        The folder cannot be written any more; what was written stays, and the same call goes on from there.
+    """
+    study = study if isinstance(study, DesignStudy) else load_identification(study)
+    solution = _Solution(study)
+    watch = None if on_progress is None else _watch(study, on_progress)
+    session = search(study, Path(folder), Workers(engine, workers, cluster, run), solution.solve, watch)
+    result = _result(study, Path(folder), session, solution.confidence)
+    write_figures(Path(folder) / RESULT, {"kind": "identification", "name": study.name} | result.figures())
+    if result.residual is not None:
+        write_best(Path(folder), study, tuple(result.values.values()))
+    return result
+
+
+class _Solution:
+    """The search itself; keeps what derivatives at its end say."""
+
+    def __init__(self, study: DesignStudy) -> None:
+        self.study = study
+        self.confidence: Confidence | None = None
+
+    def solve(self, evaluate: Evaluate) -> str:
+        """From the start, or the best of samples, to the least residuals."""
+        study, slopes = self.study, slopes_of(self.study, evaluate)
+        running_start(study, evaluate)
+        start = sampled_start(study, evaluate, lambda designs: closest(study.targets, designs))
+        stopped = fit(study, evaluate, slopes, start)
+        best = closest(study.targets, evaluate.history)
+        assert best is not None
+        try:
+            jacobian = residual_slopes(study.targets, slopes(best))
+        except LimitReached:
+            return stopped
+        self.confidence = confidence(study, best, jacobian, list(at_bounds(study, best.design)))
+        return stopped
+
+
+def _result(study: DesignStudy, folder: Path, session: Session, found: Confidence | None) -> IdentificationResult:
+    history, names = session.evaluate.history, study.setting.names
+    start, best = session.evaluate.known.get(study.start), closest(study.targets, history)
+    running = start is not None and start.complete
+    failed, reasons = failures(history)
+    return IdentificationResult(
+        folder=folder,
+        table=session.table,
+        values={} if best is None else dict(zip(names, best.design, strict=True)),
+        start=dict(zip(names, study.start, strict=True)),
+        residual=None if best is None else root_mean_square(study.targets, best),
+        start_residual=root_mean_square(study.targets, start) if start is not None and running else None,
+        targets=tuple(_reached(target, best, start) for target in study.targets) if best and start and running else (),
+        confidence=found,
+        bounds={} if best is None else at_bounds(study, best.design),
+        evaluations=len(history),
+        fresh=session.evaluate.fresh,
+        failed=failed,
+        reasons=reasons,
+        stopped=session.stopped,
+        interrupted=session.stopped == INTERRUPTED,
+        seconds=session.seconds,
+        history=tuple(
+            (each.number, root_mean_square(study.targets, each) if each.complete else None, each.complete)
+            for each in history
+        ),
+    )
+
+
+def _reached(target: Target, best: Evaluated, start: Evaluated) -> Reached:
+    reached, before = (float(each.metric(target.column)[target.run]) for each in (best, start))
+    return Reached(target, reached, before, target.residual(best))
+
+
+def _told(found: Confidence) -> dict[str, Any]:
+    """JSON has no infinity and no numbers that are none."""
+    return {
+        "deviations": dict(found.deviations),
+        "free": list(found.free),
+        "correlation": [[x if math.isfinite(x) else None for x in row] for row in found.correlation.tolist()],
+        "condition": found.condition if math.isfinite(found.condition) else None,
+        "weakest": dict(found.weakest),
+        "telling": found.telling,
+    }
+
+
+def _watch(study: DesignStudy, on_progress: Callable[[Progress], None]) -> Callable[[Evaluate, Evaluated], None]:
+    least: list[float] = []
+
+    def watch(evaluate: Evaluate, done: Evaluated) -> None:
+        if done.complete:
+            least[:] = [min([root_mean_square(study.targets, done), *least])]
+        on_progress(Progress(len(evaluate.known), study.search.evaluations, least[0] if least else None))
+
+    return watch

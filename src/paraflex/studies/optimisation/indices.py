@@ -1,0 +1,300 @@
+"""Global sensitivity: what share of a metric's variance each parameter explains, alone and with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError, suggestion
+from paraflex.studies.optimisation.record import write_figures
+from paraflex.studies.optimisation.study import read_study
+from paraflex.studies.sweeps.engines import THREADS, Engine
+from paraflex.studies.sweeps.metrics import METRICS
+from paraflex.studies.sweeps.run import COMPLETE, Outcome, run_task
+from paraflex.studies.sweeps.samples import RANDOM
+from paraflex.studies.sweeps.schema import SamplingTable
+from paraflex.studies.sweeps.session import SweepProgress, SweepResult, sweep
+from paraflex.studies.sweeps.study import SweepStudy, make_study
+from paraflex.studies.sweeps.table import whole_file
+
+Array = NDArray[np.float64]
+INDICES, TABLE = "indices.json", "indices.parquet"
+# Base samples unless told otherwise, and the fewest of which anything can be said.
+_SAMPLES, _FEWEST = 128, 8
+
+
+@dataclass(frozen=True)
+class IndicesStudy:
+    """A sweep over Saltelli's samples.
+
+    Attributes
+    ----------
+    sweep : SweepStudy
+        Its designs are blocks, one a base sample.
+    columns : tuple of str
+        Metrics whose variance is explained.
+    samples : int
+        Base samples.
+    seed : int
+    """
+
+    sweep: SweepStudy
+    columns: tuple[str, ...]
+    samples: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class SobolIndices:
+    """Indices of one metric along one path in one mode.
+
+    Attributes
+    ----------
+    path, mode, metric : str
+    parameters : tuple of str
+    first, total : (parameters,) array
+        Shares of the variance; none of a metric that does not vary.
+    first_confidence, total_confidence : (parameters,) array
+        Half the width of their intervals of 95 %, from resampling.
+    mean, deviation : float
+        Of the metric over the ranges, in its unit.
+    samples, dropped : int
+        Base samples that count, and those left out for a run of them that is not complete.
+    """
+
+    path: str
+    mode: str
+    metric: str
+    parameters: tuple[str, ...]
+    first: Array
+    first_confidence: Array
+    total: Array
+    total_confidence: Array
+    mean: float
+    deviation: float
+    samples: int
+    dropped: int
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One a parameter, in plain values."""
+        return [
+            {
+                "path": self.path,
+                "mode": self.mode,
+                "metric": self.metric,
+                "parameter": name,
+                "first": _plain(self.first[k]),
+                "first_confidence": _plain(self.first_confidence[k]),
+                "total": _plain(self.total[k]),
+                "total_confidence": _plain(self.total_confidence[k]),
+                "samples": self.samples,
+                "dropped": self.dropped,
+            }
+            for k, name in enumerate(self.parameters)
+        ]
+
+
+@dataclass(frozen=True)
+class IndicesResult:
+    """Where a study of indices stands after a session.
+
+    Attributes
+    ----------
+    sweep : SweepResult
+        The runs.
+    indices : tuple of SobolIndices
+        None before all runs are done.
+    table : Path
+        Of the indices.
+    """
+
+    sweep: SweepResult
+    indices: tuple[SobolIndices, ...]
+    table: Path
+
+    def figures(self) -> dict[str, Any]:
+        """In plain values."""
+        return {"kind": "indices", "indices": [row for each in self.indices for row in each.rows()]}
+
+
+def load_indices(
+    file: str | Path, metrics: list[str] | None = None, samples: int | None = None, seed: int | None = None
+) -> IndicesStudy:
+    """Read the study file of global indices: a sweep's, or an optimisation's, with ranges for all parameters.
+
+    Parameters
+    ----------
+    file : str or Path
+    metrics : list of str, optional
+        Whose variance is explained; those of the file by default.
+    samples : int, optional
+        Base samples, a power of two; `number` of [sampling] by default, else 128. There are (parameters + 2) times as
+        many designs.
+    seed : int, optional
+        That of [sampling] by default.
+
+    Raises
+    ------
+    InputError
+        See `load_optimisation`; or SALib is not installed.
+    """
+    table, source = read_study(file), str(file)
+    number = samples if samples is not None else table.sampling.number or _SAMPLES
+    chosen = table.sampling.seed if seed is None else seed
+    _check_samples(number)
+    try:
+        sampling = SamplingTable(kind=RANDOM, number=1, seed=chosen)
+        base = make_study(table.model_copy(update={"sampling": sampling}), Path(file).parent)
+    except InputError as error:
+        raise (error if error.source else error.in_file(source)) from None
+    wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].per_motor]
+    columns = _columns(wanted, base)
+    points = _salib_sample(base.setting.names, number, chosen)
+    designs = np.stack([p.spread(column) for p, column in zip(base.parameters, points.T, strict=True)], axis=1)
+    study = SweepStudy(base.name, base.setting, base.parameters, "saltelli", designs, base.motors)
+    return IndicesStudy(study, columns, number, chosen)
+
+
+def sobol_indices(
+    study: IndicesStudy | str | Path,
+    folder: str | Path,
+    *,
+    metrics: list[str] | None = None,
+    samples: int | None = None,
+    seed: int | None = None,
+    engine: str | Engine = THREADS,
+    workers: int | None = None,
+    cluster: str | None = None,
+    on_progress: Callable[[SweepProgress], None] | None = None,
+    run: Callable[..., Outcome] = run_task,
+) -> IndicesResult:
+    """First-order and total Sobol indices of metrics, from Saltelli's samples run as a sweep.
+
+    Parameters
+    ----------
+    study : IndicesStudy, str or Path
+        A study, or its file; see `load_indices` for metrics, samples and seed, which are for a file.
+    folder : str or Path
+        For the sweep's table, `indices.parquet` and `indices.json`; one that another session left is gone on with.
+    engine, workers, cluster, on_progress, run
+        See `sweep`.
+
+    Raises
+    ------
+    InputError
+        The study cannot be, SALib is not installed, or too few samples are complete.
+    OutputError
+        See `sweep`.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    study = study if isinstance(study, IndicesStudy) else load_indices(study, metrics, samples, seed)
+    done = sweep(study.sweep, folder, engine=engine, workers=workers, cluster=cluster, on_progress=on_progress, run=run)
+    table = Path(folder) / TABLE
+    if not done.finished:
+        return IndicesResult(done, (), table)
+    found = tuple(_indices(study, done.table))
+    result = IndicesResult(done, found, table)
+    write_figures(Path(folder) / INDICES, result.figures() | {"name": study.sweep.name})
+    with whole_file(table) as unfinished:
+        pq.write_table(pa.Table.from_pylist(result.figures()["indices"]), unfinished)
+    return result
+
+
+def _indices(study: IndicesStudy, table: Path) -> list[SobolIndices]:
+    import pyarrow.parquet as pq
+
+    setting = study.sweep.setting
+    shape = (len(study.sweep.designs), len(setting.paths), len(setting.modes))
+    read = pq.read_table(table, columns=["status", *study.columns])
+    # Rows are in order of designs, then paths, then modes.
+    complete = (read["status"].to_numpy() == COMPLETE).reshape(shape)
+    out = []
+    for column in study.columns:
+        values = read[column].to_numpy().astype(float).reshape(shape)
+        for p, path in enumerate(setting.paths):
+            for m, mode in enumerate(setting.modes):
+                usable = complete[:, p, m] & np.isfinite(values[:, p, m])
+                out.append(_analysed(study, (path, mode, column), values[:, p, m], usable))
+    return out
+
+
+def _analysed(
+    study: IndicesStudy, names: tuple[str, str, str], values: Array, usable: NDArray[np.bool_]
+) -> SobolIndices:
+    """Indices from the base samples all of whose runs are usable."""
+    parameters = study.sweep.setting.names
+    kept = usable.reshape(study.samples, -1).all(axis=1)
+    if np.count_nonzero(kept) < _FEWEST:
+        raise InputError(
+            f"only {np.count_nonzero(kept)} of {study.samples} base samples are complete in {names[1]}", field="vary",
+            remedy="narrow the ranges: reasons stand in the table",
+        )  # fmt: skip
+    values = values.reshape(study.samples, -1)[kept].ravel()
+    mean, deviation = float(np.mean(values)), float(np.std(values))
+    if deviation <= 1e-12 * abs(mean):
+        none = np.full(len(parameters), np.nan)
+        found = {"S1": none, "S1_conf": none, "ST": none, "ST_conf": none}
+    else:
+        found = _salib_analyse(parameters, values, study.seed)
+    return SobolIndices(
+        *names, parameters,
+        first=np.asarray(found["S1"]), first_confidence=np.asarray(found["S1_conf"]),
+        total=np.asarray(found["ST"]), total_confidence=np.asarray(found["ST_conf"]),
+        mean=mean, deviation=deviation,
+        samples=int(np.count_nonzero(kept)), dropped=int(np.count_nonzero(~kept)),
+    )  # fmt: skip
+
+
+def _columns(names: list[str], base: SweepStudy) -> tuple[str, ...]:
+    known = []
+    for name in base.setting.metrics:
+        known += [f"{name}.{motor}" for motor in base.motors] if METRICS[name].per_motor else [name]
+    for name in names:
+        if name not in known:
+            raise InputError("not a metric of the study", field="--metric", value=name, remedy=suggestion(name, known))
+    return tuple(dict.fromkeys(names))
+
+
+def _check_samples(number: int) -> None:
+    if number < _FEWEST or number & (number - 1):
+        raise InputError(
+            "Sobol's sequence wants a power of two", field="--samples", value=number,
+            remedy=f"say {max(_FEWEST, 1 << max(number, 1).bit_length())}",
+        )  # fmt: skip
+
+
+def _salib_sample(names: tuple[str, ...], number: int, seed: int) -> Array:
+    salib = _salib()
+    return salib.sample.sobol.sample(_problem(names), number, calc_second_order=False, seed=seed)
+
+
+def _salib_analyse(names: tuple[str, ...], values: Array, seed: int) -> dict[str, Array]:
+    # SALib takes 0 for no seed at all.
+    return _salib().analyze.sobol.analyze(_problem(names), values, calc_second_order=False, seed=seed + 1)
+
+
+def _problem(names: tuple[str, ...]) -> dict[str, Any]:
+    return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
+
+
+def _salib() -> Any:
+    try:
+        import SALib
+        import SALib.analyze.sobol
+        import SALib.sample.sobol
+    except ImportError:
+        raise InputError(
+            "global indices need SALib", field="indices", remedy="pip install 'paraflex[indices]'"
+        ) from None
+    return SALib
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,156 @@
+"""Methods of optimisation: those of SciPy and of Optuna, on one problem in the unit cube."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.studies.optimisation.problem import Problem
+
+Array = NDArray[np.float64]
+SLSQP, TRUST, LBFGSB, SIMPLEX = "slsqp", "trust-constr", "l-bfgs-b", "nelder-mead"
+EVOLUTION, OPTUNA = "differential-evolution", "optuna"
+WITH_SLOPES = (SLSQP, TRUST, LBFGSB)
+DEFAULT_METHOD = SLSQP
+
+# Metrics are known no better than to this share: time steps are chosen anew for each design.
+_TOLERANCE = 1e-4
+# More iterations than any limit of evaluations allows.
+_MANY = 100_000
+# Edges of the first simplex, as shares of the ranges.
+_SIMPLEX = 0.1
+# Members of a population per parameter.
+_POPULATION = 8
+# Designs that Optuna is asked for at a time: as many whatever the number of workers, so that all find the same.
+_BATCH = 4
+
+
+def minimise(problem: Problem, method: str | None, start: Array) -> str:
+    """Look for the least objective from a start; why it stopped, in words.
+
+    Raises
+    ------
+    InputError
+        A method that takes no limits was given some, or Optuna is not installed.
+    LimitReached
+        As many designs as the study allows.
+    """
+    name = method or DEFAULT_METHOD
+    if name == LBFGSB and problem.objective.limits:
+        raise InputError(
+            "takes no limits", field="search.method", value=name, remedy=f'say "{SLSQP}" or "{TRUST}", or drop at_most'
+        )
+    with warnings.catch_warnings():
+        # SciPy says so of quasi-Newton updates whose slopes do not change, as at bounds and beside failures.
+        warnings.filterwarnings("ignore", message="delta_grad == 0.0")
+        return _METHODS[name](problem, start)
+
+
+def _tolerance(problem: Problem) -> float:
+    given = problem.study.search.tolerance
+    return _TOLERANCE if given is None else given
+
+
+def _slsqp(problem: Problem, start: Array) -> str:
+    limits = {"type": "ineq", "fun": problem.room, "jac": problem.room_slope}
+    constraints = [limits] if problem.objective.limits else []
+    options = {"ftol": _tolerance(problem) * problem.cost, "maxiter": _MANY}
+    return _scipy(problem, start, "SLSQP", constraints=constraints, options=options)
+
+
+def _trust(problem: Problem, start: Array) -> str:
+    from scipy.optimize import NonlinearConstraint
+
+    limits = NonlinearConstraint(problem.room, 0.0, np.inf, jac=problem.room_slope)  # pyright: ignore[reportArgumentType]
+    constraints = [limits] if problem.objective.limits else []
+    tolerance = _tolerance(problem)
+    options = {"gtol": tolerance * problem.cost, "xtol": tolerance, "barrier_tol": tolerance, "maxiter": _MANY}
+    return _scipy(problem, start, "trust-constr", constraints=constraints, options=options)
+
+
+def _lbfgsb(problem: Problem, start: Array) -> str:
+    return _scipy(problem, start, "L-BFGS-B", options={"ftol": _tolerance(problem), "maxfun": _MANY, "maxiter": _MANY})
+
+
+def _scipy(problem: Problem, start: Array, method: str, **given: Any) -> str:
+    from scipy.optimize import minimize
+
+    bounds = [(0.0, 1.0)] * start.size
+    return _told(minimize(problem.value, start, jac=problem.slope, method=method, bounds=bounds, **given))
+
+
+def _simplex(problem: Problem, start: Array) -> str:
+    from scipy.optimize import minimize
+
+    # Edges point away from the nearer bound.
+    corners = np.vstack([start, start + np.diag(np.where(start > 0.5, -_SIMPLEX, _SIMPLEX))])
+    tolerance = _tolerance(problem)
+    problem.scores(list(corners))
+    options = {"initial_simplex": corners, "xatol": np.sqrt(tolerance), "fatol": tolerance * problem.cost}
+    bounds, many = [(0.0, 1.0)] * start.size, {"maxiter": _MANY, "maxfev": _MANY}
+    return _told(
+        minimize(lambda x: problem.scores([x])[0], start, method="Nelder-Mead", bounds=bounds, options=options | many)
+    )
+
+
+def _evolution(problem: Problem, start: Array) -> str:
+    from scipy.optimize import differential_evolution
+
+    return _told(
+        differential_evolution(
+            lambda population: np.array(problem.scores(list(np.atleast_2d(population.T)))),
+            [(0.0, 1.0)] * start.size,
+            x0=start,
+            seed=problem.study.search.seed,  # pyright: ignore[reportCallIssue]
+            popsize=_POPULATION,
+            tol=_tolerance(problem),
+            init="sobol",
+            maxiter=_MANY,
+            polish=False,
+            vectorized=True,
+            updating="deferred",
+        )
+    )
+
+
+def _optuna(problem: Problem, start: Array) -> str:
+    optuna = _import_optuna()
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    names = problem.study.setting.names
+    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=problem.study.search.seed))
+    study.enqueue_trial(dict(zip(names, start.tolist(), strict=True)))
+    while True:
+        trials = [study.ask() for _ in range(_BATCH)]
+        places = [np.array([trial.suggest_float(name, 0.0, 1.0) for name in names]) for trial in trials]
+        for trial, score in zip(trials, problem.scores(places), strict=True):
+            study.tell(trial, score)
+
+
+def _told(result: Any) -> str:
+    text = str(result.message).strip().rstrip(".")
+    return text[0].lower() + text[1:]
+
+
+def _import_optuna() -> Any:
+    try:
+        import optuna
+    except ImportError:
+        raise InputError(
+            "Optuna is not installed", field="search.method", value=OPTUNA, remedy="pip install 'paraflex[optuna]'"
+        ) from None
+    return optuna
+
+
+_METHODS: Mapping[str, Callable[[Problem, Array], str]] = {
+    SLSQP: _slsqp,
+    TRUST: _trust,
+    LBFGSB: _lbfgsb,
+    SIMPLEX: _simplex,
+    EVOLUTION: _evolution,
+    OPTUNA: _optuna,
+}

@@ -1,0 +1,152 @@
+"""An optimisation as methods see it: functions on the unit cube that have a value everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
+from paraflex.studies.optimisation.objective import Objective
+from paraflex.studies.optimisation.slopes import Slopes
+from paraflex.studies.optimisation.study import DesignStudy
+
+Array = NDArray[np.float64]
+# A limit is held that is passed by no more than this share of it.
+_HELD = 1e-6
+# What a design costs that passes a limit, and one that does not run, in objectives of the start.
+_OUTSIDE, _FAILED = 1e2, 1e4
+# The same for methods with slopes, which accept nothing above the start: more would spoil what they learn of curvature.
+_REFUSED = 3.0
+
+
+class Problem:
+    """The objective and its limits over the unit cube.
+
+    Parameters
+    ----------
+    study : DesignStudy
+        With an objective.
+    evaluate : Evaluate
+    slopes : Slopes
+
+    Raises
+    ------
+    InputError
+        The start cannot be run, or a metric of it that others would be divided by is zero.
+    """
+
+    def __init__(self, study: DesignStudy, evaluate: Evaluate, slopes: Slopes) -> None:
+        assert study.objective is not None
+        self.study, self.evaluate, self.slopes = study, evaluate, slopes
+        self.objective: Objective = study.objective
+        self.scales = start_scales(study, evaluate)
+        self.start = study.unit(study.start)
+        # Slopes of designs that fail lead back to the last one that did not.
+        self._safe = self.start
+
+    @cached_property
+    def cost(self) -> float:
+        """The objective at the start, or 1 if that is 0: the scale of penalties and of tolerances."""
+        (start,) = self.evaluate([self.study.start])
+        return abs(self.objective.value(start, self.scales)) or 1.0
+
+    def at(self, x: Array) -> Evaluated:
+        """The design at a place."""
+        return self.evaluate([self.study.design(x)])[0]
+
+    def scores(self, places: Sequence[Array]) -> list[float]:
+        """For methods without slopes: the objective; more than that for designs that pass limits or fail."""
+        return [self._score(design) for design in self.evaluate([self.study.design(x) for x in places])]
+
+    def value(self, x: Array) -> float:
+        """For methods with slopes: the objective, and more than at the start beyond the designs that run."""
+        design = self.at(x)
+        if design.complete:
+            return self.objective.value(design, self.scales)
+        return _REFUSED * self.cost * (1.0 + float(np.linalg.norm(x - self._safe)))
+
+    def slope(self, x: Array) -> Array:
+        """Derivatives of `value`, (parameters,)."""
+        design = self.at(x)
+        if design.complete:
+            self._safe = np.array(x)
+            return self.objective.slope(design, self.scales, self.slopes(design))
+        away = x - self._safe
+        return _REFUSED * self.cost * away / (float(np.linalg.norm(away)) or 1.0)
+
+    def room(self, x: Array) -> Array:
+        """How far metrics are below their limits, (limits,); none where the design fails."""
+        design = self.at(x)
+        return self.objective.room(design) if design.complete else np.full(len(self.objective.limits), -1.0)
+
+    def room_slope(self, x: Array) -> Array:
+        """Derivatives of `room`, (limits, parameters)."""
+        design = self.at(x)
+        if design.complete:
+            return self.objective.room_slope(design, self.slopes(design))
+        return np.zeros((len(self.objective.limits), x.size))
+
+    def _score(self, design: Evaluated) -> float:
+        if not design.complete:
+            return _FAILED * self.cost
+        violation = self.objective.violation(design)
+        if violation > _HELD:
+            return _OUTSIDE * self.cost * (1.0 + violation)
+        return self.objective.value(design, self.scales)
+
+
+def start_scales(study: DesignStudy, evaluate: Evaluate) -> Mapping[str, float]:
+    """What metrics are divided by.
+
+    Raises
+    ------
+    InputError
+        The start cannot be run, or a metric of it is zero.
+    """
+    assert study.objective is not None
+    start = running_start(study, evaluate)
+    scales = study.objective.scales(start)
+    for column, scale in scales.items():
+        if scale == 0.0:
+            raise InputError(
+                "zero at the start: nothing is relative to it", field=f"objective.minimise.{column}",
+                remedy="say relative = false",
+            )  # fmt: skip
+    return scales
+
+
+def running_start(study: DesignStudy, evaluate: Evaluate) -> Evaluated:
+    """The start, evaluated.
+
+    Raises
+    ------
+    InputError
+        It cannot be run.
+    """
+    (start,) = evaluate([study.start])
+    if not start.complete:
+        told = ", ".join(f"{name} = {value:g}" for name, value in zip(study.setting.names, study.start, strict=True))
+        raise InputError(
+            f"the start cannot be run ({start.reason})", field="vary", value=told, remedy="give another start"
+        )
+    return start
+
+
+def best_of(objective: Objective, scales: Mapping[str, float], designs: Sequence[Evaluated]) -> Evaluated | None:
+    """The complete design that holds all limits and has the least objective, or else the one that passes them least."""
+
+    def rank(design: Evaluated) -> tuple[float, float, int]:
+        violation = objective.violation(design)
+        value = objective.value(design, scales)
+        return (violation if violation > _HELD else 0.0, value, design.number)
+
+    return min((design for design in designs if design.complete), key=rank, default=None)
+
+
+def holds_limits(objective: Objective, design: Evaluated) -> bool:
+    """Whether no limit is passed."""
+    return objective.violation(design) <= _HELD

@@ -1,0 +1,78 @@
+"""The study file of a search for designs as pydantic sees it: a sweep's, and more."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from paraflex.files.schema import Count, Number, Text
+from paraflex.studies.sweeps.schema import SweepTable, VaryTable
+
+Yes = Annotated[bool, Field(strict=True)]
+MethodName = Literal["slsqp", "trust-constr", "l-bfgs-b", "nelder-mead", "differential-evolution", "optuna"]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ParameterTable(VaryTable):
+    """A parameter that is looked for."""
+
+    start: Number | None = Field(default=None, description="where the search starts; the file's number by default")
+
+
+class AtMostTable(_Table):
+    """A metric with a limit."""
+
+    metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
+    value: Number = Field(description="its limit, in the metric's unit")
+
+
+class ObjectiveTable(_Table):
+    """What is to be least."""
+
+    minimise: dict[str, Number] = Field(description="metrics and their weights")
+    over: Literal["worst", "mean"] = Field(
+        default="worst", description='"worst" or "mean" of all paths and modes, of each metric'
+    )
+    relative: Yes = Field(default=True, description="false for metrics as they are, not divided by those of the start")
+    at_most: list[AtMostTable] = Field(default=[], description="limits, [[objective.at_most]]")
+
+
+class TargetTable(_Table):
+    """A number that is to be reproduced."""
+
+    metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
+    value: Number = Field(description="what it should be, in the metric's unit")
+    mode: Text | None = Field(default=None, description="the actuation mode, where the study has several")
+    path: Text | None = Field(default=None, description="the path, where the study has several")
+    weight: Number = Field(default=1.0, description="a factor of its residual")
+    relative: Yes = Field(default=True, description="false for the difference itself, not divided by the value")
+
+
+class SearchTable(_Table):
+    """How it is looked for."""
+
+    method: MethodName | None = Field(
+        default=None,
+        description='"slsqp", "trust-constr", "l-bfgs-b", "nelder-mead", "differential-evolution" or "optuna"',
+    )
+    evaluations: Count = Field(default=200, description="designs at most")
+    samples: Count = Field(default=0, description="Sobol samples looked at first; the search starts from the best")
+    seed: Count = Field(default=0, description="a whole number from 0 on")
+    tolerance: Number | None = Field(default=None, description="the relative change at which it ends")
+    gradients: Literal["differences", "exact"] = Field(default="differences", description='"differences" or "exact"')
+    difference: Number = Field(default=1e-3, description="the step of differences, as a share of a parameter's range")
+
+
+class StudyTable(SweepTable):
+    """A study file."""
+
+    vary: dict[str, ParameterTable] = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        default={}, description="a [vary.NAME] table for each parameter"
+    )
+    objective: ObjectiveTable | None = Field(default=None, description="[objective], for paraflex optimise")
+    target: list[TargetTable] = Field(default=[], description="[[target]] tables, for paraflex identify")
+    search: SearchTable = SearchTable()

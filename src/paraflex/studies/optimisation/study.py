@@ -1,0 +1,331 @@
+"""A search for designs, read from its file: what a sweep has, where it starts, and what is looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError, suggestion
+from paraflex.files.expressions import evaluate, evaluate_parameters
+from paraflex.files.read import read_toml, validate
+from paraflex.studies.optimisation.objective import Objective, Target
+from paraflex.studies.optimisation.schema import ObjectiveTable, ParameterTable, SearchTable, StudyTable, TargetTable
+from paraflex.studies.sweeps.metrics import METRICS
+from paraflex.studies.sweeps.overlay import Place
+from paraflex.studies.sweeps.samples import RANDOM, Varied
+from paraflex.studies.sweeps.schema import SamplingTable
+from paraflex.studies.sweeps.study import Setting, SweepStudy, make_study
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Search:
+    """How a design is looked for.
+
+    Attributes
+    ----------
+    method : str or None
+    evaluations : int
+        Designs at most.
+    samples : int
+        Sobol samples that are looked at first.
+    seed : int
+    tolerance : float or None
+        Relative change at which it ends.
+    gradients : str
+        "differences" or "exact".
+    difference : float
+        Step of differences as a share of a parameter's range.
+    """
+
+    method: str | None = None
+    evaluations: int = 200
+    samples: int = 0
+    seed: int = 0
+    tolerance: float | None = None
+    gradients: str = "differences"
+    difference: float = 1e-3
+
+
+@dataclass(frozen=True)
+class DesignStudy:
+    """A mechanism, the parameters that are free within bounds, and what is looked for.
+
+    Attributes
+    ----------
+    base : SweepStudy
+        What is run; its only design is the start.
+    objective : Objective or None
+    targets : tuple of Target
+    search : Search
+    """
+
+    base: SweepStudy
+    objective: Objective | None
+    targets: tuple[Target, ...]
+    search: Search
+
+    @property
+    def name(self) -> str:
+        """Of the study."""
+        return self.base.name
+
+    @property
+    def setting(self) -> Setting:
+        """What all runs have in common."""
+        return self.base.setting
+
+    @property
+    def parameters(self) -> tuple[Varied, ...]:
+        """What is looked for, each with its range."""
+        return self.base.parameters
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """The design the search starts from."""
+        return tuple(self.base.designs[0].tolist())
+
+    @property
+    def runs(self) -> int:
+        """Runs of a design: paths times modes."""
+        return self.base.runs
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Metrics that count."""
+        targets = tuple(dict.fromkeys(target.column for target in self.targets))
+        return self.objective.columns if self.objective is not None else targets
+
+    def design(self, unit: Array) -> tuple[float, ...]:
+        """Numbers of a point of the unit cube, which the ranges are mapped to: logarithmic ones by the logarithm."""
+        inside = np.clip(unit, 0.0, 1.0)
+        return tuple(_rounded(p, float(p.spread(x))) for p, x in zip(self.parameters, inside, strict=True))
+
+    def unit(self, design: Sequence[float]) -> Array:
+        """Where a design is in the unit cube."""
+        return np.array([_share(p, value) for p, value in zip(self.parameters, design, strict=True)])
+
+    def per_unit(self, design: Sequence[float]) -> Array:
+        """Derivatives of the numbers by their place in the unit cube, (parameters,)."""
+        out = [
+            value * np.log(p.high / p.low) if p.log else p.high - p.low  # pyright: ignore[reportOperatorIssue, reportOptionalOperand]
+            for p, value in zip(self.parameters, design, strict=True)
+        ]
+        return np.array(out)
+
+    def content(self) -> dict[str, Any]:
+        """What the results depend on, in plain values; the limit of evaluations is left out, for it may be raised."""
+        search = {name: value for name, value in vars(self.search).items() if name != "evaluations"}
+        asked = None if self.objective is None else vars(self.objective) | {"weights": dict(self.objective.weights)}
+        ranges = [[p.low, p.high, p.log] for p in self.parameters]
+        targets = [vars(target) for target in self.targets]
+        more = {"ranges": ranges, "objective": asked, "targets": targets, "search": search}
+        return self.base.content() | more
+
+
+def load_optimisation(file: str | FilePath) -> DesignStudy:
+    """Read the study file of an optimisation.
+
+    Parameters
+    ----------
+    file : str or Path
+        TOML; see docs/optimisation.md.
+
+    Raises
+    ------
+    InputError
+        Anything in it that does not fit the file or the mechanism: it names file, field, value and remedy.
+    """
+    return _load(file, _optimisation)
+
+
+def load_identification(file: str | FilePath) -> DesignStudy:
+    """Read the study file of an identification; see `load_optimisation`."""
+    return _load(file, _identification)
+
+
+def read_study(file: str | FilePath) -> StudyTable:
+    """A study file as the schema has it.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or a field does not fit.
+    """
+    return validate(StudyTable, read_toml(FilePath(file), str(file)), str(file))
+
+
+def _load(file: str | FilePath, make: Any) -> DesignStudy:
+    table = read_study(file)
+    try:
+        return make(table, FilePath(file).parent)
+    except InputError as error:
+        raise (error if error.source else error.in_file(str(file))) from None
+
+
+def _optimisation(table: StudyTable, folder: FilePath) -> DesignStudy:
+    if table.objective is None:
+        raise InputError("is missing", field="objective", remedy="say [objective] minimise = { tracking_rms = 1.0 }")
+    columns = {f"objective.minimise.{name}": name for name in table.objective.minimise}
+    columns |= {f"objective.at_most.{k}.metric": each.metric for k, each in enumerate(table.objective.at_most)}
+    base = _base(table, folder, columns)
+    objective = _objective(table.objective, base)
+    return DesignStudy(base, objective, (), _search(table.search))
+
+
+def _identification(table: StudyTable, folder: FilePath) -> DesignStudy:
+    if not table.target:
+        raise InputError("is missing", field="target", remedy="add [[target]] tables with metric and value")
+    if table.search.method is not None:
+        raise InputError(
+            "an identification is a problem of least squares", field="search.method", value=table.search.method,
+            remedy="leave it out",
+        )  # fmt: skip
+    base = _base(table, folder, {f"target.{k}.metric": target.metric for k, target in enumerate(table.target)})
+    targets = tuple(_target(entry, k, base) for k, entry in enumerate(table.target))
+    return DesignStudy(base, None, targets, _search(table.search))
+
+
+def _base(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> SweepStudy:
+    """What is run, its one design the start; with the metrics that are kept anyway and those that count, by field."""
+    for name, entry in table.vary.items():
+        _check_range(f"vary.{name}", entry)
+    for field, column in columns.items():
+        name = _metric(column)
+        if name not in METRICS:
+            raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(METRICS)))
+    metrics = list(dict.fromkeys([*table.metrics, *map(_metric, columns.values())])) if table.metrics else []
+    sampling = SamplingTable(kind=RANDOM, number=1)
+    base = make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
+    for field, column in columns.items():
+        _check_column(field, column, base.motors)
+    start = [
+        _start(base.setting, places, p, table.vary[p.name].start)
+        for p, places in zip(base.parameters, base.setting.places, strict=True)
+    ]
+    return SweepStudy(base.name, base.setting, base.parameters, "search", np.array([start]), base.motors)
+
+
+def _check_range(field: str, entry: ParameterTable) -> None:
+    for key in ("values", "number", "whole"):
+        if getattr(entry, key):
+            raise InputError(
+                "is for sweeps", field=f"{field}.{key}", value=getattr(entry, key), remedy="give low and high alone"
+            )
+    if entry.low is not None and entry.low == entry.high:
+        raise InputError("low and high are equal", field=f"{field}.high", value=entry.high, remedy="leave it out")
+
+
+def _metric(column: str) -> str:
+    return column.partition(".")[0]
+
+
+def _check_column(field: str, column: str, motors: tuple[str, ...]) -> None:
+    """Nothing, if a metric is one number of each run."""
+    name, _, motor = column.partition(".")
+    known = [f"{name}.{each}" for each in motors]
+    if METRICS[name].per_motor and column not in known:
+        raise InputError("of which motor?", field=field, value=column, remedy=suggestion(column, known))
+    if motor and not METRICS[name].per_motor:
+        raise InputError("not a metric per motor", field=field, value=column, remedy=f'say "{name}"')
+
+
+def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given: float | None) -> float:
+    """Where a parameter starts: as the study says, else as the mechanism's file."""
+    field = f"vary.{parameter.name}.start"
+    found = {_number_at(setting.data, place) for place in places} if given is None else {given}
+    if len(found) > 1:
+        told = sorted(found)
+        raise InputError("its fields differ in the mechanism's file", field=field, value=told, remedy="give a start")
+    (start,) = found
+    assert parameter.low is not None
+    assert parameter.high is not None
+    if not parameter.low <= start <= parameter.high:
+        raise InputError(
+            f"outside the bounds, {parameter.low:g} to {parameter.high:g}", field=field, value=start,
+            remedy="give a start within, or other bounds",
+        )  # fmt: skip
+    return _rounded(parameter, start)
+
+
+def _number_at(data: Mapping[str, Any], place: Place) -> float:
+    inside: Any = data
+    for key in place:
+        inside = inside[key]
+    if isinstance(inside, str):
+        return float(evaluate(inside, evaluate_parameters(data.get("parameters", {}))))
+    return float(inside)
+
+
+def _share(parameter: Varied, value: float) -> float:
+    assert parameter.low is not None
+    assert parameter.high is not None
+    if parameter.log:
+        return float(np.log(value / parameter.low) / np.log(parameter.high / parameter.low))
+    return (value - parameter.low) / (parameter.high - parameter.low)
+
+
+def _rounded(parameter: Varied, value: float) -> float:
+    """A value to twelve digits, within the bounds: the last ones would only keep equal designs apart."""
+    assert parameter.low is not None
+    assert parameter.high is not None
+    return min(max(float(f"{value:.12g}"), parameter.low), parameter.high)
+
+
+def _objective(table: ObjectiveTable, base: SweepStudy) -> Objective:
+    if not table.minimise:
+        raise InputError("nothing to minimise", field="objective.minimise", remedy="say { tracking_rms = 1.0 }")
+    for column, weight in table.minimise.items():
+        if not weight > 0.0:
+            raise InputError(
+                "must be positive", field=f"objective.minimise.{column}", value=weight, remedy="leave the metric out"
+            )
+    limits = tuple((each.metric, each.value) for each in table.at_most)
+    return Objective(dict(table.minimise), table.over, table.relative, limits)
+
+
+def _target(entry: TargetTable, number: int, base: SweepStudy) -> Target:
+    field, setting = f"target.{number}", base.setting
+    path = _one(f"{field}.path", entry.path, setting.paths)
+    mode = _one(f"{field}.mode", entry.mode, setting.modes)
+    if entry.relative and entry.value == 0.0:
+        raise InputError(
+            "nothing is relative to zero", field=f"{field}.value", value=0.0, remedy="say relative = false"
+        )
+    if not entry.weight > 0.0:
+        raise InputError("must be positive", field=f"{field}.weight", value=entry.weight, remedy="leave the target out")
+    run = setting.paths.index(path) * len(setting.modes) + setting.modes.index(mode)
+    return Target(entry.metric, run, path, mode, entry.value, entry.weight, entry.relative)
+
+
+def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:
+    if name is None and len(known) == 1:
+        return known[0]
+    if name is None:
+        raise InputError("the study has several", field=field, remedy=f"choose from {', '.join(known)}")
+    if name not in known:
+        raise InputError("not one of the study's", field=field, value=name, remedy=suggestion(name, known))
+    return name
+
+
+def _search(table: SearchTable) -> Search:
+    for name in ("evaluations", "difference", "tolerance"):
+        value = getattr(table, name)
+        if value is not None and not value > 0:
+            raise InputError("must be positive", field=f"search.{name}", value=value, remedy="leave it out")
+    for name in ("samples", "seed"):
+        if getattr(table, name) < 0:
+            raise InputError(
+                "must not be negative", field=f"search.{name}", value=getattr(table, name), remedy="leave it out"
+            )
+    if table.difference > 0.1:
+        raise InputError(
+            "too large for a derivative", field="search.difference", value=table.difference, remedy="say 1e-3"
+        )
+    return Search(**{name: getattr(table, name) for name in SearchTable.model_fields})
