@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from paraflex.mechanism import Mechanism, chain_of_segments, four_bars_in_a_row, raparm_i
     from paraflex.results import load_results, save_results, summary, tracking_dataset
     from paraflex.simulate import plan_tracking
-    from paraflex.studies import load_sweep, run_study, sweep
+    from paraflex.studies import load_sensitivities, load_sweep, run_study, sensitivities, sweep
 
 _HOME = {
     "Circle": "kinematics",
@@ -44,11 +44,13 @@ _HOME = {
     "load": "files",
     "load_path": "files",
     "load_results": "results",
+    "load_sensitivities": "studies",
     "load_sweep": "studies",
     "plan_tracking": "simulate",
     "raparm_i": "mechanism",
     "run_study": "studies",
     "save_results": "results",
+    "sensitivities": "studies",
     "summary": "results",
     "sweep": "studies",
     "tracking_dataset": "results",
@@ -76,12 +78,14 @@ __all__ = [
     "load",
     "load_path",
     "load_results",
+    "load_sensitivities",
     "load_sweep",
     "plan_tracking",
     "plots",
     "raparm_i",
     "run_study",
     "save_results",
+    "sensitivities",
     "summary",
     "sweep",
     "tracking_dataset",

@@ -4,6 +4,13 @@ from paraflex.studies.agreement import agreement
 from paraflex.studies.cases import Case, motion_case, tracking_case
 from paraflex.studies.compare import ComparisonOptions, compare_methods
 from paraflex.studies.comparison import Measurement, MethodComparison, Reference
+from paraflex.studies.sensitivities import (
+    Sensitivities,
+    SensitivityStudy,
+    load_sensitivities,
+    metric_gradients,
+    sensitivities,
+)
 from paraflex.studies.sweeps import SweepProgress, SweepResult, SweepStudy, load_sweep, sweep
 from paraflex.studies.tracking import Simulator, StudyResult, run_study
 from paraflex.studies.verification import (
@@ -26,6 +33,8 @@ __all__ = [
     "ModelRuns",
     "Reference",
     "Refinement",
+    "Sensitivities",
+    "SensitivityStudy",
     "Simulator",
     "StudyResult",
     "SweepProgress",
@@ -36,10 +45,13 @@ __all__ = [
     "agreement",
     "check_model",
     "compare_methods",
+    "load_sensitivities",
     "load_sweep",
+    "metric_gradients",
     "motion_case",
     "reference_model",
     "run_study",
+    "sensitivities",
     "sweep",
     "tracking_case",
     "verify",
