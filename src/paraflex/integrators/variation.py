@@ -18,19 +18,10 @@ from paraflex.integrators.run import Problem, empty_samples
 from paraflex.integrators.stretches import hidden_from
 from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
 from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
+from paraflex.kernel.settle import History, make_history, sample_energies, settle_steps
 from paraflex.kernel.tangent import make_tangent
-from paraflex.kernel.variation import (
-    PLACES,
-    STEP,
-    History,
-    Variation,
-    make_history,
-    make_piece,
-    make_variation,
-    sample_energies,
-    settle_steps,
-    vary_steps,
-)
+from paraflex.kernel.variation import make_piece, vary_steps
+from paraflex.kernel.variation_samples import PLACES, STEP, Variation, make_variation
 
 Array = NDArray[np.float64]
 

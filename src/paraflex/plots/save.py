@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import OutputError
 from paraflex.plots.agreement import compared_links, compared_paths, model_distances, prototype_pair
+from paraflex.plots.elasticities import elasticities
 from paraflex.plots.modes import motor_torques, tracking_errors
 from paraflex.plots.overview import motion_overview
 from paraflex.plots.phase import phase_diagrams
@@ -116,6 +117,21 @@ def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[
     if not any(run["status"] == "complete" for method in figures["methods"].values() for run in method["runs"]):
         return []
     return _save({"work_precision": partial(work_precision, figures)}, Path(folder))
+
+
+def save_elasticities(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
+    """Write a figure of elasticities for each run of a sensitivity study, as PNG and SVG.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    drawn = {
+        f"elasticities_{run['path']}_{run['mode']}": partial(elasticities, figures, k)
+        for k, run in enumerate(figures["runs"])
+    }
+    return _save(drawn, Path(folder))
 
 
 def _save(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:

@@ -120,7 +120,8 @@ class Setting:
         """
         study = model.study
         wanted = dict(self.integration) | dict(chosen or {})
-        given = {"method": study.method, "tolerance": study.tolerance, "step": study.step} | wanted
+        given: dict[str, Any] = {"method": study.method, "tolerance": study.tolerance, "step": study.step}
+        given |= wanted
         # A step goes with a method: naming another method leaves the mechanism's step out.
         if "step" not in wanted and given["method"] != study.method:
             given["step"] = None
