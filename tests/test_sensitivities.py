@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from paraflex.cli.sensitivity import SensitivityRequest, sensitivity_command
 from paraflex.dynamics import State, build_system, constant_signals, numbers_of, pack_signals, same_layout
 from paraflex.errors import InputError, NumericalError
 from paraflex.fem import modal_basis
@@ -131,8 +132,9 @@ def test_motion_against_differences_of_whole_runs(design, name):
         assert np.abs(exact[0] - expected).max() < 3e-6 * np.abs(expected).max(), kind
 
 
-def test_metrics_against_differences_of_sweep_runs(design):
+def test_metrics_against_differences_of_sweep_runs(tmp_path):
     """Of the runs that `paraflex sweep` makes, whose Newton iterations leave what the tolerance allows."""
+    design = Design(load_sensitivities(write(tmp_path, STUDY.replace("tolerance = 1e-7", "tolerance = 1e-9"))))
     ((mode, values, gradients),) = metric_gradients(design.setting, design.task)
     assert mode == "++++"
     names = [name for name in gradients if name != "residual_vibration"]
@@ -363,18 +365,32 @@ def test_command(tmp_path):
     }
     with pytest.raises(InputError, match="no such run"):
         elasticities(figures, 1)
-    # Again is the same; another point is not, and says so.
-    again = paraflex("sensitivity", str(file), "--output", str(out), "--json")
-    assert json.loads(again.stdout) == figures
-    other = paraflex("sensitivity", str(file), "--output", str(out), "--at", "thickness=0.006")
-    assert other.returncode == 2
-    assert "--output: the folder holds results of another study" in other.stderr
-    assert paraflex("sensitivity", str(file), "--output", str(tmp_path)).returncode == 2
-    wrong = paraflex("sensitivity", str(file), "--at", "thickness", cwd=tmp_path)
-    assert wrong.returncode == 2
-    assert "--at: not NAME=VALUE (got 'thickness')" in wrong.stderr
-    metric = paraflex("sensitivity", str(file), "--metrics", "steps, work", cwd=tmp_path)
-    assert "metrics: has no derivative (got 'steps')" in metric.stderr
+
+
+def test_command_again_and_elsewhere(tmp_path, capsys):
+    """Again is the same; another point is not, and says so."""
+    text = only("thickness").replace("duration = 0.06", 'duration = 0.01\nmetrics = ["rms_torque"]')
+    file, out = write(tmp_path, text), tmp_path / "out"
+
+    def ask(output=out, at=(), metrics=(), as_json=True):
+        return sensitivity_command(SensitivityRequest(str(file), str(output), list(at), list(metrics), as_json))
+
+    assert ask() == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert ask(as_json=False) == 0
+    assert "rms_torque.tau6 [N m]" in capsys.readouterr().out
+    assert json.loads((out / "sensitivity.json").read_text()) == figures
+    with pytest.raises(InputError, match="--output: the folder holds results of another study"):
+        ask(at=["thickness=0.006"])
+    with pytest.raises(InputError, match="--output: the folder holds other files"):
+        ask(output=tmp_path)
+    with pytest.raises(InputError, match=r"--at: not NAME=VALUE .got 'thickness'"):
+        ask(at=["thickness"])
+    with pytest.raises(InputError, match=r"metrics: has no derivative .got 'steps'"):
+        ask(metrics=["work, steps"])
+    (out / "sensitivity.json").write_text("{", encoding="utf-8")
+    with pytest.raises(InputError, match="--output: the folder holds results of another study"):
+        ask()
 
 
 def test_example_is_a_study():

@@ -167,7 +167,8 @@ def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Ar
     return out
 
 
-class _Chunk(NamedTuple):
+@dataclass(frozen=True)
+class _Chunk:
     """Accepted steps one after the other, under signals that do not jump."""
 
     history: History

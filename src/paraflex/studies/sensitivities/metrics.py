@@ -47,7 +47,7 @@ def _deflections(traces: Traces) -> Array:
 
 def _deflection(moved: Traces, nominal: Traces) -> float:
     tips = _deflections(nominal)
-    return _largest(_deflections)(moved, nominal) if np.any(np.isfinite(tips)) else 0.0
+    return float(_deflections(moved).flat[int(np.nanargmax(tips))]) if np.any(np.isfinite(tips)) else 0.0
 
 
 def _residual_vibration(moved: Traces, nominal: Traces) -> float:

@@ -45,8 +45,8 @@ class Stencil:
         stack = np.stack(values)
         # Differences from one of the values: what does not change leaves no rounding.
         stack = stack - stack[0]
-        fine = np.tensordot(self.weights, stack, axes=1)
-        return Difference(fine, np.abs(fine - np.tensordot(self.coarse, stack, axes=1)))
+        fine, coarse = (np.asarray(np.tensordot(w, stack, axes=1), dtype=float) for w in (self.weights, self.coarse))
+        return Difference(fine, np.abs(fine - coarse))
 
 
 def make_stencil(places: range | tuple[int, ...], spacing: float) -> Stencil:
