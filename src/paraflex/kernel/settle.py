@@ -50,11 +50,9 @@ class History(NamedTuple):
 
 def make_history(steps: int, stages: int, n: int, m: int) -> History:
     """Room for so many steps."""
-    motion = (apart((steps, stages, n)) for _ in range(3))
-    return History(
-        apart(steps), apart(steps), apart(steps, np.int64), *motion, apart((steps, stages, m)), apart((steps, stages)),
-        apart(steps), apart(2),
-    )  # fmt: skip
+    q, v, a = (apart((steps, stages, n)) for _ in range(3))
+    lam, power, restart = apart((steps, stages, m)), apart((steps, stages)), apart(steps, np.int64)
+    return History(apart(steps), apart(steps), restart, q, v, a, lam, power, apart(steps), apart(2))
 
 
 @routine
