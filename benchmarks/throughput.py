@@ -17,6 +17,7 @@ import json
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -83,12 +84,12 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def coarsest(modes: list[str]) -> tuple[dict[str, float], dict[str, float]]:
+def coarsest(modes: list[str]) -> tuple[dict[str, Any], dict[str, float]]:
     """The coarsest setting that serves in every mode, and the deviations with it."""
     model = load("raparm_i")
     task = plan_tracking(model.mechanism, model.path(), duration=model.study.duration)
     exact = {mode: places(task, mode, {"tolerance": CONVERGED}) for mode in modes}
-    found: dict[str, float] = {}
+    found: dict[str, Any] = {}
     for setting in SETTINGS:
         found = {mode: deviation(task, mode, setting, exact[mode]) for mode in modes}
         if max(found.values()) <= DEVIATION:
@@ -96,7 +97,7 @@ def coarsest(modes: list[str]) -> tuple[dict[str, float], dict[str, float]]:
     raise SystemExit(f"no setting keeps to {DEVIATION:g} m: {found}")
 
 
-def deviation(task: TrackingTask, mode: str, setting: dict[str, float], exact: np.ndarray) -> float:
+def deviation(task: TrackingTask, mode: str, setting: dict[str, Any], exact: np.ndarray) -> float:
     """Largest distance from the converged run; infinite where this one fails."""
     try:
         away = places(task, mode, setting) - exact
@@ -105,7 +106,7 @@ def deviation(task: TrackingTask, mode: str, setting: dict[str, float], exact: n
     return float(np.max(np.hypot(away[:, 0], away[:, 1])))
 
 
-def places(task: TrackingTask, mode: str, setting: dict[str, float]) -> np.ndarray:
+def places(task: TrackingTask, mode: str, setting: dict[str, Any]) -> np.ndarray:
     """Of the end-effector at the samples."""
     solution = task.simulate(mode, options=IntegrationOptions(method=METHOD, **setting)).solution
     effector = task.mechanism.end_effector
@@ -113,12 +114,12 @@ def places(task: TrackingTask, mode: str, setting: dict[str, float]) -> np.ndarr
     return point_motion(task.system, effector.point, solution.q, solution.v, solution.a).position
 
 
-def told(setting: dict[str, float], between: str) -> str:
+def told(setting: dict[str, Any], between: str) -> str:
     """A setting as a study file says it."""
     return between.join(f"{name} = {value:g}" for name, value in setting.items())
 
 
-def runs_a_second(engine: str, workers: int, modes: list[str], designs: int, setting: dict[str, float]) -> float:
+def runs_a_second(engine: str, workers: int, modes: list[str], designs: int, setting: dict[str, Any]) -> float:
     """Between the first design that is done and the last."""
     moments: list[float] = []
     with tempfile.TemporaryDirectory() as name:

@@ -39,11 +39,14 @@ class FeedForward:
         One a motor, zero for passive ones [N m].
     knots : (j,) array
         Times between which the torques are smooth [s].
+    times : (k,) array
+        Through whose torques the splines go, the knots among them [s].
     """
 
     mode: ActuationMode
     signals: tuple[InputSignals, ...]
     knots: NDArray[np.float64]
+    times: NDArray[np.float64]
 
     def evaluate(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Torques (k, motors) at times t [N m]."""
@@ -90,11 +93,32 @@ class TorquePlan:
         for refined in range(_REFINEMENTS):
             effort = self._effort(refined)
             t, torques = effort.motion.t, allocate(effort, mode)
-            checked = FeedForward(mode, tuple(_splines(t[::2], torques[::2], self.knots)), self.knots)
+            checked = FeedForward(mode, tuple(_splines(t[::2], torques[::2], self.knots)), self.knots, t[::2])
             error = np.max(np.abs(checked.evaluate(t) - torques))
             if error <= _GAIN * _ACCURACY * max(np.max(np.abs(torques)), np.finfo(float).tiny):
-                return FeedForward(mode, tuple(_splines(t, torques, self.knots)), self.knots)
+                return FeedForward(mode, tuple(_splines(t, torques, self.knots)), self.knots, t)
         raise NumericalError(f'the torques of mode "{mode.name}" are too steep to interpolate: near a singularity')
+
+    def feed_forward_like(self, other: FeedForward) -> FeedForward:
+        """Torques of the same mode through as many instants: those of another plan, where its knots are these.
+
+        Between knots instants move in proportion. As a plan changes little its torques then change smoothly.
+
+        Parameters
+        ----------
+        other : FeedForward
+            Of a plan with as many knots.
+
+        Raises
+        ------
+        ActuationError, SingularActuationError
+            See `allocate`.
+        """
+        times = np.interp(other.times, other.knots, self.knots)
+        times[np.searchsorted(other.times, other.knots)] = self.knots
+        effort = required_effort(self.follow(times))
+        torques = allocate(effort, other.mode)
+        return FeedForward(other.mode, tuple(_splines(times, torques, self.knots)), self.knots, times)
 
     def _effort(self, refined: int) -> Effort:
         """On the fine grid with every interval halved so often."""

@@ -262,6 +262,29 @@ def compare_methods(
 
 
 @app.command()
+def sensitivity(
+    study: Annotated[str, typer.Argument(metavar="STUDY.toml", help="What is run, and by what it is differentiated.")],
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "--out", metavar="DIR", help="Folder for results. Default: results/STUDY."),
+    ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Where derivatives are taken; repeatable. Default: the mechanism's."),
+    ] = None,
+    metrics: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME,...", help="What is differentiated; repeatable. Default: the study's."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Differentiate what runs are judged by; write sensitivity.json, a table and figures/."""
+    from paraflex.cli.sensitivity import SensitivityRequest, sensitivity_command
+
+    raise typer.Exit(sensitivity_command(SensitivityRequest(study, output, at or [], metrics or [], json)))
+
+
+@app.command()
 def sweep(
     study: Annotated[str, typer.Argument(metavar="STUDY.toml", help="What varies, what is run, what is kept.")],
     output: Annotated[

@@ -5,6 +5,7 @@ from paraflex.dynamics.drive import Reach, reach
 from paraflex.dynamics.equilibrium import static_equilibrium
 from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
+from paraflex.dynamics.numbers import blocks_of, numbers_of, same_layout, with_numbers
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.singularity import SingularityMeasure
@@ -35,6 +36,7 @@ __all__ = [
     "System",
     "Vibration",
     "axis_angle",
+    "blocks_of",
     "build_system",
     "closure_of",
     "consistent_state",
@@ -47,6 +49,7 @@ __all__ = [
     "momentum",
     "natural_frequencies",
     "node_marker",
+    "numbers_of",
     "pack_signals",
     "piecewise_quintic",
     "project_position",
@@ -54,7 +57,9 @@ __all__ = [
     "reach",
     "redundant_rows",
     "reference_pose",
+    "same_layout",
     "start_state",
     "static_equilibrium",
     "undeformed",
+    "with_numbers",
 ]

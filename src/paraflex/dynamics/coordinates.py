@@ -124,8 +124,16 @@ class Marker:
         return s
 
 
-def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordinates:
+def body_coordinates(body: Body, offset: int, geometry: Geometry, like: ModalBasis | None = None) -> BodyCoordinates:
     """Coordinates of a body that start at an offset in q.
+
+    Parameters
+    ----------
+    body : Body
+    offset : int
+    geometry : Geometry
+    like : ModalBasis, optional
+        Of a body little different, whose modes these are to follow in order and sign: see `ModalBasis.like`.
 
     Raises
     ------
@@ -144,7 +152,9 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry) -> BodyCoordin
             field=f"body.{body.name}",
             remedy="check section, material and lumped masses for values many orders of magnitude apart",
         ) from error
-    if not isinstance(body, RigidBody) and body.modes is not None:
+    if like is not None:
+        modes = modes.like(like, integrals.Mff)
+    elif not isinstance(body, RigidBody) and body.modes is not None:
         modes = modes.lowest(body.modes)
     integrals = integrals.in_basis(modes.vectors)
     points = None

@@ -90,12 +90,15 @@ class System:
         return jacobian
 
 
-def build_system(mechanism: Mechanism) -> System:
+def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     """Turn a mechanism into a system; flexible coordinates are diagonalised per body.
 
     Parameters
     ----------
     mechanism : Mechanism
+    like : System, optional
+        Of a mechanism that differs a little in its numbers: modes follow those there in order and sign, so that
+        coordinates of the two mean the same.
 
     Returns
     -------
@@ -108,7 +111,8 @@ def build_system(mechanism: Mechanism) -> System:
     """
     bodies, offset = [], 0
     for body in mechanism.bodies:
-        coordinates = body_coordinates(body, offset, mechanism.geometry)
+        modes = None if like is None else like.body(body.name).modes
+        coordinates = body_coordinates(body, offset, mechanism.geometry, modes)
         bodies.append(coordinates)
         offset += 3 + coordinates.nf
     index = {body.name: i for i, body in enumerate(bodies)}

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+import scipy.optimize
 from numpy.typing import NDArray
 
 from paraflex.fem.integrals import ShapeIntegrals
@@ -29,6 +30,22 @@ class ModalBasis:
     def lowest(self, count: int) -> ModalBasis:
         """The modes of lowest frequency alone: the modal reduction."""
         return ModalBasis(self.omega[:count], self.vectors[:, :count])
+
+    def like(self, other: ModalBasis, Mff: NDArray[np.float64]) -> ModalBasis:
+        """Those of these modes that are nearest to the modes of a body little different, in their order and signs.
+
+        Frequencies may cross as a body changes, and eigenvectors have no sign: told by overlap, modes change smoothly.
+
+        Parameters
+        ----------
+        other : ModalBasis
+            Of as many coordinates; it may have fewer modes.
+        Mff : (nodal, nodal) array
+            Of this body, in the metric of which modes overlap.
+        """
+        overlap = other.vectors.T @ Mff @ self.vectors
+        rows, columns = scipy.optimize.linear_sum_assignment(-np.abs(overlap))
+        return ModalBasis(self.omega[columns], self.vectors[:, columns] * np.sign(overlap[rows, columns]))
 
 
 def modal_basis(body: ShapeIntegrals) -> ModalBasis:

@@ -1,6 +1,7 @@
 """Figures of a tracking study, each a function from its dataset to a Matplotlib figure; their files."""
 
 from paraflex.plots.agreement import compared_links, compared_paths, model_distances
+from paraflex.plots.elasticities import elasticities
 from paraflex.plots.modes import motor_torques, tracking_errors
 from paraflex.plots.numerical_damping import numerical_damping
 from paraflex.plots.optimisation import convergence, sobol_bars, targets_reached
@@ -8,6 +9,7 @@ from paraflex.plots.overview import motion_overview
 from paraflex.plots.phase import phase_diagrams
 from paraflex.plots.save import (
     save_agreement_figures,
+    save_elasticities,
     save_figures,
     save_overview,
     save_search_figures,
@@ -22,6 +24,7 @@ __all__ = [
     "compared_paths",
     "convergence",
     "desired_path",
+    "elasticities",
     "end_effector_motion",
     "end_effector_path",
     "link_motions",
@@ -31,6 +34,7 @@ __all__ = [
     "numerical_damping",
     "phase_diagrams",
     "save_agreement_figures",
+    "save_elasticities",
     "save_figures",
     "save_overview",
     "save_search_figures",

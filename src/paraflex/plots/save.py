@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import OutputError
 from paraflex.plots.agreement import compared_links, compared_paths, model_distances, prototype_pair
+from paraflex.plots.elasticities import elasticities
 from paraflex.plots.modes import motor_torques, tracking_errors
 from paraflex.plots.optimisation import convergence, sobol_bars, targets_reached
 from paraflex.plots.overview import motion_overview
@@ -143,6 +144,21 @@ def save_search_figures(figures: Mapping[str, Any], folder: str | Path) -> list[
     if any(row["first"] is not None for row in figures.get("indices", ())):
         drawn["indices"] = partial(sobol_bars, figures)
     return _save(drawn, Path(folder)) if drawn else []
+
+
+def save_elasticities(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
+    """Write a figure of elasticities for each run of a sensitivity study, as PNG and SVG.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    drawn = {
+        f"elasticities_{run['path']}_{run['mode']}": partial(elasticities, figures, k)
+        for k, run in enumerate(figures["runs"])
+    }
+    return _save(drawn, Path(folder))
 
 
 def _save(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:

@@ -16,6 +16,13 @@ from paraflex.studies.optimisation import (
     optimise,
     sobol_indices,
 )
+from paraflex.studies.sensitivities import (
+    Sensitivities,
+    SensitivityStudy,
+    load_sensitivities,
+    metric_gradients,
+    sensitivities,
+)
 from paraflex.studies.sweeps import SweepProgress, SweepResult, SweepStudy, load_sweep, sweep
 from paraflex.studies.tracking import Simulator, StudyResult, run_study
 from paraflex.studies.verification import (
@@ -42,6 +49,8 @@ __all__ = [
     "OptimisationResult",
     "Reference",
     "Refinement",
+    "Sensitivities",
+    "SensitivityStudy",
     "Simulator",
     "StudyResult",
     "SweepProgress",
@@ -56,11 +65,14 @@ __all__ = [
     "load_identification",
     "load_indices",
     "load_optimisation",
+    "load_sensitivities",
     "load_sweep",
+    "metric_gradients",
     "motion_case",
     "optimise",
     "reference_model",
     "run_study",
+    "sensitivities",
     "sobol_indices",
     "sweep",
     "tracking_case",

@@ -11,13 +11,11 @@ import xarray as xr
 
 from paraflex.compilation import compile_kernels_for
 from paraflex.errors import InputError, NumericalError
-from paraflex.files import model_from
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.results import tracking_dataset
 from paraflex.simulate import TrackingRun, TrackingTask, plan_tracking, simulate
 from paraflex.studies.sweeps.metrics import measure
-from paraflex.studies.sweeps.overlay import overlaid
 from paraflex.studies.sweeps.study import Setting, digest, versions
 
 COMPLETE, FAILED, INVALID = "complete", "failed", "invalid"
@@ -80,7 +78,7 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     _check_versions(setting)
     rows, kept = [_blank(setting, task, mode) for mode in setting.modes], {}
     try:
-        planned, options = _plan(setting, task)
+        planned, options = plan_task(setting, task)
     except Exception as error:
         for row in rows:
             row |= trouble(error)
@@ -98,6 +96,28 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
         if setting.trajectories:
             kept[row["id"]] = _trajectory(run, options, row)
     return Outcome(task, rows, kept)
+
+
+def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOptions]:
+    """The planned motion of a design along its path, and how its runs are integrated.
+
+    Raises
+    ------
+    InputError, NumericalError
+        Numbers that cannot be, or a path out of reach.
+    """
+    model, options = setting.design(task.values)
+    _compile(model.mechanism)
+    path = model.path(task.path)
+    planned = plan_tracking(
+        model.mechanism,
+        path,
+        duration=model.duration(task.path, path) if setting.duration is None else setting.duration,
+        samples=model.study.samples if setting.samples is None else setting.samples,
+        assembly=setting.assembly or model.study.assembly,
+        orientation=model.study.orientation,
+    )
+    return planned, options
 
 
 def trouble(error: Exception) -> Row:
@@ -135,22 +155,6 @@ def _blank(setting: Setting, task: Task, mode: str) -> Row:
         "reason": "",
         "time_reached": None,
     }
-
-
-def _plan(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOptions]:
-    model = model_from(overlaid(dict(setting.data), setting.numbers(task.values)), setting.source)
-    options = setting.options(model)
-    _compile(model.mechanism)
-    path = model.path(task.path)
-    planned = plan_tracking(
-        model.mechanism,
-        path,
-        duration=model.duration(task.path, path) if setting.duration is None else setting.duration,
-        samples=model.study.samples if setting.samples is None else setting.samples,
-        assembly=setting.assembly or model.study.assembly,
-        orientation=model.study.orientation,
-    )
-    return planned, options
 
 
 def _simulate(

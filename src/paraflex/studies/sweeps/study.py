@@ -21,13 +21,16 @@ from paraflex.files.read import read_toml, validate
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import parse_mode
 from paraflex.studies.sweeps.metrics import METRICS
-from paraflex.studies.sweeps.overlay import Place, find_place
+from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
 from paraflex.studies.sweeps.samples import Varied, check_varied, designs
 from paraflex.studies.sweeps.schema import SweepTable, VaryTable
 from paraflex.studies.sweeps.table import FIXED_COLUMNS
 
 # Attempted steps before a run is given up, unless the study says: a design that flails about must not hold up the rest.
 MOST_STEPS = 200_000
+# A field of this table is one of the study's own [integration], and may be one of these.
+INTEGRATION = "integration"
+INTEGRATION_NUMBERS = ("tolerance", "step", "alpha", "beta")
 # What results depend on besides the study.
 _PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
@@ -93,8 +96,22 @@ class Setting:
             for place in places
         ]
 
-    def options(self, model: Model) -> IntegrationOptions:
-        """How the runs of a design are integrated: as the study says, else as the design's file.
+    def design(self, values: tuple[float, ...]) -> tuple[Model, IntegrationOptions]:
+        """A design's model, and how its runs are integrated.
+
+        Raises
+        ------
+        InputError
+            Numbers that cannot be.
+        """
+        numbers = self.numbers(values)
+        inside = [(place, number) for place, number in numbers if place[0] != INTEGRATION]
+        chosen = {str(place[1]): number for place, number in numbers if place[0] == INTEGRATION}
+        model = model_from(overlaid(dict(self.data), inside), self.source)
+        return model, self.options(model, chosen)
+
+    def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
+        """How the runs of a design are integrated: as the design chooses, then as the study says, else as its file.
 
         Raises
         ------
@@ -102,9 +119,11 @@ class Setting:
             They do not go together.
         """
         study = model.study
-        given = {"method": study.method, "tolerance": study.tolerance, "step": study.step} | dict(self.integration)
+        wanted = dict(self.integration) | dict(chosen or {})
+        given: dict[str, Any] = {"method": study.method, "tolerance": study.tolerance, "step": study.step}
+        given |= wanted
         # A step goes with a method: naming another method leaves the mechanism's step out.
-        if "step" not in self.integration and given["method"] != study.method:
+        if "step" not in wanted and given["method"] != study.method:
             given["step"] = None
         return IntegrationOptions(**{name: value for name, value in given.items() if value is not None})
 
@@ -185,11 +204,31 @@ def load_sweep(file: str | FilePath) -> SweepStudy:
 
 def make_study(table: SweepTable, folder: FilePath) -> SweepStudy:
     """A study as a file in a folder says it; see `load_sweep`."""
+    setting, parameters, model = make_setting(table, folder)
+    for parameter in parameters:
+        check_varied(parameter, table.sampling.kind)
+    sampling = table.sampling
+    return SweepStudy(
+        name=table.name,
+        setting=setting,
+        parameters=parameters,
+        kind=sampling.kind,
+        designs=designs(parameters, sampling.kind, sampling.number, sampling.seed),
+        motors=tuple(motor.name for motor in model.mechanism.motors),
+    )
+
+
+def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Varied, ...], Model]:
+    """What all runs of a study have in common, its parameters, and the mechanism's model as its file has it.
+
+    Raises
+    ------
+    InputError
+        Anything that does not fit the mechanism, whatever designs are taken.
+    """
     data, source = load_data(_mechanism(table.mechanism, folder))
     model = model_from(data, source)
     parameters = tuple(_varied(name, entry) for name, entry in table.vary.items())
-    for parameter in parameters:
-        check_varied(parameter, table.sampling.kind)
     setting = Setting(
         data=data,
         source=source,
@@ -207,17 +246,8 @@ def make_study(table: SweepTable, folder: FilePath) -> SweepStudy:
         versions=versions(),
     )
     _check(setting, model)
-    motors = tuple(motor.name for motor in model.mechanism.motors)
     _check_columns(parameters)
-    sampling = table.sampling
-    return SweepStudy(
-        name=table.name,
-        setting=setting,
-        parameters=parameters,
-        kind=sampling.kind,
-        designs=designs(parameters, sampling.kind, sampling.number, sampling.seed),
-        motors=motors,
-    )
+    return setting, parameters, model
 
 
 @cache
@@ -260,10 +290,19 @@ def _varied(name: str, entry: VaryTable) -> Varied:
 
 def _places(data: Mapping[str, Any], parameter: Varied) -> tuple[Place, ...]:
     try:
-        return tuple(find_place(data, field) for field in parameter.fields)
+        return tuple(_place(data, field) for field in parameter.fields)
     except InputError as error:
         given = f"vary.{parameter.name}.fields" if parameter.fields != (parameter.name,) else f"vary.{parameter.name}"
         raise InputError(error.problem, field=given, value=error.field, remedy=error.remedy) from None
+
+
+def _place(data: Mapping[str, Any], field: str) -> Place:
+    table, _, name = field.partition(".")
+    if table != INTEGRATION:
+        return find_place(data, field)
+    if name not in INTEGRATION_NUMBERS:
+        raise InputError("no such number of the integration", field=field, remedy=suggestion(name, INTEGRATION_NUMBERS))
+    return INTEGRATION, name
 
 
 def _paths(model: Model, names: list[str]) -> tuple[str, ...]:

@@ -1,0 +1,150 @@
+"""`paraflex sensitivity`: derivatives of what runs are judged by, by numbers of the mechanism's file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from paraflex.cli.request import COMPLETE
+from paraflex.cli.tables import number, plain_console
+from paraflex.errors import InputError, OutputError
+from paraflex.plots import save_elasticities
+from paraflex.studies import Sensitivities, load_sensitivities, sensitivities
+from paraflex.studies.sweeps.folder import held
+from paraflex.studies.sweeps.study import digest
+from paraflex.studies.sweeps.table import whole_file
+
+RESULTS, TABLE, LINES = "sensitivity.json", "sensitivity.csv", "sensitivity.parquet"
+FIGURES = "figures"
+# Parameters side by side in a table of 80 columns.
+_COLUMNS = 4
+_OURS = {RESULTS, TABLE, LINES, FIGURES, ".lock"}
+
+
+@dataclass(frozen=True)
+class SensitivityRequest:
+    """What `paraflex sensitivity` was asked for."""
+
+    study: str
+    output: str | None
+    at: list[str]
+    metrics: list[str]
+    json: bool
+
+
+def sensitivity_command(request: SensitivityRequest) -> int:
+    """Differentiate the runs of a study; write sensitivity.json, the table and figures. The exit code."""
+    study = load_sensitivities(request.study, [name for entry in request.metrics for name in _names(entry)])
+    at = _values(request.at)
+    folder = Path("results") / Path(request.study).stem if request.output is None else Path(request.output)
+    setting = study.setting
+    places = [[list(place) for place in places] for places in setting.places]
+    asked = digest([setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics, at])
+    with held(folder):
+        _claim(folder, asked)
+        found = sensitivities(study, at=at)
+        figures = {"content": asked} | found.told()
+        _write(folder, figures, found)
+        save_elasticities(figures, folder / FIGURES)
+    console = plain_console()
+    if request.json:
+        print(json.dumps(figures, indent=2))
+        return COMPLETE
+    for row in range(len(found.rows)):
+        _print(console, found, row)
+    console.print(f"{folder / RESULTS}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
+    return COMPLETE
+
+
+def _names(entry: str) -> list[str]:
+    return [name.strip() for name in entry.split(",") if name.strip()]
+
+
+def _values(entries: list[str]) -> dict[str, float]:
+    values = {}
+    for entry in entries:
+        name, _, value = entry.partition("=")
+        try:
+            values[name.strip()] = float(value)
+        except ValueError:
+            raise InputError("not NAME=VALUE", field="--at", value=entry, remedy="say --at thickness=0.006") from None
+    return values
+
+
+def _claim(folder: Path, asked: str) -> None:
+    """Nothing, if the folder is empty or holds what the same study wrote."""
+    others = sorted(entry.name for entry in folder.iterdir() if entry.name not in _OURS)
+    if others:
+        raise InputError(
+            f"the folder holds other files ({', '.join(others[:3])})", field="--output", value=str(folder),
+            remedy="name a new folder",
+        )  # fmt: skip
+    if (folder / RESULTS).exists() and _content(folder / RESULTS) != asked:
+        raise InputError(
+            "the folder holds results of another study, or of this one before it was changed", field="--output",
+            value=str(folder), remedy="name a new folder",
+        )  # fmt: skip
+
+
+def _content(file: Path) -> Any:
+    try:
+        return json.loads(file.read_text(encoding="utf-8")).get("content")
+    except (OSError, ValueError, AttributeError):
+        return None
+
+
+def _write(folder: Path, figures: dict[str, Any], found: Sensitivities) -> None:
+    lines = found.to_frame()
+    with whole_file(folder / RESULTS) as unfinished:
+        unfinished.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    with whole_file(folder / TABLE) as unfinished:
+        lines.to_csv(unfinished, index=False)
+    with whole_file(folder / LINES) as unfinished:
+        _to_parquet(lines, unfinished)
+
+
+def _to_parquet(lines: Any, file: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        pq.write_table(pa.Table.from_pandas(lines, preserve_index=False), file)
+    except pa.ArrowException as error:
+        raise OutputError(f"cannot be written ({error})", field=str(file), remedy="choose another folder") from error
+
+
+def _print(console: Console, found: Sensitivities, row: int) -> None:
+    """Elasticities and derivatives of one run, a table each for every few parameters."""
+    path, mode = found.rows[row]
+    where, relative = f"{found.mechanism}, {path}, mode {mode}", found.relative
+    for first in range(0, len(found.parameters), _COLUMNS):
+        some = slice(first, first + _COLUMNS)
+        # Not the table's own title: that is broken at the table's width.
+        console.print(f"{where}: change of metrics by that of parameters [% / %]", soft_wrap=True)
+        console.print(_table(found, row, relative[row, :, some], some, "+.2f"))
+        console.print("Derivatives, in the units of metrics and parameters", soft_wrap=True)
+        console.print(_table(found, row, found.derivatives[row, :, some], some, ".2e"))
+
+
+def _table(found: Sensitivities, row: int, shown: NDArray[np.float64], some: slice, form: str) -> Table:
+    table = Table(box=box.SIMPLE, collapse_padding=True, pad_edge=False)
+    table.add_column("metric", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    for name, value in zip(found.parameters[some], found.nominal[some], strict=True):
+        table.add_column(f"{name}\n{value:g}", justify="right")
+    named = zip(found.metrics, found.units, found.values[row], shown, strict=True)
+    for metric, unit, value, numbers in named:
+        table.add_row(f"{metric} [{unit}]", _number(value, ".3e"), *(_number(x, form) for x in numbers))
+    return table
+
+
+def _number(value: float, form: str) -> str:
+    return number(value, form) if np.isfinite(value) else ""

@@ -1,0 +1,290 @@
+"""Derivatives of a run by parameters: the run's own steps, solved to rounding and differentiated stage by stage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import numbers_of, with_numbers
+from paraflex.errors import InputError, IntegrationError, Moment
+from paraflex.integrators.methods import METHODS, Family, Treatment
+from paraflex.integrators.native import NativeRun, prepare
+from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.run import Problem, empty_samples
+from paraflex.integrators.stretches import hidden_from
+from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
+from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
+from paraflex.kernel.settle import History, make_history, sample_energies, settle_steps
+from paraflex.kernel.tangent import make_tangent
+from paraflex.kernel.variation import make_piece, vary_steps
+from paraflex.kernel.variation_samples import PLACES, STEP, Variation, make_variation
+
+Array = NDArray[np.float64]
+
+# Steps that are held at once.
+_CHUNK = 256
+# Where corrections of a stage are left larger than this part of what they correct, there is no derivative.
+_UNSETTLED = 1e-6
+
+
+class Direction(NamedTuple):
+    """How what a run is given changes with a parameter: derivatives, by the parameter as a part of its size.
+
+    Attributes
+    ----------
+    packed, signals : arrays
+        Of the numbers of the packed system and of the signals, as `dynamics.numbers_of` orders them.
+    q, v : (n,) arrays
+        Of the initial state.
+    stops, times : arrays
+        Of the stops and of the sample times [s].
+    gains : (2,) array
+        Of Baumgarte's alpha and beta [1/s].
+    """
+
+    packed: Array
+    signals: Array
+    q: Array
+    v: Array
+    stops: Array
+    times: Array
+    gains: Array
+
+
+class Motion(NamedTuple):
+    """Samples of a run, (k, ...), or their derivatives by parameters, (parameters, k, ...).
+
+    Attributes
+    ----------
+    q, v, a, multipliers : arrays
+    work : array
+        Of motors and all else but weight, less what dampers take [J].
+    """
+
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    work: Array
+
+
+@dataclass(frozen=True)
+class RunDerivatives:
+    """A run solved to rounding in its own steps, and how it changes with parameters.
+
+    Attributes
+    ----------
+    t : (k,) array
+        [s]
+    motion : Motion
+    derivatives : Motion
+    steps : int
+        Accepted ones.
+    unsettled : float
+        Largest last correction of any stage's equations, as a part of what it corrected: what they are solved to.
+    """
+
+    t: Array
+    motion: Motion
+    derivatives: Motion
+    steps: int
+    unsettled: float
+
+
+def check_differentiable(options: IntegrationOptions) -> None:
+    """Nothing, if runs with these options can be differentiated.
+
+    Raises
+    ------
+    InputError
+        Another family of methods, treatment of constraints, or events.
+    """
+    if options.description.family != Family.ESDIRK:
+        able = [name for name, method in METHODS.items() if method.family == Family.ESDIRK]
+        raise InputError(
+            "has no derivatives", field="method", value=options.method, remedy=f"choose from {', '.join(able)}"
+        )
+    if options.treatment != Treatment.BAUMGARTE:
+        raise InputError(
+            "has no derivatives", field="constraints", value=options.treatment.value, remedy='choose "baumgarte"'
+        )
+    if options.events:
+        raise InputError(
+            "an event ends a run at a time of its own: no derivatives", field="events", remedy="leave them out"
+        )
+
+
+def run_derivatives(problem: Problem, options: IntegrationOptions, directions: Sequence[Direction]) -> RunDerivatives:
+    """Derivatives of a run by parameters, its steps as they are.
+
+    Steps keep their share of the stretch between two stops: where a stop moves, they move with it.
+
+    Parameters
+    ----------
+    problem : Problem
+        As `make_problem` returns it.
+    options : IntegrationOptions
+    directions : sequence of Direction
+        One a parameter.
+
+    Raises
+    ------
+    InputError
+        See `check_differentiable`.
+    IntegrationError
+        The run could not be finished, or equations of a stage could not be solved to rounding: it names the time.
+    """
+    check_differentiable(options)
+    run = prepare(problem, options)
+    varied = _Varied(problem, run, directions)
+    for chunk in _chunks(run):
+        varied.go_through(chunk)
+    derivatives = [_motion(y) for y in varied.variations]
+    empty = tuple(np.zeros((0, *part.shape)) for part in varied.motion)
+    return RunDerivatives(
+        t=problem.times,
+        motion=varied.motion,
+        derivatives=Motion(*(np.stack(parts) for parts in zip(*derivatives, strict=True)))
+        if derivatives
+        else Motion(*empty),
+        steps=int(run.state.counts[STEPS]),
+        unsettled=varied.unsettled,
+    )
+
+
+def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Array:
+    """Kinetic energy, strain energy with that of springs, and what gravity has done at samples (k, 3) [J].
+
+    The last counts from where all mass lies at the origin of the ground frame.
+    """
+    out = np.zeros((q.shape[0], 3))
+    arrays = (np.ascontiguousarray(part) for part in (q, v, multipliers))
+    sample_energies(packed, *arrays, make_scratch(packed), out)
+    return out
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """Accepted steps one after the other, under signals that do not jump."""
+
+    history: History
+    count: int
+    signals: Signals
+
+
+def _chunks(run: NativeRun) -> Iterator[_Chunk]:
+    """The accepted steps of a run while it is marched, in one history that is filled again and again."""
+    problem, state, jumps = run.problem, run.state, run.problem.jumps
+    history = make_history(_CHUNK, run.scheme.c.size, problem.system.n, problem.system.m)
+    run.start()
+    count, restart, code = 0, True, PAUSED
+    signals = _signals_from(problem, state.clock[TIME])
+    while True:
+        before, accepted = float(state.clock[TIME]), state.counts[STEPS]
+        code = run.march(1)
+        if code == FINISHED:
+            break
+        if code != PAUSED:
+            raise IntegrationError("the run cannot go on", Moment(before, int(accepted)))
+        if state.counts[STEPS] == accepted:
+            # The first stage is solved anew for the second shorter step.
+            restart |= bool(state.counts[FAILURES] == 2)
+            continue
+        history.t[count], history.h[count], history.restart[count] = before, state.clock[LAST_STEP], restart
+        history.a[count], history.lam[count] = state.stage_a[0], state.stage_lam
+        count, restart = count + 1, bool(np.any(jumps == state.clock[TIME]))
+        if count == _CHUNK or restart:
+            yield _Chunk(history, count, signals)
+            count, signals = 0, _signals_from(problem, state.clock[TIME])
+    if count:
+        yield _Chunk(history, count, signals)
+
+
+def _signals_from(problem: Problem, time: float) -> Signals:
+    """Signals as steps from that time on may see them, as in `NativeRun.march`."""
+    ahead = problem.jumps[problem.jumps > time]
+    return hidden_from(problem.signals, ahead[0]) if ahead.size else problem.signals
+
+
+class _Varied:
+    """A run solved to rounding, and its derivatives, as far as they have come."""
+
+    def __init__(self, problem: Problem, run: NativeRun, directions: Sequence[Direction]) -> None:
+        self.problem, self.run, self.directions, self.unsettled = problem, run, directions, 0.0
+        system, initial, stages = problem.system, problem.initial, run.scheme.c.size
+        self.march = make_march(system.n, system.m, stages, len(system.mechanism.motors))
+        self.march.q[:], self.march.v[:] = initial.q, initial.v
+        self.workspace, self.samples = system.workspace(), empty_samples(problem.times, system)
+        self.tangent = make_tangent(system.packed)
+        self.moved = [
+            (_moved(system.packed, direction.packed), _moved(problem.signals, direction.signals))
+            for direction in directions
+        ]
+        self.pieces = tuple(make_piece(problem.signals) for _ in PLACES)
+        self.variations = [
+            make_variation(_CHUNK, stages, system.n, system.m, problem.times, np.ascontiguousarray(direction.times))
+            for direction in directions
+        ]
+        gains = np.array([run.controls.alpha, run.controls.beta])
+        for y, direction in zip(self.variations, directions, strict=True):
+            y.q[0], y.v[0] = direction.q, direction.v
+            y.gains[:] = gains + STEP * np.outer(PLACES, direction.gains)
+
+    @property
+    def motion(self) -> Motion:
+        """Samples of the run itself."""
+        samples = self.samples
+        return Motion(samples.q, samples.v, samples.a, samples.lam, self.work)
+
+    @property
+    def work(self) -> Array:
+        """Without that of weight, which samples count from the origin of the ground frame."""
+        samples = self.samples
+        weight = energies(self.problem.system.packed, samples.q, samples.v, samples.lam)[:, 2]
+        return samples.energy[:, 2] - weight
+
+    def go_through(self, chunk: _Chunk) -> None:
+        """Solve and differentiate the steps of a chunk."""
+        run, system = self.run, self.problem.system
+        arguments = (run.scheme, run.controls, chunk.count, chunk.history)
+        settle_steps(system.packed, chunk.signals, *arguments, self.march, self.workspace, self.samples)
+        self._check(chunk, chunk.history.left)
+        torques = self.march.torques
+        for y, direction, moved in zip(self.variations, self.directions, self.moved, strict=True):
+            self._vary_times(chunk, y, direction)
+            rest = (*arguments, y, self.tangent, torques, self.workspace)
+            vary_steps(system.packed, chunk.signals, *moved, self.pieces, *rest)
+            self._check(chunk, y.left)
+
+    def _vary_times(self, chunk: _Chunk, y: Variation, direction: Direction) -> None:
+        """Derivatives of when steps begin and of their lengths: they share those of the stops around them."""
+        stops = np.concatenate([[self.problem.initial.time], self.problem.stops])
+        change = np.concatenate([[0.0], direction.stops])
+        t, h = chunk.history.t[: chunk.count], chunk.history.h[: chunk.count]
+        stretch = np.clip(np.searchsorted(stops, t, side="right") - 1, 0, stops.size - 2)
+        slope = np.diff(change) / np.diff(stops)
+        y.t[: chunk.count] = change[stretch] + (t - stops[stretch]) * slope[stretch]
+        y.h[: chunk.count] = h * slope[stretch]
+
+    def _check(self, chunk: _Chunk, left: Array) -> None:
+        left = left[: chunk.count]
+        self.unsettled = max(self.unsettled, float(left.max()))
+        if not self.unsettled <= _UNSETTLED:
+            worst = int(np.argmax(~(left <= _UNSETTLED)))
+            raise IntegrationError(
+                "the equations of a stage cannot be solved to rounding", Moment(float(chunk.history.t[worst]), worst)
+            )
+
+
+def _moved(record, change: Array) -> tuple:
+    """A packed system or signals at the places of the kernel's differences."""
+    numbers = numbers_of(record)
+    return tuple(with_numbers(record, numbers + place * STEP * change) for place in PLACES)
+
+
+def _motion(y: Variation) -> Motion:
+    return Motion(y.sample_q, y.sample_v, y.sample_a, y.sample_lam, y.sample_work)

@@ -1,0 +1,150 @@
+"""Derivatives of a run at its samples, within a step: those of what `march.write_samples` finds."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.kernel.arrays import apart, fill
+from paraflex.kernel.compiling import routine
+from paraflex.kernel.march import interpolate
+from paraflex.kernel.records import by_reference
+
+# Central differences of fourth order over this part of a parameter's size, and their places and weights.
+STEP = 1e-3
+PLACES, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
+
+
+@by_reference
+class Variation(NamedTuple):
+    """Derivatives of the motion by one parameter: what it moves, where the motion stands, and samples."""
+
+    t: NDArray[np.float64]  # (steps,) of when steps begin
+    h: NDArray[np.float64]  # and of their lengths
+    gains: NDArray[np.float64]  # (4, 2) Baumgarte's alpha and beta at the places of the difference
+    q: NDArray[np.float64]  # (stages, n) of the step at hand; the first is where the last one ended
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    lam: NDArray[np.float64]  # (stages, m)
+    power: NDArray[np.float64]  # (stages,)
+    f: NDArray[np.float64]  # (n,) R_s of the equations of motion
+    rows: NDArray[np.float64]  # (m,) and of the rows
+    moved_q: NDArray[np.float64]  # scratch
+    moved_v: NDArray[np.float64]
+    moved_lam: NDArray[np.float64]
+    work: NDArray[np.float64]  # (2,) work until now and its derivative
+    taken: NDArray[np.int64]  # (1,) samples until now
+    left: NDArray[np.float64]  # (steps,) as in `History`
+    times: NDArray[np.float64]  # (times,) of the samples
+    sample_times: NDArray[np.float64]  # and their derivatives
+    sample_q: NDArray[np.float64]  # (times, n)
+    sample_v: NDArray[np.float64]
+    sample_a: NDArray[np.float64]
+    sample_lam: NDArray[np.float64]  # (times, m)
+    sample_work: NDArray[np.float64]  # (times,) without that of weight
+
+
+def make_variation(
+    steps: int, stages: int, n: int, m: int, times: NDArray[np.float64], sample_times: NDArray[np.float64]
+) -> Variation:
+    """Room for the derivatives by one parameter; zero."""
+    k = times.size
+    return Variation(
+        t=apart(steps),
+        h=apart(steps),
+        gains=apart((4, 2)),
+        q=apart((stages, n)),
+        v=apart((stages, n)),
+        a=apart((stages, n)),
+        lam=apart((stages, m)),
+        power=apart(stages),
+        f=apart(n),
+        rows=apart(m),
+        moved_q=apart(n),
+        moved_v=apart(n),
+        moved_lam=apart(m),
+        work=apart(2),
+        taken=apart(1, np.int64),
+        left=apart(steps),
+        times=times,
+        sample_times=sample_times,
+        sample_q=apart((k, n)),
+        sample_v=apart((k, n)),
+        sample_a=apart((k, n)),
+        sample_lam=apart((k, m)),
+        sample_work=apart(k),
+    )
+
+
+@routine
+def vary_step_work(tableau, k, x, y):
+    """Work of the motors in step k, and its derivative."""
+    last, work, d_work = tableau.c.size - 1, 0.0, 0.0
+    for s in range(last + 1):
+        work += x.h[k] * tableau.A[last, s] * x.power[k, s]
+        d_work += tableau.A[last, s] * (x.h[k] * y.power[s] + y.h[k] * x.power[k, s])
+    return work, d_work
+
+
+@routine
+def vary_multipliers(tableau, k, fraction, d_fraction, x, y, out):
+    """Derivative of the multipliers at a fraction of step k that moves itself: see `march.interpolate_multipliers`."""
+    fill(out, 0.0)
+    for s in tableau.nodes:
+        weight = 1.0
+        for l in tableau.nodes:
+            if l != s:
+                weight *= (fraction - tableau.c[l]) / (tableau.c[s] - tableau.c[l])
+        slope = 0.0
+        for skipped in tableau.nodes:
+            if skipped != s:
+                product = 1.0 / (tableau.c[s] - tableau.c[skipped])
+                for l in tableau.nodes:
+                    if l != s and l != skipped:
+                        product *= (fraction - tableau.c[l]) / (tableau.c[s] - tableau.c[l])
+                slope += product
+        for r in range(out.size):
+            out[r] += weight * y.lam[s, r] + slope * d_fraction * x.lam[k, s, r]
+
+
+@routine
+def vary_samples(tableau, k, x, y):
+    """Derivatives at every sample time within step k: those of what `march.write_samples` finds."""
+    t, h, last = x.t[k], x.h[k], tableau.c.size - 1
+    piece, i = 0, y.taken[0]
+    while i < y.times.size and y.times[i] <= t + h * (1.0 + 1e-12):
+        time, d_time = y.times[i], y.sample_times[i] - y.t[k]
+        while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
+            piece += 1
+        s0, s1 = tableau.dense[piece], tableau.dense[piece + 1]
+        width, d_width = (tableau.c[s1] - tableau.c[s0]) * h, (tableau.c[s1] - tableau.c[s0]) * y.h[k]
+        z = min(max((time - t - tableau.c[s0] * h) / width, 0.0), 1.0)
+        d_z = (d_time - tableau.c[s0] * y.h[k] - z * d_width) / width
+        shifts = d_z != 0.0 or d_width != 0.0
+        for j in range(y.q.shape[1]):
+            y.sample_q[i, j], y.sample_v[i, j], y.sample_a[i, j] = interpolate(
+                y.q[s0, j], y.v[s0, j], y.a[s0, j], y.q[s1, j], y.v[s1, j], y.a[s1, j], width, z
+            )
+            if shifts:
+                for e in range(4):
+                    q, v, a = interpolate(
+                        x.q[k, s0, j], x.v[k, s0, j], x.a[k, s0, j], x.q[k, s1, j], x.v[k, s1, j], x.a[k, s1, j],
+                        width + PLACES[e] * STEP * d_width, z + PLACES[e] * STEP * d_z,
+                    )  # fmt: skip
+                    y.sample_q[i, j] += WEIGHTS[e] * q / STEP
+                    y.sample_v[i, j] += WEIGHTS[e] * v / STEP
+                    y.sample_a[i, j] += WEIGHTS[e] * a / STEP
+        vary_multipliers(tableau, k, (time - t) / h, (d_time - (time - t) / h * y.h[k]) / h, x, y, y.sample_lam[i])
+        work, d_work = vary_step_work(tableau, k, x, y)
+        done = min(max((time - t) / h, 0.0), 1.0)
+        d_done, left = (d_time - done * y.h[k]) / h, 1.0 - done
+        first, end = x.power[k, 0], x.power[k, last]
+        y.sample_work[i] = y.work[1] + done * done * (3.0 - 2.0 * done) * d_work + 6.0 * done * left * d_done * work
+        bend = done * left * (left * first - done * end)
+        d_bend = (left - done) * (left * first - done * end) - done * left * (first + end)
+        y.sample_work[i] += y.h[k] * bend + h * d_done * d_bend
+        y.sample_work[i] += h * done * left * (left * y.power[0] - done * y.power[last])
+        i += 1
+    y.taken[0] = i

@@ -1,0 +1,71 @@
+"""What moves the metrics of a run: elasticities as bars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import mode_label
+from paraflex.plots.layout import TWO_COLUMNS, lay_out, panels
+from paraflex.plots.style import COLOURS, ZERO, journal_style
+
+# Height of a metric's group of bars, and of one bar in it, [mm]; width of a letter of a metric's name, [em].
+_GROUP, _BAR, _LETTER = 2.4, 1.9, 0.2
+_EM = 7.0 / 72.0 * 25.4
+
+
+@journal_style()
+def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
+    """By how many per cent each metric changes with one per cent of each parameter: a group of bars a metric.
+
+    Parameters
+    ----------
+    figures : mapping
+        From `studies.Sensitivities.told`, or read from `sensitivity.json`.
+    run : int
+        Which of its runs.
+
+    Raises
+    ------
+    InputError
+        No such run.
+    """
+    if not 0 <= run < len(figures["runs"]):
+        raise InputError("no such run", field="run", value=run, remedy=f"name one from 0 to {len(figures['runs']) - 1}")
+    told = figures["runs"][run]
+    parameters, metrics = list(figures["parameters"]), list(told["metrics"])
+    figure, axes = panels(1, 1)
+    panel = axes[0, 0]
+    # Groups from the top down, in them the parameters in order.
+    pitch = len(parameters) * _BAR + _GROUP
+    places = -pitch * np.arange(len(metrics))
+    for k, parameter in enumerate(parameters):
+        values = [told["metrics"][metric]["relative"][parameter] for metric in metrics]
+        widths = [np.nan if value is None else value for value in values]
+        offset = (0.5 * (len(parameters) - 1) - k) * _BAR
+        panel.barh(places + offset, widths, 0.9 * _BAR, color=COLOURS[k % len(COLOURS)], label=parameter)
+    panel.axvline(0.0, **ZERO)
+    for place in places[:-1]:
+        panel.axhline(place - 0.5 * pitch, color="0.9", linewidth=0.4)
+    panel.set_ylim(places[-1] - 0.5 * pitch, 0.5 * pitch)
+    panel.margins(x=0.06)
+    panel.autoscale(axis="x")
+    panel.set_yticks([])
+    panel.set_xlabel("change of the metric by change of the parameter [% / %]")
+    panel.set_title(f"{figures['mechanism']}, {told['path']}, {mode_label(told['mode'])}", loc="left")
+    lay_out(figure, axes, panel_height=pitch * len(metrics))
+    _name_groups(panel, dict(zip(metrics, places, strict=True)))
+    return figure
+
+
+def _name_groups(panel: Any, places: Mapping[str, float]) -> None:
+    """Names of the metrics left of the panel, which gives them the room."""
+    left, bottom, width, height = panel.get_position().bounds
+    room = _EM * (1.0 + max(len(name) for name in places) * (0.36 + _LETTER)) / TWO_COLUMNS
+    panel.set_position((left + room, bottom, width - room, height))
+    for name, place in places.items():
+        panel.text(-0.008, place, name, transform=panel.get_yaxis_transform(), ha="right", va="center", clip_on=False)

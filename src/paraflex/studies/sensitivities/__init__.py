@@ -1,0 +1,23 @@
+"""Sensitivities: derivatives of what runs are judged by, by any numbers of the mechanism's file."""
+
+from paraflex.studies.sensitivities.gradient import ModeGradients, metric_gradients, mode_gradients
+from paraflex.studies.sensitivities.metrics import SMOOTH
+from paraflex.studies.sensitivities.plans import nominal_values
+from paraflex.studies.sensitivities.study import (
+    Sensitivities,
+    SensitivityStudy,
+    load_sensitivities,
+    sensitivities,
+)
+
+__all__ = [
+    "SMOOTH",
+    "ModeGradients",
+    "Sensitivities",
+    "SensitivityStudy",
+    "load_sensitivities",
+    "metric_gradients",
+    "mode_gradients",
+    "nominal_values",
+    "sensitivities",
+]

@@ -1,0 +1,73 @@
+"""Differences of high order of what is smooth to rounding, with an estimate of their error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Between places, as parts of a parameter's size. Motion and metrics: short, for near a singular pose or a maximum they
+# curve. Systems: long, for stiffnesses of a beam lie many powers of ten apart, which leaves the soft ones a relative
+# rounding of 1e-10.
+_SHORT, _LONG = 5e-4, 4e-3
+
+
+class Difference(NamedTuple):
+    """A derivative, and how far it is from that of a formula two orders lower, which is less exact than it."""
+
+    value: Array
+    error: Array
+
+
+@dataclass(frozen=True)
+class Stencil:
+    """Places at which a function is asked for, and what weighs its values there.
+
+    Attributes
+    ----------
+    places : tuple of float
+        As parts of a parameter's size.
+    weights, coarse : (places,) arrays
+        For a derivative by the parameter as a part of its size; `coarse` leaves out the outermost places.
+    """
+
+    places: tuple[float, ...]
+    weights: Array
+    coarse: Array
+
+    def derivative(self, values: list[Array]) -> Difference:
+        """Of values at the places, arrays of one shape."""
+        stack = np.stack(values)
+        # Differences from one of the values: what does not change leaves no rounding.
+        stack = stack - stack[0]
+        fine, coarse = (np.asarray(np.tensordot(w, stack, axes=1), dtype=float) for w in (self.weights, self.coarse))
+        return Difference(fine, np.abs(fine - coarse))
+
+
+def make_stencil(places: range | tuple[int, ...], spacing: float) -> Stencil:
+    """The stencil of places in units of a spacing; the coarser formula leaves out two of them."""
+    x = np.array(places, dtype=float)
+    near = np.argsort(np.abs(x), kind="stable")[:-2]
+    weights, coarse = np.zeros(x.size), np.zeros(x.size)
+    weights[:] = _weights(x)
+    coarse[near] = _weights(x[near])
+    return Stencil(tuple(spacing * x), weights / spacing, coarse / spacing)
+
+
+def _weights(places: Array) -> Array:
+    """Of values at places for the first derivative at zero, in units of the spacing: by Taylor's series."""
+    taylor = np.array([places**power / factorial(power) for power in range(places.size)])
+    return np.linalg.solve(taylor, np.eye(places.size)[1])
+
+
+# For motion and metrics, and for systems: about a value, and to either side of it alone.
+STENCILS = (
+    (make_stencil((-3, -2, -1, 1, 2, 3), _SHORT), make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _LONG)),
+    (make_stencil(range(7), _SHORT), make_stencil(range(9), _LONG)),
+    (make_stencil(range(0, -7, -1), _SHORT), make_stencil(range(0, -9, -1), _LONG)),
+)
