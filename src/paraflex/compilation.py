@@ -25,7 +25,7 @@ from paraflex.kinematics import Line
 from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
 from paraflex.simulate import plan_tracking
 
-NOTICE = "Compiling the kernels: once after an installation, about a minute."
+NOTICE = "Compiling the kernels: once after an installation, about half a minute."
 
 
 def are_compiled(geometry: Geometry = Geometry.LINEAR) -> bool:
