@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from paraflex.kernel.arrays import add, apart, copy, largest
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.compiling import inlined, kernel, lasting, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
@@ -115,7 +115,7 @@ def settle(p, signals, t, g, b, weights, dependent_part, m, a, lam, least, ws):
     return change
 
 
-@kernel
+@lasting
 def settle_steps(p, signals, tableau, controls, count, x, m, ws, out):
     """Solve the first `count` steps of a history again, each to rounding, from where m stands; samples into out.
 

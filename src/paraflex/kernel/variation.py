@@ -17,12 +17,12 @@ from __future__ import annotations
 import numpy as np
 
 from paraflex.kernel.arrays import add, apart, copy, fill
-from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.compiling import inlined, lasting, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.linear import right_hand_side, solve_system
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.settle import MOST_CORRECTIONS, baumgarte_weights, ended, prepare_matrix, relative
-from paraflex.kernel.signals import evaluate_signal
+from paraflex.kernel.signals import evaluate_signal, piece_at
 from paraflex.kernel.stage import equations
 from paraflex.kernel.step import input_power
 from paraflex.kernel.tangent import note_slopes, residual_tangent
@@ -33,19 +33,6 @@ def make_piece(signals: Signals) -> Signals:
     """Room for one piece of every signal."""
     count = signals.start.size - 1
     return Signals(2 * np.arange(count + 1), apart(2 * count), apart((2 * count, signals.coefficients.shape[1])))
-
-
-@inlined
-def piece_at(s, k, t):
-    """Which piece `signals.evaluate_signal` evaluates."""
-    low, high = s.start[k], s.start[k + 1] - 2
-    while low < high:
-        middle = (low + high + 1) // 2
-        if s.breaks[middle] <= t:
-            low = middle
-        else:
-            high = middle - 1
-    return low
 
 
 @routine
@@ -143,7 +130,7 @@ def vary_power(moved, signals, times, i, q, v, lam, torques, y, ws):
     y.power[i] = total / STEP
 
 
-@kernel
+@lasting
 def vary_steps(p, signals, moved, moved_signals, pieces, tableau, controls, count, x, y, d, torques, ws):
     """Derivatives of the motion by one parameter over the first `count` steps of a history.
 
