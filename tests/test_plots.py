@@ -33,6 +33,31 @@ DESIRED_TWINS = (
 SINGLE = ("tip_deflections", "link_motions", "end_effector_path", "end_effector_motion", "phase_diagrams")
 # Of methods of integration, not of a dataset: test_compare.py.
 METHODS = ("numerical_damping", "work_precision")
+# Of studies of many designs, from their results as files hold them.
+_INDEX = {"first": 0.4, "first_confidence": 0.2, "total": 0.7, "total_confidence": 0.3}
+_INDICES = [
+    {"metric": metric, "path": "square", "mode": FULL, "parameter": parameter, **_INDEX}
+    for metric in ("tracking_rms", "peak_torque_max", "motor_energy")
+    for parameter in ("thickness", "length of the distal links")
+]
+_MOVED = {name: {"relative": {"thickness": -2.0, "end_mass": None}} for name in ("tracking_rms", "peak_torque_max")}
+STUDIES = {
+    "convergence": {
+        "kind": "optimisation",
+        "history": [(0, 2.0, True), (1, None, False), (2, 1.5, True), (3, 9.0, False)],
+    },
+    "targets_reached": {
+        "targets": [
+            {"metric": "tracking_rms", "path": path, "mode": FULL, "value": 2.0, "start": 1.0, "reached": 2.1}
+            for path in ("square", "a long way round")
+        ]
+    },
+    "sobol_bars": {"indices": _INDICES},
+    "elasticities": {
+        "mechanism": "arm", "parameters": ["thickness", "end_mass"],
+        "runs": [{"path": "square", "mode": FULL, "metrics": _MOVED}],
+    },
+}  # fmt: skip
 COMPARED = ("compared_links", "compared_paths")
 NAMES = (
     "fig11_desired_path",
@@ -170,16 +195,21 @@ def test_every_axis_label_names_its_unit(data: xr.Dataset, name: str, units: set
 
 @pytest.mark.parametrize("mode", [FULL, PARTIAL])
 @pytest.mark.parametrize(
-    "name", [name for name in plots.__all__ if not name.startswith("save") and name not in METHODS]
+    "name", [name for name in plots.__all__ if not name.startswith("save") and name not in {*METHODS, *STUDIES}]
 )
 def test_nothing_overlaps_or_leaves_the_page(data: xr.Dataset, name: str, mode: str) -> None:
     data["angular_acceleration"] *= 50.0  # five digits and a sign
     stays_on_the_page(figure_of(name, data, mode))
 
 
+@pytest.mark.parametrize("name", list(STUDIES))
+def test_figures_of_studies_stay_on_the_page(name: str) -> None:
+    stays_on_the_page(getattr(plots, name)(STUDIES[name]))
+
+
 def stays_on_the_page(figure: Figure) -> None:
     figure.draw_without_rendering()
-    boxes = [axes.get_tightbbox() for axes in figure.axes]
+    boxes = [axes.get_tightbbox() for axes in figure.axes if axes.get_visible()]
     boxes += [legend.get_window_extent() for legend in figure.legends]
     page = figure.bbox
     for k, box in enumerate(boxes):

@@ -121,7 +121,7 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     for _ in range(_MAX_ITERATIONS):
         phi, _ = system.constraints(signals, t, q, zero)
         if np.max(np.abs(phi), initial=0.0) < CLOSED:
-            if _keeps_shape(system, q):
+            if _keeps_shape(system, start, q):
                 return q
             break
         q -= least_change(system, q, phi, stiffness=_POSITION_STIFFNESS)
@@ -133,14 +133,14 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     )
 
 
-def _keeps_shape(system: System, q: NDArray[np.float64]) -> bool:
-    """Whether no link is bent out of shape: in linear theory any loop closes by stretching."""
+def _keeps_shape(system: System, start: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
+    """Whether closing bends no link out of the shape it had: in linear theory any loop closes by stretching."""
     for body in system.bodies:
         markers = [system.marker(PointRef(body.name, point)) for point in system.mechanism.points[body.name]]
         if body.nf == 0 or not markers:
             continue
         places = np.array([marker.x0 for marker in markers])
-        deflected = np.array([marker.place(q[body.flexible]) for marker in markers]) - places
+        deflected = np.array([marker.place(q[body.flexible]) - marker.place(start[body.flexible]) for marker in markers])
         size = np.max(np.linalg.norm(places - places[:1], axis=1), initial=0.0)
         if size > 0.0 and np.max(np.linalg.norm(deflected, axis=1)) > _LARGEST_DEFLECTION * size:
             return False
