@@ -140,7 +140,9 @@ def _keeps_shape(system: System, start: NDArray[np.float64], q: NDArray[np.float
         if body.nf == 0 or not markers:
             continue
         places = np.array([marker.x0 for marker in markers])
-        deflected = np.array([marker.place(q[body.flexible]) - marker.place(start[body.flexible]) for marker in markers])
+        deflected = np.array(
+            [marker.place(q[body.flexible]) - marker.place(start[body.flexible]) for marker in markers]
+        )
         size = np.max(np.linalg.norm(places - places[:1], axis=1), initial=0.0)
         if size > 0.0 and np.max(np.linalg.norm(deflected, axis=1)) > _LARGEST_DEFLECTION * size:
             return False

@@ -33,15 +33,16 @@ class _Library(JITCodeLibrary):
     def _divide(self) -> None:
         """Part what other functions take copies of from what becomes machine code."""
         module = self._final_module
-        self._shared_module = module.clone() if self.called_from_python else module
-        _relink(self._shared_module, binding.Linkage.external, binding.Linkage.linkonce_odr)
+        variables = [f'@"{each.name}" = common global ptr null' for each in module.global_variables if _is_kept(each)]
         if self.called_from_python:
+            # Nobody copies it: names are enough to find it again in the cache.
+            entries = [each.name for each in module.functions if _is_entry(each)]
+            stubs = [f'define void @"{name}"() {{ ret void }}' for name in entries]
+            self._shared_module = _parsed(stubs + variables, module.name)
             _relink(module, binding.Linkage.linkonce_odr, binding.Linkage.internal)
         else:
-            names = [each.name for each in module.global_variables if _is_environment(each)]
-            kept = "\n".join(f"@{name} = common global ptr null" for name in names)
-            self._final_module = binding.parse_assembly(kept)
-            self._final_module.name = module.name
+            self._shared_module, self._final_module = module, _parsed(variables, module.name)
+            _relink(module, binding.Linkage.external, binding.Linkage.linkonce_odr)
 
 
 class SeparateCode(Compiler):
@@ -56,12 +57,22 @@ class SeparateCode(Compiler):
         return super().compile_extra(func)
 
 
-def _is_environment(variable: Any) -> bool:
-    """Whether Numba looks for it, be there code or not."""
-    return variable.name.startswith("_ZN08NumbaEnv")
-
-
 def _relink(module: Any, old: binding.Linkage, new: binding.Linkage) -> None:
     for function in module.functions:
         if not function.is_declaration and function.linkage == old:
             function.linkage = new
+
+
+def _is_entry(function: Any) -> bool:
+    return not function.is_declaration and function.linkage == binding.Linkage.external
+
+
+def _is_kept(variable: Any) -> bool:
+    """Whether Numba looks for it, be there code or not."""
+    return variable.name.startswith("_ZN08NumbaEnv")
+
+
+def _parsed(lines: list[str], name: str) -> Any:
+    module = binding.parse_assembly("\n".join(lines))
+    module.name = name
+    return module
