@@ -49,6 +49,7 @@ class Way:
 
 
 WAYS = (
+    Way("paraflex, linear", Tolerance("esdirk5", 1e-3, 1.2e-3), Tolerance("esdirk5", 1e-7)),
     Way("paraflex, linear", Tolerance("esdirk5", 2e-4), Tolerance("esdirk5", 1e-7)),
     Way("paraflex, linear", Tolerance("tr-bdf2", 6e-5), Tolerance("esdirk5", 1e-7)),
     Way("paraflex, second-order", Tolerance("esdirk5", 1e-4), Tolerance("esdirk5", 1e-7)),
