@@ -51,7 +51,9 @@ WorkersOption = Annotated[
 ]
 ClusterOption = Annotated[
     str | None,
-    typer.Option("--cluster", metavar="ADDRESS", help="Of a Dask scheduler. Default: one on this machine."),
+    typer.Option(
+        "--cluster", metavar="ADDRESS", help="Of a Dask scheduler, tcp://host:8786. Default: one on this machine."
+    ),
 ]
 Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
 
@@ -264,10 +266,7 @@ def compare_methods(
 @app.command()
 def sensitivity(
     study: Annotated[str, typer.Argument(metavar="STUDY.toml", help="What is run, and by what it is differentiated.")],
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "--out", metavar="DIR", help="Folder for results. Default: results/STUDY."),
-    ] = None,
+    output: OutputOption = None,
     at: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="Where derivatives are taken; repeatable. Default: the mechanism's."),
@@ -287,18 +286,10 @@ def sensitivity(
 @app.command()
 def sweep(
     study: Annotated[str, typer.Argument(metavar="STUDY.toml", help="What varies, what is run, what is kept.")],
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "--out", metavar="DIR", help="Folder for the table. Default: results/STUDY."),
-    ] = None,
-    engine: Annotated[
-        str, typer.Option(metavar="threads|processes|dask", help="Who computes; results are the same.")
-    ] = "threads",
-    workers: Annotated[int | None, typer.Option(metavar="N", help="How many. Default: one a processor.")] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Of a Dask scheduler, tcp://host:8786. Default: one on this machine."),
-    ] = None,
+    output: OutputOption = None,
+    engine: EngineOption = "threads",
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     limit: Annotated[int | None, typer.Option(metavar="N", help="Runs this time, rounded up to whole designs.")] = None,
     json: Json = False,
 ) -> None:

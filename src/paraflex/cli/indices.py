@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
 
 from rich.progress import BarColumn, Progress, TextColumn
 
-from paraflex.cli.request import COMPLETE, INTERRUPTED
+from paraflex.cli.request import COMPLETE, INTERRUPTED, study_folder
 from paraflex.cli.search import plain_table
 from paraflex.cli.tables import number, plain_console
 from paraflex.compilation import compile_kernels_for
@@ -35,7 +34,7 @@ def indices_command(request: IndicesRequest) -> int:
     """Do what is left of the runs, and say the indices; the exit code."""
     console = plain_console(stderr=True)
     study = load_indices(request.study, request.metrics, request.samples, request.seed)
-    folder = Path("results") / Path(request.study).stem if request.output is None else Path(request.output)
+    folder = study_folder(request.study, request.output)
     compile_kernels_for(study.sweep.model().mechanism, console.print)
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.completed}/{task.total}"))
     with Progress(*columns, console=console, transient=not console.is_terminal, refresh_per_second=4) as progress:

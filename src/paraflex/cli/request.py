@@ -113,6 +113,11 @@ def results_folder(out: str) -> Path:
     return folder
 
 
+def study_folder(study: str, output: str | None) -> Path:
+    """Where results of a study file go: where it is said, else results/ and the file's name."""
+    return Path("results") / Path(study).stem if output is None else Path(output)
+
+
 def write_json(figures: Any, file: Path) -> None:
     """Write a file of numbers; it appears whole or not at all."""
     unfinished = file.with_name(file.name + ".part")

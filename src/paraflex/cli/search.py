@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
+from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, study_folder
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
@@ -37,7 +37,7 @@ class SearchRequest:
     @property
     def folder(self) -> Path:
         """Where results go."""
-        return Path("results") / Path(self.study).stem if self.output is None else Path(self.output)
+        return study_folder(self.study, self.output)
 
 
 def search_command(

@@ -13,14 +13,14 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from paraflex.cli.request import COMPLETE
+from paraflex.cli.request import COMPLETE, study_folder
 from paraflex.cli.tables import number, plain_console
 from paraflex.errors import InputError, OutputError
 from paraflex.plots import save_elasticities
 from paraflex.studies import Sensitivities, load_sensitivities, sensitivities
 from paraflex.studies.sweeps.folder import held
 from paraflex.studies.sweeps.study import digest
-from paraflex.studies.sweeps.table import whole_file
+from paraflex.studies.sweeps.table import whole_file, write_json
 
 RESULTS, TABLE, LINES = "sensitivity.json", "sensitivity.csv", "sensitivity.parquet"
 FIGURES = "figures"
@@ -44,7 +44,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     """Differentiate the runs of a study; write sensitivity.json, the table and figures. The exit code."""
     study = load_sensitivities(request.study, [name for entry in request.metrics for name in _names(entry)])
     at = _values(request.at)
-    folder = Path("results") / Path(request.study).stem if request.output is None else Path(request.output)
+    folder = study_folder(request.study, request.output)
     setting = study.setting
     places = [[list(place) for place in places] for places in setting.places]
     asked = digest([setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics, at])
@@ -103,8 +103,7 @@ def _content(file: Path) -> Any:
 
 def _write(folder: Path, figures: dict[str, Any], found: Sensitivities) -> None:
     lines = found.to_frame()
-    with whole_file(folder / RESULTS) as unfinished:
-        unfinished.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    write_json(folder / RESULTS, figures)
     with whole_file(folder / TABLE) as unfinished:
         lines.to_csv(unfinished, index=False)
     with whole_file(folder / LINES) as unfinished:

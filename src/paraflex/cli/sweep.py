@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
+from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, study_folder
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.studies import SweepProgress, SweepResult, load_sweep, sweep
@@ -34,7 +34,7 @@ def sweep_command(request: SweepRequest) -> int:
     """Do what is left of a sweep; the exit code."""
     console = plain_console(stderr=True)
     study = load_sweep(request.study)
-    folder = Path("results") / Path(request.study).stem if request.output is None else Path(request.output)
+    folder = study_folder(request.study, request.output)
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
     if request.json:

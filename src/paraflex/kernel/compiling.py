@@ -45,7 +45,8 @@ class Kernel:
     from_python, inner : numba dispatchers
     """
 
-    def __init__(self, function: FunctionType, **options: Any) -> None:
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        assert isinstance(function, FunctionType)
         update_wrapper(self, function)
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         # The cache goes by this name.
@@ -80,7 +81,6 @@ def _inner(value: Kernel, _: object) -> types.Dispatcher:
 
 def kernel(function: Callable[..., Any]) -> Kernel:
     """Make a kernel of a function."""
-    assert isinstance(function, FunctionType)
     return Kernel(function)
 
 
@@ -89,5 +89,4 @@ def lasting(function: Callable[..., Any]) -> Kernel:
 
     One that soon returns would have to wait for them.
     """
-    assert isinstance(function, FunctionType)
     return Kernel(function, nogil=True)

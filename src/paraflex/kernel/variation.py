@@ -22,8 +22,8 @@ from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.linear import right_hand_side, solve_system
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.settle import MOST_CORRECTIONS, baumgarte_weights, ended, prepare_matrix, relative
-from paraflex.kernel.signals import evaluate_signal, piece_at
-from paraflex.kernel.stage import equations
+from paraflex.kernel.signals import piece_at
+from paraflex.kernel.stage import equations, note_torques
 from paraflex.kernel.step import input_power
 from paraflex.kernel.tangent import note_slopes, residual_tangent
 from paraflex.kernel.variation_samples import PLACES, STEP, WEIGHTS, vary_samples, vary_step_work
@@ -113,8 +113,7 @@ def moved_power(p, signals, t, place, i, q, v, lam, torques, y, ws):
         y.moved_v[j] = v[j] + place * STEP * y.v[i, j]
     for r in range(lam.size):
         y.moved_lam[r] = lam[r] + place * STEP * y.lam[i, r]
-    for k in range(torques.size):
-        torques[k] = evaluate_signal(signals, k, t)[0]
+    note_torques(signals, t, torques)
     return input_power(p, signals, t, y.moved_q, y.moved_v, y.moved_lam, torques, ws)
 
 
@@ -175,8 +174,7 @@ def vary_steps(p, signals, moved, moved_signals, pieces, tableau, controls, coun
             note_friction(p, q, v, ws.mu, ws.compliance)
             take_pieces(signals, t, moved_signals, pieces)
             find_parametric(moved, pieces, times, weights, q, v, a, lam, torques, y, ws)
-            for l in range(torques.size):
-                torques[l] = evaluate_signal(signals, l, t)[0]
+            note_torques(signals, t, torques)
             here = baumgarte_weights(controls, controls.alpha, controls.beta, length)
             left = respond_to_parameter(
                 p, g, g * g, here, controls.dependent_part, q, v, a, lam, x.least, i, torques, y, d, ws

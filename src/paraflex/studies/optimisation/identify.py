@@ -21,11 +21,12 @@ from paraflex.studies.optimisation.fit import (
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.optimise import at_bounds, failures
 from paraflex.studies.optimisation.problem import running_start
-from paraflex.studies.optimisation.record import RESULT, write_figures
+from paraflex.studies.optimisation.record import RESULT
 from paraflex.studies.optimisation.session import INTERRUPTED, Progress, Session, Workers, sampled_start, search
 from paraflex.studies.optimisation.slopes import slopes_of
 from paraflex.studies.optimisation.study import DesignStudy, load_identification
 from paraflex.studies.sweeps.engines import THREADS, Engine
+from paraflex.studies.sweeps.table import write_json
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,7 @@ def identify(
     watch = None if on_progress is None else _watch(study, on_progress)
     session = search(study, Path(folder), Workers(engine, workers, cluster, run), solution.solve, watch)
     result = _result(study, Path(folder), session, solution.confidence)
-    write_figures(Path(folder) / RESULT, {"kind": "identification", "name": study.name} | result.figures())
+    write_json(Path(folder) / RESULT, {"kind": "identification", "name": study.name} | result.figures())
     if result.residual is not None:
         write_best(Path(folder), study, tuple(result.values.values()))
     return result

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
-from paraflex.studies.optimisation.record import write_figures
 from paraflex.studies.optimisation.study import read_study
 from paraflex.studies.sweeps.engines import THREADS, Engine
 from paraflex.studies.sweeps.metrics import METRICS
@@ -20,7 +19,7 @@ from paraflex.studies.sweeps.samples import RANDOM
 from paraflex.studies.sweeps.schema import SamplingTable
 from paraflex.studies.sweeps.session import SweepProgress, SweepResult, sweep
 from paraflex.studies.sweeps.study import SweepStudy, make_study
-from paraflex.studies.sweeps.table import whole_file
+from paraflex.studies.sweeps.table import whole_file, write_json
 
 Array = NDArray[np.float64]
 INDICES, TABLE = "indices.json", "indices.parquet"
@@ -201,7 +200,7 @@ def sobol_indices(
         return IndicesResult(done, (), table)
     found = tuple(_indices(study, done.table))
     result = IndicesResult(done, found, table)
-    write_figures(Path(folder) / INDICES, result.figures() | {"name": study.sweep.name})
+    write_json(Path(folder) / INDICES, result.figures() | {"name": study.sweep.name})
     with whole_file(table) as unfinished:
         pq.write_table(pa.Table.from_pylist(result.figures()["indices"]), unfinished)
     return result

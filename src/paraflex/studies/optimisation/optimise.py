@@ -13,11 +13,12 @@ from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, minimise
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.problem import Problem, best_of, holds_limits
-from paraflex.studies.optimisation.record import RESULT, write_figures
+from paraflex.studies.optimisation.record import RESULT
 from paraflex.studies.optimisation.session import Progress, Session, Workers, sampled_start, search
 from paraflex.studies.optimisation.slopes import slopes_of
 from paraflex.studies.optimisation.study import DesignStudy, load_optimisation
 from paraflex.studies.sweeps.engines import THREADS, Engine
+from paraflex.studies.sweeps.table import write_json
 
 # So near a bound, as a share of the range, a parameter is at it.
 _AT_BOUND = 1e-4
@@ -129,7 +130,7 @@ def optimise(
     asked = Workers(engine, workers, cluster, run)
     session = search(study, Path(folder), asked, partial(_solve, study, study.objective), watch)
     result = _result(study, study.objective, Path(folder), session)
-    write_figures(Path(folder) / RESULT, {"kind": "optimisation", "name": study.name} | _said(study) | result.figures())
+    write_json(Path(folder) / RESULT, {"kind": "optimisation", "name": study.name} | _said(study) | result.figures())
     if result.objective is not None:
         write_best(Path(folder), study, tuple(result.values.values()))
     return result

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from paraflex.errors import OutputError
 from paraflex.studies.optimisation.study import DesignStudy
@@ -97,12 +96,6 @@ class Record:
     def table(self) -> Path:
         """What pandas reads: the table, or the parts of a search that was stopped."""
         return self.folder / PARTS if parts(self.folder) else self.folder / RESULTS
-
-
-def write_figures(file: Path, figures: dict[str, Any]) -> None:
-    """Write numbers as JSON; the file appears whole or not at all."""
-    with whole_file(file) as unfinished:
-        unfinished.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
 
 def _found(folder: Path) -> list[Row]:

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
-from paraflex.files.expressions import evaluate, evaluate_parameters
 from paraflex.files.read import read_toml, validate
 from paraflex.studies.optimisation.objective import Objective, Target
 from paraflex.studies.optimisation.schema import ObjectiveTable, ParameterTable, SearchTable, StudyTable, TargetTable
 from paraflex.studies.sweeps.metrics import METRICS
-from paraflex.studies.sweeps.overlay import Place
+from paraflex.studies.sweeps.overlay import Place, number_at
 from paraflex.studies.sweeps.samples import RANDOM, Varied
 from paraflex.studies.sweeps.schema import SamplingTable
 from paraflex.studies.sweeps.study import Setting, SweepStudy, make_study
@@ -239,7 +238,7 @@ def _check_column(field: str, column: str, motors: tuple[str, ...]) -> None:
 def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given: float | None) -> float:
     """Where a parameter starts: as the study says, else as the mechanism's file."""
     field = f"vary.{parameter.name}.start"
-    found = {_number_at(setting.data, place) for place in places} if given is None else {given}
+    found = {number_at(setting.data, place) for place in places} if given is None else {given}
     if len(found) > 1:
         told = sorted(found)
         raise InputError("its fields differ in the mechanism's file", field=field, value=told, remedy="give a start")
@@ -252,15 +251,6 @@ def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given
             remedy="give a start within, or other bounds",
         )  # fmt: skip
     return _rounded(parameter, start)
-
-
-def _number_at(data: Mapping[str, Any], place: Place) -> float:
-    inside: Any = data
-    for key in place:
-        inside = inside[key]
-    if isinstance(inside, str):
-        return float(evaluate(inside, evaluate_parameters(data.get("parameters", {}))))
-    return float(inside)
 
 
 def _share(parameter: Varied, value: float) -> float:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +11,12 @@ from numpy.typing import NDArray
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.dynamics import System, build_system, numbers_of, pack_signals, same_layout
 from paraflex.errors import InputError, ParaflexError
-from paraflex.files.expressions import evaluate, evaluate_parameters
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
 from paraflex.integrators.variation import Direction
 from paraflex.simulate import TrackingTask
 from paraflex.studies.sensitivities.stencil import STENCILS, Stencil
-from paraflex.studies.sweeps.overlay import Place
+from paraflex.studies.sweeps.overlay import Place, number_at
 from paraflex.studies.sweeps.run import Task, plan_task
 from paraflex.studies.sweeps.study import INTEGRATION, Setting
 
@@ -212,10 +210,4 @@ def _nominal(setting: Setting, name: str, places: tuple[Place, ...]) -> float:
 def _value(setting: Setting, place: Place) -> float:
     if place[0] == INTEGRATION:
         return float(setting.integration.get(str(place[1]), getattr(IntegrationOptions(), str(place[1])) or 0.0))
-    inside: Any = setting.data
-    for key in place:
-        inside = inside[key]
-    if isinstance(inside, str):
-        table: Mapping[str, Any] = setting.data.get("parameters", {})
-        return float(evaluate(inside, evaluate_parameters(table)))
-    return float(inside)
+    return number_at(setting.data, place)

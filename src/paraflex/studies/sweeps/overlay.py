@@ -61,6 +61,16 @@ def number_places(data: Mapping[str, Any]) -> Iterator[Place]:
     yield from walk(data, ())
 
 
+def number_at(data: Mapping[str, Any], place: Place) -> float:
+    """The number at a place that `find_place` found, or the value of its expression."""
+    inside: Any = data
+    for key in place:
+        inside = inside[key]
+    if isinstance(inside, str):
+        return float(evaluate(inside, evaluate_parameters(data.get("parameters", {}))))
+    return float(inside)
+
+
 def overlaid(data: dict[str, Any], numbers: Sequence[tuple[Place, float | int]]) -> dict[str, Any]:
     """A model's data with numbers in place of those there; what is not on the way to one is shared, not copied."""
     out: Any = dict(data)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from paraflex.studies.sweeps.engines import THREADS, Engine, LostWorker, open_en
 from paraflex.studies.sweeps.folder import TRAJECTORIES, claim, done_runs, forget_unfinished, held
 from paraflex.studies.sweeps.run import Outcome, Row, Task, lost, run_task
 from paraflex.studies.sweeps.study import SweepStudy, load_sweep
-from paraflex.studies.sweeps.table import RESULTS, PartsWriter, merge, parts, status_counts, table_schema, whole_file
+from paraflex.studies.sweeps.table import RESULTS, PartsWriter, merge, parts, status_counts, table_schema, write_json
 
 # Rows are written when so many wait, or the first has waited so long [s]: what a crash can cost.
 _ROWS, _SECONDS = 2048, 2.0
@@ -250,5 +249,4 @@ class _Session:
     def _summarise(self, counts: dict[str, int]) -> None:
         """Counts beside the table; the time taken stands nowhere in it, for it is no result."""
         told = {"name": self.study.name, "runs": self.study.runs, "done": sum(counts.values()), "status": counts}
-        with whole_file(self.folder / SUMMARY) as unfinished:
-            unfinished.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        write_json(self.folder / SUMMARY, told)

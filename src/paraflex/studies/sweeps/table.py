@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -113,6 +114,12 @@ class whole_file:
             self.unfinished.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise _unwritable(self.path, error) from error
+
+
+def write_json(file: Path, figures: Mapping[str, Any]) -> None:
+    """Write numbers as JSON; the file appears whole or not at all."""
+    with whole_file(file) as unfinished:
+        unfinished.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
 
 def parts(folder: Path) -> list[Path]:
