@@ -15,7 +15,6 @@ from paraflex.kernel.newmark import restart_algorithmic
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.projection import project
 from paraflex.kernel.run_state import (
-    AGE,
     BALANCE,
     BAUMGARTE,
     DPHI_MAX,
@@ -194,7 +193,6 @@ def accept(p, signals, tableau, controls, t, h, m, ws, out):
     copy(m.stage_lam[last], m.stage_lam[0])
     m.power[0] = m.power[last]
     m.counts[STEPS] += 1
-    m.counts[AGE] += 1
     m.counts[FAILURES] = 0
     kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)
     strain += spring_energy(p, m.stage_lam[0]) + line_energy(p, m.q, m.v)[0]

@@ -17,7 +17,10 @@ PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # March.clock
 TIME, STEP, WORK, FACTOR_B, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(12)
 # March.counts
-STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, AGE, FAILURES, PASSAGES = range(9)
+STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
+# and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
+# new one each.
+FRESH, EXCESS, REUSED, IMPATIENT = range(8, 12)
 
 
 # What keeps the constraints, as integers for kernels; index 3 is POSITION.
@@ -110,7 +113,7 @@ def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGA
     stage_v = apart((stages, n))
     return March(
         clock=apart(12),
-        counts=apart(9, np.int64),
+        counts=apart(12, np.int64),
         q=apart(n),
         v=apart(n),
         stage_t=apart((2, stages)),

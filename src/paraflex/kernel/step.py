@@ -21,10 +21,12 @@ from paraflex.kernel.linear import orient
 from paraflex.kernel.newmark import newmark_end, newmark_start
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
-    AGE,
+    EXCESS,
     FACTOR_B,
     FACTORS,
+    FRESH,
     GGL,
+    IMPATIENT,
     ITERATIONS,
     NO_CONVERGENCE,
     NOT_FINITE,
@@ -33,12 +35,16 @@ from paraflex.kernel.run_state import (
     POSITION,
     PROJECTION,
     RATE,
+    REUSED,
 )
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.stage import CONVERGED, WORST_RATE, solve_stage
 
-# A stage that takes more iterations than this asks for a new factor, once the old one has served a few steps.
-ENOUGH_ITERATIONS, SERVED = 2, 5
+# A new factor costs about as much as this many iterations: it pays once the old one has cost so many more.
+# Of second-order geometry it costs more.
+FACTOR_COST, BENT_FACTOR_COST = 2, 3
+# So many steps get a new factor each after one that cost that much at once.
+IMPATIENCE = 20
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
 
@@ -91,7 +97,29 @@ def renew_factor(p, b, m, ws):
     note_all_axial_forces(p, m.q, m.v, m.stage_a[1, 0], m.stage_lam[0], ws, ws.geometric)
     factor_bodies(p, b, m.q, ws)
     m.counts[FACTORS] += 1
-    m.clock[FACTOR_B], m.clock[RATE], m.counts[AGE] = b, WORST_RATE, 0
+    m.clock[FACTOR_B], m.clock[RATE] = b, WORST_RATE
+
+
+@routine
+def note_excess(p, iterations, fresh, m):
+    """Count what a step took beyond the first one of its factor, and ask for a new factor once that has cost enough.
+
+    Where already the second step of a factor did, the next ones get a new factor each.
+    """
+    cost = FACTOR_COST if p.bending is None else BENT_FACTOR_COST
+    if fresh:
+        m.counts[FRESH] = min(iterations, m.counts[FRESH] + 1) if m.counts[FRESH] > 0 else iterations
+        m.counts[EXCESS], m.counts[REUSED] = 0, 0
+        m.counts[IMPATIENT] = max(0, m.counts[IMPATIENT] - 1)
+        if m.counts[IMPATIENT] > 0:
+            m.clock[FACTOR_B] = -1.0
+        return
+    m.counts[REUSED] += 1
+    m.counts[EXCESS] += max(0, iterations - m.counts[FRESH])
+    if m.counts[EXCESS] >= cost:
+        m.clock[FACTOR_B] = -1.0
+        if m.counts[REUSED] == 1 and m.counts[EXCESS] > cost:
+            m.counts[IMPATIENT] = IMPATIENCE
 
 
 @routine
@@ -161,7 +189,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
         note_passage(t, h, m)
     tolerance = controls.newton_fraction * controls.rate * h
-    slowest = 0
+    before = m.counts[ITERATIONS]
     i = 1
     while i < stages:
         if not one_stage:
@@ -184,7 +212,6 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
             orient(p, m.q, ws, controls.dependent_part)
             fresh = True
             continue
-        slowest = max(slowest, iterations)
         if one_stage:
             newmark_end(p, signals, tableau.newmark, controls.fixed_step == 0.0, t, h, m, ws)
         copy(ws.q, m.stage_q[i])
@@ -194,8 +221,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
                 m.stage_d[i, j] = ws.v[j] + m.shift[j] / g
         m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques, ws)
         i += 1
-    if slowest > ENOUGH_ITERATIONS and m.counts[AGE] >= SERVED:
-        m.clock[FACTOR_B] = -1.0
+    note_excess(p, m.counts[ITERATIONS] - before, fresh, m)
     error = 0.0
     if controls.fixed_step == 0.0:
         if tableau.error.size > 0:
