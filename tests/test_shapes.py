@@ -1,4 +1,4 @@
-"""Deformed shapes in the results: against points, closed forms and quintics; stiff between joints; files old and new."""
+"""Deformed shapes in the results: against points, closed forms and quintics; stiff between joints; old files."""
 
 import shutil
 from dataclasses import replace
@@ -386,7 +386,7 @@ def test_what_is_no_result_is_named_for_what_it_is(tmp_path):
 
 def test_the_folder_of_a_sweep_leads_to_its_runs(tmp_path):
     (tmp_path / "results.parquet").write_bytes(b"PAR1")
-    with pytest.raises(InputError, match="many runs.*trajectories = true"):
+    with pytest.raises(InputError, match=r"many runs.*trajectories = true"):
         pf.open_results(tmp_path)
     with pytest.raises(InputError, match="a table of many runs"):
         pf.open_results(tmp_path / "results.parquet")

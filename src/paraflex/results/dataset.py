@@ -16,9 +16,9 @@ from paraflex.mechanism import Mechanism
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
 from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
 from paraflex.results.record import FIGURES, Record, record
+from paraflex.results.storage import SCHEMA
 from paraflex.simulate import TrackingRun
 
-SCHEMA = 2
 UNITS = {
     "time": ("time", "s"),
     "end_effector": ("end-effector position", "m"),

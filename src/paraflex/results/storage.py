@@ -7,8 +7,9 @@ from pathlib import Path
 import xarray as xr
 
 from paraflex.errors import InputError, OutputError, suggestion
-from paraflex.results.dataset import SCHEMA
 
+# Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from.
+SCHEMA = 2
 # What commands call the file in their folder, and where a sweep keeps its runs.
 FILES = ("results.nc", "verify.nc")
 _TRAJECTORIES = "trajectories"
@@ -140,8 +141,8 @@ def _checked(data: xr.Dataset, file: Path) -> xr.Dataset:
         )
     if not 1 <= schema <= SCHEMA:
         raise InputError(
-            f"written by a later version, paraflex {data.attrs['paraflex_version']} (schema {schema}; this one reads up "
-            f"to {SCHEMA})",
+            f"written by a later version, paraflex {data.attrs['paraflex_version']} (schema {schema}; this one reads up to "
+            f"{SCHEMA})",
             field=str(file),
             remedy="update paraflex",
         )

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
-from paraflex.results.dataset import SCHEMA, UNITS, end_effector_point
+from paraflex.results.dataset import UNITS, end_effector_point
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.motion import joint_forces, point_motion, tip_deflection
 from paraflex.results.record import FIGURES
+from paraflex.results.storage import SCHEMA
 from paraflex.results.summary import finite_or_none
 
 _OWN_UNITS = {
