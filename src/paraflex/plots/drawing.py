@@ -222,16 +222,19 @@ def mechanism_drawing(
 
 
 def name_links(figure: Figure, shown: Scene, look: Theme, size: float, y: float) -> None:
-    """Names of the bodies in their colours, along the bottom."""
+    """Names of the bodies in their colours, in a row."""
     names = list(shown.bodies)
     if len(names) > _NAMED:
         return
-    widths = np.array([len(name) + 3.0 for name in names])
-    places = (np.cumsum(widths) - 0.5 * widths) / widths.sum()
+    # Letters are two thirds of their size wide, as shares of the figure's width; three between names.
+    letter = size / 72.0 * 0.68 / figure.get_figwidth()
+    widths = letter * np.array([len(name) + 3.0 for name in names])
+    widths *= min(1.0, 0.94 / widths.sum())
+    places = 0.5 - 0.5 * widths.sum() + np.cumsum(widths) - 0.5 * widths
     for i, (name, x) in enumerate(zip(names, places, strict=True)):
         figure.text(
-            0.5 + 0.94 * (x - 0.5), y, name, color=look.link(i), fontsize=size, ha="center", va="center",
-            fontweight="bold", parse_math=False,
+            x, y, name, color=look.link(i), fontsize=size, ha="center", va="center", fontweight="bold",
+            parse_math=False,
         )  # fmt: skip
 
 

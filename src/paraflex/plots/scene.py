@@ -1,4 +1,4 @@
-"""What a picture of a mechanism consists of, in metres: links, joints, ground, springs, paths, at any times of a run."""
+"""What a picture of a mechanism consists of, in metres: links, joints, ground, springs and paths at given times."""
 
 from __future__ import annotations
 
