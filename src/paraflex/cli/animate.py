@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -12,6 +14,9 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.results import open_results
+
+if TYPE_CHECKING:
+    from paraflex.plots.film import Film
 
 # Options as the command spells them.
 _FLAGS = ("magnify", "fps", "speed", "size", "theme", "at", "mode", "model")
@@ -53,15 +58,7 @@ def animate_command(request: AnimateRequest) -> int:
             at=request.at,
             model=request.model,
         )
-        with _progress(console) as progress:
-            bar = progress.add_task(output.name, total=None)
-            film = write_film(
-                data,
-                output,
-                request.modes,
-                options,
-                on_progress=lambda done, total: progress.update(bar, completed=done, total=total),
-            )
+        film = _drawn(console, lambda report: write_film(data, output, request.modes, options, on_progress=report))
     except InputError as error:
         raise _at_fault(error, request) from None
     width, height = film.size
@@ -94,12 +91,22 @@ def refuse_existing(output: Path, force: bool) -> None:
     )
 
 
-def _progress(console: Console) -> Progress:
-    text = TextColumn("{task.description}", markup=False)
-    return Progress(
-        text, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=console,
-        transient=not console.is_terminal,
-    )  # fmt: skip
+def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film]) -> Film:
+    """Draw, telling how far that is."""
+    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    progress = Progress(TextColumn("{task.description}"), *columns, console=console, transient=not console.is_terminal)
+    bar = progress.add_task("pictures", total=None)
+
+    def report(done: int, total: int) -> None:
+        # Not before there is something to tell: an error is one line.
+        progress.start()
+        progress.update(bar, completed=done, total=total)
+
+    try:
+        return draw(report)
+    finally:
+        if progress.live.is_started:
+            progress.stop()
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -211,9 +211,11 @@ def _frame(
             write((k + 0.5) * panel, 3.0 * text, f"mode {mode_label(shown.mode)}", look.ink, "middle")
     names = list(first.bodies)
     if len(names) <= _NAMED:
-        widths = np.array([len(name) + 3.0 for name in names])
-        for i, (name, x) in enumerate(zip(names, (np.cumsum(widths) - 0.5 * widths) / widths.sum(), strict=True)):
-            place = 0.5 * width + 0.94 * (x - 0.5) * width
+        # Letters are some two thirds of their size wide; three between names.
+        widths = 0.55 * text * np.array([len(name) + 3.0 for name in names])
+        widths *= min(1.0, 0.96 * width / widths.sum())
+        places = 0.5 * (width - widths.sum()) + np.cumsum(widths) - 0.5 * widths
+        for i, (name, place) in enumerate(zip(names, places, strict=True)):
             write(
                 place,
                 height - 2.45 * text,

@@ -37,7 +37,7 @@ _TRAIL = 400
 _SMALLEST, _LARGEST = 64, 7680
 # Parts of the picture's height above and below the drawing.
 _HEAD, _FOOT = 0.105, 0.11
-_GIF_COLOURS = 128
+_GIF_COLOURS, _NEAR = 128, 12
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,12 @@ class Film:
     fps: float
     speed: float
     look: Theme
+    plays: bool = True
+
+    @property
+    def caption(self) -> str:
+        """What is magnified, and how fast it plays."""
+        return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "")
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -125,7 +131,7 @@ def plan_film(
             )  # fmt: skip
         times = np.linspace(first, last, max(count, 2))
     scenes = tuple(scene(run, times, options.magnify) for run in runs)
-    return Film(scenes, _size(scenes, options.size), fps, speed, theme(options.theme))
+    return Film(scenes, _size(scenes, options.size), fps, speed, theme(options.theme), kind != ".png")
 
 
 def _until(first: float, last: float, at: float | None) -> NDArray[np.float64]:
@@ -317,7 +323,7 @@ def _stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
     first = film.scenes[0]
     margin = 0.18 / (width / dpi)
     figure.text(margin, 0.972, first.mechanism, color=look.ink, fontsize=10.5, va="center", parse_math=False)
-    figure.text(margin, 0.03, f"{caption(first)}, speed × {film.speed:g}", color=look.earth, fontsize=9.0, va="center")
+    figure.text(margin, 0.03, film.caption, color=look.earth, fontsize=9.0, va="center")
     draw_scale_bar(figure, limits, look, (1.0 - margin, 0.022), 9.0, share=1.0 / count)
     name_links(figure, first, look, 8.0, 0.088)
     texts.append(
@@ -389,11 +395,11 @@ def _palette(film: Film) -> Image.Image:
     scenes = tuple(_at(shown, chosen) for shown in film.scenes)
     few = Film(scenes, film.size, film.fps, film.speed, film.look)
     palette = Image.fromarray(np.concatenate(list(_frames(few)))).convert("RGB").quantize(_GIF_COLOURS)
-    # The ground is exactly what it is, not the mean of its neighbours.
-    colours = palette.getpalette() or []
-    ground = int(np.asarray(palette)[0, 0])
-    colours[3 * ground : 3 * ground + 3] = bytes.fromhex(film.look.ground[1:])
-    palette.putpalette(colours)
+    # The ground is exactly what it is: nothing near it may stand in for it.
+    colours = np.array(palette.getpalette(), dtype=np.int64).reshape(-1, 3)
+    ground = np.array(list(bytes.fromhex(film.look.ground[1:])))
+    colours[np.max(np.abs(colours - ground), axis=1) < _NEAR] = ground
+    palette.putpalette(colours.ravel().tolist())
     return palette
 
 
