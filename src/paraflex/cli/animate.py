@@ -18,6 +18,7 @@ from paraflex.results import open_results
 if TYPE_CHECKING:
     from paraflex.plots.film import Film
 
+COMPLETE, INTERRUPTED = 0, 130
 # Options as the command spells them.
 _FLAGS = ("magnify", "fps", "speed", "size", "theme", "at", "mode", "model")
 
@@ -59,6 +60,9 @@ def animate_command(request: AnimateRequest) -> int:
             model=request.model,
         )
         film = _drawn(console, lambda report: write_film(data, output, request.modes, options, on_progress=report))
+    except KeyboardInterrupt:
+        console.print("interrupted: nothing was written")
+        return INTERRUPTED
     except InputError as error:
         raise _at_fault(error, request) from None
     width, height = film.size
@@ -71,7 +75,7 @@ def animate_command(request: AnimateRequest) -> int:
             f"{output}",
             soft_wrap=True,
         )
-    return 0
+    return COMPLETE
 
 
 def refuse_existing(output: Path, force: bool) -> None:

@@ -404,6 +404,24 @@ def animate(
 
 
 @app.command()
+def export(
+    results: Annotated[str, typer.Argument(metavar="RESULTS", help="A folder or file that paraflex wrote.")],
+    to: Annotated[str, typer.Option("--to", metavar="csv|parquet|mat|netcdf", help="For which programs.")],
+    output: Annotated[
+        str | None, typer.Option("--output", "--out", metavar="FILE|DIR", help="Default: export/ beside the results.")
+    ] = None,
+    shapes: Annotated[
+        bool, typer.Option("--shapes", help="A table of deformed shapes too; mat and netcdf always have them.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Write over what is there.")] = False,
+) -> None:
+    """Write results for other programs: tables as CSV or Parquet, a struct for MATLAB, netCDF."""
+    from paraflex.cli.export import ExportRequest, export_command
+
+    raise typer.Exit(export_command(ExportRequest(results, to, output, shapes, force)))
+
+
+@app.command()
 def modes(source: Source = "raparm_i", path: PathOption = None, json: Json = False) -> None:
     """List the actuation modes and how well each can drive the path."""
     from paraflex.cli.modes import modes_command

@@ -383,10 +383,11 @@ def _write_gif(film: Film, file: Path, tell: Callable[[int, int], None]) -> None
             yield Image.fromarray(frame).convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)
 
     pictures = reduced()
-    next(pictures).save(
-        file, format="GIF", save_all=True, append_images=pictures, duration=round(1000.0 / film.fps), loop=0,
-        optimize=False,
-    )  # fmt: skip
+    with file.open("wb") as stream:
+        next(pictures).save(
+            stream, format="GIF", save_all=True, append_images=pictures, duration=round(1000.0 / film.fps), loop=0,
+            optimize=False,
+        )  # fmt: skip
 
 
 def _palette(film: Film) -> Image.Image:
