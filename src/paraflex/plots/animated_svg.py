@@ -60,7 +60,7 @@ def animated_svg(scenes: Sequence[Scene], size: tuple[int, int], look: Theme, sp
     title = f"{first.mechanism}{', mode ' + named if named else ''}: {caption(first)}"
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
-        f'role="img" font-family="system-ui, DejaVu Sans, Helvetica, Arial, sans-serif" font-size="{text:.1f}">',
+        f'style="max-width:100%;max-height:100vh" role="img" font-family="system-ui, DejaVu Sans, Helvetica, Arial, sans-serif" font-size="{text:.1f}">',
         f"<title>{escape(title)}</title>",
         f'<rect width="{width}" height="{height}" fill="{look.ground}"/>',
         *(
@@ -137,6 +137,7 @@ class _Panel:
                 out.append(self._line(block(joint, self.limits), face))
             if joint.kind == "weld":
                 out.append(self._line(square(joint.place, self.limits), f'fill="{look.ink}"'))
+        for joint in shown.joints:
             if joint.kind in ("pin", "slot", "sliding"):
                 out.append(self._circle(joint.place, 3.2, face))
         if shown.trail is not None:
