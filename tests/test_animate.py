@@ -220,14 +220,27 @@ def test_an_svg_plays_by_itself(data, tmp_path):
     links = [line for line in root.iter(f"{SVG}polyline") if line.get("stroke-linecap") == "round"]
     assert len(links) == 8
     # Pixels of the last picture are places of the last sample, by one scale and one offset.
-    places = np.concatenate([shown[-1] for shown in film.scenes[0].bodies.values()])
+    places = np.concatenate([shown[-1, [0, 8, -1]] for shown in film.scenes[0].bodies.values()])
     values = [line.find(f"{SVG}animate").get("values").split(";") for line in links]
     assert {len(one) for one in values} == {11}
-    last = np.array([pair.split(",") for one in values for pair in one[-1].split()], dtype=float)
-    scale = np.ptp(last[:, 0]) / np.ptp(places[:, 0])
-    np.testing.assert_allclose(last[:, 0] - last[0, 0], scale * (places[:, 0] - places[0, 0]), rtol=0, atol=0.2)
-    np.testing.assert_allclose(last[:, 1] - last[0, 1], -scale * (places[:, 1] - places[0, 1]), rtol=0, atol=0.2)
+    curves = [np.array([pair.split(",") for pair in one[-1].split()], dtype=float) for one in values]
+    ends = np.concatenate([[curve[0], curve[0], curve[-1]] for curve in curves])
+    scale = np.ptp(ends[:, 0]) / np.ptp(places[:, 0])
+    pixels = ends[0] + scale * (places - places[0]) * [1.0, -1.0]
+    np.testing.assert_allclose(ends[::3], pixels[::3], rtol=0, atol=0.2)
+    np.testing.assert_allclose(ends[2::3], pixels[2::3], rtol=0, atol=0.2)
+    # Half way along a link the line, whose straight parts have fewer points, passes by where it is bent to.
+    for curve, middle in zip(curves, pixels[1::3], strict=True):
+        assert _distance(middle, curve) < 0.4
+    assert max(_distance(middle, curve[[0, -1]]) for curve, middle in zip(curves, pixels[1::3], strict=True)) > 2.0
     assert "deflections × 50" in text
+
+
+def _distance(place, curve):
+    """Of a place from a line through points."""
+    starts, steps = curve[:-1], np.diff(curve, axis=0)
+    part = np.clip(np.sum((place - starts) * steps, axis=1) / np.sum(steps**2, axis=1), 0.0, 1.0)
+    return np.min(np.linalg.norm(starts + part[:, None] * steps - place, axis=1))
 
 
 def test_names_are_escaped_in_an_svg(data, tmp_path):

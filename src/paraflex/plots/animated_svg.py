@@ -33,6 +33,9 @@ _MOST_KEYS = 400
 # Parts of the height above and below the drawing, and the height of text as a part of it.
 _HEAD, _FOOT, _TEXT = 0.11, 0.1, 0.028
 _NAMED = 9
+_FONTS = "system-ui, DejaVu Sans, Helvetica, Arial, sans-serif"
+# Points of a line this near to it are left out [pixels].
+_STRAIGHT = 0.15
 
 
 def animated_svg(scenes: Sequence[Scene], size: tuple[int, int], look: Theme, speed: float) -> str:
@@ -60,7 +63,7 @@ def animated_svg(scenes: Sequence[Scene], size: tuple[int, int], look: Theme, sp
     title = f"{first.mechanism}{', mode ' + named if named else ''}: {caption(first)}"
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
-        f'style="max-width:100%;max-height:100vh" role="img" font-family="system-ui, DejaVu Sans, Helvetica, Arial, sans-serif" font-size="{text:.1f}">',
+        f'style="max-width:100%;max-height:100vh" role="img" font-family="{_FONTS}" font-size="{text:.1f}">',
         f"<title>{escape(title)}</title>",
         f'<rect width="{width}" height="{height}" fill="{look.ground}"/>',
         *(
@@ -148,6 +151,7 @@ class _Panel:
         if places.shape[1] < 2:
             return ""
         pixels = self._pixels(places[self.keys])
+        pixels = pixels[:, _corners(pixels)]
         frames = [" ".join(_points(frame)) for frame in pixels]
         return f'<polyline points="{frames[0]}" {look}>{self._animate("points", frames)}</polyline>'
 
@@ -255,6 +259,19 @@ def _frame(
 
 def _points(pixels: Array) -> list[str]:
     return [f"{x:.1f},{y:.1f}" for x, y in pixels]
+
+
+def _corners(pixels: Array) -> list[int]:
+    """The points of a line (f, s, 2) that it is not straight without, in one picture at least."""
+    kept = [0]
+    for last in range(2, pixels.shape[1]):
+        start = pixels[:, kept[-1], None]
+        chord = pixels[:, last, None] - start
+        arms = pixels[:, kept[-1] + 1 : last] - start
+        across = np.abs(chord[..., 0] * arms[..., 1] - chord[..., 1] * arms[..., 0])
+        if np.any(across > _STRAIGHT * np.linalg.norm(chord, axis=-1)) or np.any(np.sum(chord * arms, axis=-1) < 0.0):
+            kept.append(last - 1)
+    return [*kept, pixels.shape[1] - 1]
 
 
 def _thin(places: Array, most: int = 400) -> Array:
