@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.collections import LineCollection
 from PIL import Image
 from typer.testing import CliRunner
@@ -161,6 +162,18 @@ def test_what_cannot_be_drawn_is_refused(data, arguments, field):
 def test_results_of_the_first_schema_have_no_shapes_to_draw():
     with pytest.raises(InputError, match=r"no shapes of links.*run the study again"):
         mechanism_drawing(pf.open_results(OLD))
+
+
+def test_of_a_verification_the_model_asked_for_is_drawn(data):
+    models = xr.concat([data, data.assign(shape=data["shape"] + 1.0)], xr.Variable("model", ["linear", "moved"]))
+    models.attrs["reference"] = "moved"
+    places = {
+        name: plan_film(models, ["++++"], FilmOptions(model=name)).scenes[0].bodies["link1"]
+        for name in ("linear", None)
+    }
+    np.testing.assert_allclose(places[None], places["linear"] + 1.0, rtol=0, atol=1e-6)
+    with pytest.raises(InputError, match=r'model: no such model.*did you mean "linear"'):
+        plan_film(models, ["++++"], FilmOptions(model="linaer"))
 
 
 # --- Films -----------------------------------------------------------------------------------------------------------

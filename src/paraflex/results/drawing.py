@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics import System, material_angle
 from paraflex.mechanism import (
     AxisJoint,
+    Body,
     Joint,
     Mechanism,
     PointRef,
@@ -88,7 +89,15 @@ def drawing(
             return np.broadcast_to(np.array(mechanism.ground[ref.point], dtype=float), (samples, 2))
         return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
 
-    bases = {name: _base(mechanism, one, shapes[name], place, angle, frame) for name, one in drawn.items()}
+    joined: dict[str, list[tuple[Joint, PointRef]]] = {name: [] for name in drawn}
+    for joint in mechanism.joints:
+        for ref in (joint.a, joint.b):
+            if not ref.on_ground:
+                joined[ref.body].append((joint, ref))
+    bases = {
+        name: _base(mechanism.body(name), one, joined[name], shapes[name], place, angle, frame)
+        for name, one in drawn.items()
+    }
     directions = np.full((samples, len(mechanism.joints)), np.nan)
     for i, joint in enumerate(mechanism.joints):
         if isinstance(joint, AxisJoint):
@@ -158,27 +167,24 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def _base(
-    mechanism: Mechanism,
+    body: Body,
     one: Outline,
+    joined: list[tuple[Joint, PointRef]],
     shape: Array,
     place: Callable[[PointRef], Array],
     angle: Callable[[PointRef], Array],
     frame: Callable[[str], tuple[Array, Array]],
 ) -> Array:
     """A body drawn stiff between the joints that hold it."""
-    body = mechanism.body(one.body)
     if isinstance(body, RigidBody) or not body.flexible:
         return shape
     held: dict[int, PointRef] = {}
     moving = []
-    for joint in mechanism.joints:
-        for ref in (joint.a, joint.b):
-            if ref.body != one.body:
-                continue
-            if isinstance(joint, SlidingJoint) and ref is joint.a:
-                moving.append(_contact(place(joint.b), *frame(one.body)))
-            else:
-                held.setdefault(one.points[ref.point], ref)
+    for joint, ref in joined:
+        if isinstance(joint, SlidingJoint) and ref is joint.a:
+            moving.append(_contact(place(joint.b), *frame(one.body)))
+        else:
+            held.setdefault(one.points[ref.point], ref)
     holds = [
         Hold(np.full(len(shape), complex(*one.places[station])), _complex(shape[:, station])) for station in held
     ] + moving
