@@ -13,6 +13,64 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _GREEK = ("alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "tau", "omega")
 
 
+class Quantity(NamedTuple):
+    """What an axis shows: its name, its symbol (empty where there is none) and its unit."""
+
+    name: str
+    symbol: str
+    unit: str
+
+
+# The one list of what axes are called; {} is a direction.
+QUANTITIES = {
+    "time": Quantity("time", "$t$", "s"),
+    "angle": Quantity("angle", r"$\varphi$", "rad"),
+    "angular_velocity": Quantity("angular velocity", r"$\dot\varphi$", "rad/s"),
+    "angular_acceleration": Quantity("angular acceleration", r"$\ddot\varphi$", "rad/s²"),
+    "position": Quantity("displacement", "${}$", "mm"),
+    "velocity": Quantity("velocity", r"$\dot {}$", "m/s"),
+    "acceleration": Quantity("acceleration", r"$\ddot {}$", "m/s²"),
+    "displacement": Quantity("displacement", "", "mm"),
+    "slope": Quantity("slope", "", "rad"),
+    "error": Quantity("error", "", "mm"),
+    "distance": Quantity("distance", "", "mm"),
+    "torque": Quantity("torque", r"$\tau$", "N m"),
+    "force": Quantity("force", "", "N"),
+    "energy": Quantity("energy", "", "J"),
+    "condition": Quantity("condition number", "", "1"),
+    "flexible": Quantity("flexible coordinate", r"$\eta$", "m kg$^{1/2}$"),
+    "wall_time": Quantity("wall time", "", "s"),
+}
+
+
+def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", short: bool = False) -> str:
+    """Name, symbol and unit of an axis: "torque τ [N m]"; numbers without a unit have no brackets.
+
+    Parameters
+    ----------
+    quantity : str
+        One of `QUANTITIES`.
+    unit : str, optional
+        That values are shown in, where it is not the quantity's own.
+    direction : str
+        "x" or "y", of a symbol that has one.
+    short : bool
+        Whether the symbol is enough, if there is one: below a title that names the quantity.
+    """
+    told = QUANTITIES[quantity]
+    mark = told.symbol.replace("{}", direction)
+    text = " ".join(part for part in ("" if short and mark else told.name, mark) if part)
+    unit = told.unit if unit is None else unit
+    return text if unit == "1" else f"{text} [{unit}]"
+
+
+def effort_label(units: str) -> str:
+    """Motors that turn give torques, motors that slide forces."""
+    if units in ("N m", "N"):
+        return axis_label("torque" if units == "N m" else "force")
+    return f"torque, force [{units}]"
+
+
 class DisplayUnit(NamedTuple):
     """A unit to show values in: its name, and what values in SI are multiplied by."""
 
@@ -63,6 +121,11 @@ def symbol(name: str) -> str:
         letter = letters if len(letters) == 1 else rf"\{letters}"
         return rf"${letter}_{{{number}}}$" if number else f"${letter}$"
     return f"{letters} {number}".rstrip()
+
+
+def plain(name: str) -> str:
+    """A name that is not read as mathematics."""
+    return name.replace("$", r"\$")
 
 
 def mode_label(name: str) -> str:

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
 from paraflex.plots.labels import mode_label
-from paraflex.plots.layout import TWO_COLUMNS, lay_out, panels
-from paraflex.plots.style import COLOURS, ZERO, journal_style
+from paraflex.plots.layout import MM, lay_out, panels
+from paraflex.plots.style import COLOURS, STYLE, ZERO, journal_style
 
 # Height of a metric's group of bars, and of one bar in it, [mm]; width of a letter of a metric's name, [em].
 _GROUP, _BAR, _LETTER = 2.4, 1.9, 0.2
-_EM = 7.0 / 72.0 * 25.4
+_EM = STYLE["font.size"] / 72.0 * 25.4
 
 
 @journal_style()
@@ -65,7 +65,7 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
 def _name_groups(panel: Any, places: Mapping[str, float]) -> None:
     """Names of the metrics left of the panel, which gives them the room."""
     left, bottom, width, height = panel.get_position().bounds
-    room = _EM * (1.0 + max(len(name) for name in places) * (0.36 + _LETTER)) / TWO_COLUMNS
+    room = _EM * (1.0 + max(len(name) for name in places) * (0.36 + _LETTER)) / (panel.figure.get_figwidth() / MM)
     panel.set_position((left + room, bottom, width - room, height))
     for name, place in places.items():
         panel.text(-0.008, place, name, transform=panel.get_yaxis_transform(), ha="right", va="center", clip_on=False)
