@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, mode_label, peak, symbol
-from paraflex.plots.layout import label_outer_time, lay_out, panels
+from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, draw_curves, select_run, shade_rest
 from paraflex.plots.scales import mark_powers
 from paraflex.plots.style import BLUE, VERMILLION, journal_style, keep_flat, look_of
@@ -33,6 +33,8 @@ _PAIR: tuple[dict[str, Any], ...] = (
 )
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
 _SHORTEST = 1e-8
+# Links that a page holds in one column.
+_MOST_NARROW = 6
 
 
 def printed(model: str) -> str:
@@ -68,7 +70,8 @@ def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
 def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure:
     """Angle and angular velocity of every link in two models (Fig. 22).
 
-    A link's angle is that of the line from its first end to its last, which every model has.
+    A link's angle is that of the line from its first end to its last, which every model has. In one column there are
+    those of the first six.
 
     Parameters
     ----------
@@ -89,7 +92,7 @@ def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure
         ("chord_angle", "angle"),
         ("chord_velocity", "angular_velocity"),
     )
-    bodies, time = data["body"].values, data["time"].values
+    bodies, time = data["body"].values[: _MOST_NARROW if is_narrow() else None], data["time"].values
     figure, axes = panels(len(bodies), len(columns))
     for column, (variable, quantity) in zip(axes.T, columns, strict=True):
         scale = max(float(np.ptp(run[variable].values, axis=0).max()) for run in runs)

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
-from paraflex.plots.labels import mode_label
-from paraflex.plots.layout import MM, lay_out, panels
+from paraflex.plots.labels import metric_name, mode_label
+from paraflex.plots.layout import MM, is_narrow, lay_out, panels
 from paraflex.plots.style import COLOURS, STYLE, ZERO, journal_style
 
 # Height of a metric's group of bars, and of one bar in it, [mm]; width of a letter of a metric's name, [em].
@@ -55,10 +55,11 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
     panel.margins(x=0.06)
     panel.autoscale(axis="x")
     panel.set_yticks([])
-    panel.set_xlabel("change of the metric by change of the parameter [% / %]")
+    # Half of the width is the names of the metrics.
+    panel.set_xlabel("elasticity [% / %]" if is_narrow() else "change of the metric by change of the parameter [% / %]")
     panel.set_title(f"{figures['mechanism']}, {told['path']}, {mode_label(told['mode'])}", loc="left")
     lay_out(figure, axes, panel_height=pitch * len(metrics))
-    _name_groups(panel, dict(zip(metrics, places, strict=True)))
+    _name_groups(panel, dict(zip(map(metric_name, metrics), places, strict=True)))
     return figure
 
 

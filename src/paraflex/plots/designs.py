@@ -10,24 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
-from paraflex.plots.labels import display_unit
+from paraflex.plots.labels import display_unit, metric_name
 
 Array = NDArray[np.float64]
 
-# What a metric is called in print; others go by their own names.
-METRIC_NAMES = {
-    "tracking_rms": "RMS tracking error",
-    "tracking_max": "largest tracking error",
-    "residual_vibration": "residual vibration",
-    "deflection_max": "largest deflection",
-    "peak_torque_max": "peak torque",
-    "rms_torque_norm": "RMS torque",
-    "motor_energy": "energy of the motors",
-    "strain_energy_max": "largest strain energy",
-    "kinetic_energy_max": "largest kinetic energy",
-    "total_mass": "mass",
-    "actuation_condition_max": "condition number",
-}
 # Not what a design is chosen for: figures of the solver.
 _OF_THE_SOLVER = ("steps", "rejected", "newton_iterations", "constraint_position_max", "energy_balance_max")
 _FIRST, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
@@ -118,11 +104,10 @@ class DesignTable:
 
     def labelled(self, metric: str) -> tuple[str, float]:
         """What an axis of a metric is called, and what its values are multiplied by."""
-        name, dot, motor = metric.partition(".")
         unit, factor = self.units.get(metric, ""), 1.0
         if unit == "m":
             unit, factor = display_unit("m", self.metrics[metric])
-        printed = METRIC_NAMES.get(name, name.replace("_", " ")) + (f" of {motor}" if dot else "")
+        printed = metric_name(metric)
         return (f"{printed} [{unit}]" if unit not in ("", "1") else printed), factor
 
     def _varies(self, name: str) -> bool:

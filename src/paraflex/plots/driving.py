@@ -69,7 +69,7 @@ def tracking_distance(data: xr.Dataset) -> Figure:
 
 @journal_style()
 def mode_comparison(data: xr.Dataset) -> Figure:
-    """RMS tracking error, residual vibration and largest torque of every mode, as bars.
+    """RMS tracking error, residual vibration and largest torque of every mode.
 
     Parameters
     ----------
@@ -80,15 +80,23 @@ def mode_comparison(data: xr.Dataset) -> Figure:
     label = effort_label(data["torque"].attrs.get("units", "N m"))
     figure, axes = panels(1, 3)
     modes = [str(name) for name in data["mode"].values]
-    for panel, values, title, look in (
+    names = [mode_label(name) for name in modes]
+    for panel, values, title, colour in (
         (axes[0, 0], data["tracking_rms"].values, "RMS tracking error", BLUE),
         (axes[0, 1], data["residual_vibration"].values, "residual vibration", GREEN),
-        (axes[0, 2], efforts, f"largest {label.partition(' [')[0]}", VERMILLION),
     ):
-        unit = display_unit("m", values) if panel is not axes[0, 2] else None
-        _bars(panel, [mode_label(name) for name in modes], values * (1.0 if unit is None else unit.factor), look)
+        unit = display_unit("m", values)
+        # Modes differ by orders of magnitude, of which bars show only the largest.
+        panel.plot(unit.factor * values, np.arange(len(modes)), "o", color=colour, markersize=4.0)
+        _list_modes(panel, names)
         panel.set_title(title)
-        panel.set_xlabel(label if unit is None else axis_label("distance", unit=unit.name))
+        panel.set_xlabel(axis_label("distance", unit=unit.name))
+        panel.margins(x=0.08)
+        if (values > 0.0).any():
+            mark_powers(panel, "x")
+    _bars(axes[0, 2], names, efforts, VERMILLION)
+    axes[0, 2].set_title(f"largest {label.partition(' [')[0]}")
+    axes[0, 2].set_xlabel(label)
     return lay_out(figure, axes, panel_height=_LINE * len(modes) + 2.0)
 
 
@@ -125,6 +133,11 @@ def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
 def _bars(panel: Axes, names: list[str], values: Any, colour: str, **look: Any) -> None:
     lines = np.arange(len(names))
     panel.barh(lines, values, height=0.6, color=colour, linewidth=0.0, **look)
-    panel.set_yticks(lines, [plain(name) for name in names])
-    panel.set_ylim(len(names) - 0.4, -0.6)
+    _list_modes(panel, names)
     panel.margins(x=0.05)
+
+
+def _list_modes(panel: Axes, names: list[str]) -> None:
+    panel.set_yticks(range(len(names)), [plain(name) for name in names])
+    panel.set_ylim(len(names) - 0.4, -0.6)
+    panel.grid(axis="x", color="0.9", linewidth=0.4)

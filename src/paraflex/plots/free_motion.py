@@ -14,6 +14,8 @@ from paraflex.plots.workspace import finish_workspace, workspace_panel
 
 # Lines that can still be told apart in one panel; a point that moves less than this share of all stands still.
 _MOST, _STILL = 7, 1e-3
+# Coordinates that change by less rest, but for rounding.
+_NOTHING = 1e-12
 # Of modal coordinates, what they are by the last part of their names.
 _KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1.0)}
 
@@ -32,7 +34,9 @@ def coordinates(data: xr.Dataset) -> Figure:
     names = [str(name) for name in data["coordinate"].values]
     values = data["coordinate_value"].transpose("time", "coordinate").values
     travel = np.nan_to_num(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))
-    groups = {kind: [k for k, name in enumerate(names) if _kind(name) == kind and travel[k] > 0.0] for kind in _KINDS}
+    groups = {
+        kind: [k for k, name in enumerate(names) if _kind(name) == kind and travel[k] > _NOTHING] for kind in _KINDS
+    }
     groups = {kind: members for kind, members in groups.items() if members} or {"phi": list(range(len(names)))[:1]}
     bodies = [str(name) for name in data["body"].values]
     figure, axes = panels(len(groups), 1)
@@ -46,7 +50,7 @@ def coordinates(data: xr.Dataset) -> Figure:
             draw_curves(panel, data, {label: factor * values[:, k]}, first=look)
         keep_flat(panel, peak(factor * values[:, members]) or 1.0)
         panel.set_xlim(data["time"].values[[0, -1]])
-        panel.set_ylabel(axis_label(quantity, direction=kind))
+        panel.set_ylabel(axis_label(quantity, direction=kind, short=kind == "eta"))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=34.0)
 

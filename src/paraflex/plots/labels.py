@@ -38,7 +38,7 @@ QUANTITIES = {
     "force": Quantity("force", "", "N"),
     "energy": Quantity("energy", "", "J"),
     "condition": Quantity("condition number", "", "1"),
-    "flexible": Quantity("flexible coordinate", r"$\eta$", "m kg$^{1/2}$"),
+    "flexible": Quantity("modal coordinate", r"$\eta$", "m kg$^{1/2}$"),
     "wall_time": Quantity("wall time", "", "s"),
 }
 
@@ -62,6 +62,28 @@ def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", s
     text = " ".join(part for part in ("" if short and mark else told.name, mark) if part)
     unit = told.unit if unit is None else unit
     return text if unit == "1" else f"{text} [{unit}]"
+
+
+# What a metric is called in print; others go by their own names.
+METRIC_NAMES = {
+    "tracking_rms": "RMS tracking error",
+    "tracking_max": "largest tracking error",
+    "residual_vibration": "residual vibration",
+    "deflection_max": "largest deflection",
+    "peak_torque_max": "peak torque",
+    "rms_torque_norm": "RMS torque",
+    "motor_energy": "energy of the motors",
+    "strain_energy_max": "largest strain energy",
+    "kinetic_energy_max": "largest kinetic energy",
+    "total_mass": "mass",
+    "actuation_condition_max": "condition number",
+}
+
+
+def metric_name(metric: str) -> str:
+    """What a metric is called in print: "RMS tracking error"; "peak torque of tau1" of one motor's."""
+    name, dot, motor = metric.partition(".")
+    return plain(METRIC_NAMES.get(name, name.replace("_", " ")) + (f" of {motor}" if dot else ""))
 
 
 def effort_label(units: str) -> str:
@@ -109,6 +131,15 @@ def power_of_ten(value: float) -> str:
     if not math.isclose(value, 10.0**exponent, rel_tol=1e-9):
         return f"{value:g}"
     return "10" + str(exponent).translate(_RAISED)
+
+
+def logarithmic_number(value: float) -> str:
+    """A number of a logarithmic axis: 0.001 to 5000 plainly, others as "10⁻⁵" or "2·10⁻⁵"."""
+    if value <= 0.0 or 0.999e-3 <= value < 0.999e4:
+        return f"{value:g}"
+    exponent = math.floor(math.log10(value) + 1e-9)
+    digits = f"{value / 10.0**exponent:.3g}"
+    return ("" if digits == "1" else f"{digits}·") + "10" + str(exponent).translate(_RAISED)
 
 
 def symbol(name: str) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from paraflex.plots.designs import DesignTable
 from paraflex.plots.labels import mode_label, plain, three_digits
-from paraflex.plots.layout import lay_out, panels
+from paraflex.plots.layout import is_narrow, lay_out, panels
 from paraflex.plots.style import VERMILLION, journal_style
 
 Array = NDArray[np.float64]
@@ -56,7 +56,10 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
     figure, axes = panels(1, 1)
     _draw_designs(axes[0, 0], places, places[:, len(parameters)], labels[len(parameters)].partition(" [")[0])
     _draw_axes(axes[0, 0], labels, low, high)
-    axes[0, 0].set_title(f"{len(values)} designs, {plain(pair[0])}, mode {mode_label(pair[1])}", loc="left")
+    # In the middle: beside the names there is no room for it in one column.
+    axes[0, 0].set_title(
+        " ".join([f"{len(values)} designs,", *([] if is_narrow() else [f"{plain(pair[0])},"]), mode_label(pair[1])])
+    )
     return lay_out(figure, axes, panel_height=_ROW * len(labels))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable
 from paraflex.plots.labels import mode_label, plain
-from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panels
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
 from paraflex.plots.style import journal_style, look_of
 
 Array = NDArray[np.float64]
@@ -36,14 +36,15 @@ def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) ->
     ----------
     table : DesignTable
     metrics : sequence of str, optional
-        By default the first three that vary.
+        By default the first three that vary; in one column of print the first, where there are several parameters.
 
     Raises
     ------
     InputError
         No such metric, or none that varies.
     """
-    rows, columns = table.judged_by(metrics, _MOST_METRICS), table.varied[:_MOST_PARAMETERS]
+    columns = table.varied[:_MOST_PARAMETERS]
+    rows = table.judged_by(metrics, 1 if is_narrow() and len(columns) > 1 else _MOST_METRICS)
     figure, axes = panels(len(rows), len(columns), width=ONE_COLUMN if len(columns) == 1 else TWO_COLUMNS)
     series = table.series
     for row, metric in zip(axes, rows, strict=True):
@@ -54,6 +55,7 @@ def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) ->
                 _draw_response(panel, x, y, k, _series_name(pair, table), alone=len(table.varied) == 1)
             panel.margins(x=0.05)
             panel.set_xlabel(plain(parameter))
+            panel.locator_params(axis="x", nbins=5)
         row[0].set_ylabel(label)
     return lay_out(figure, axes, panel_height=42.0 if len(rows) > 1 else 52.0)
 
@@ -96,14 +98,14 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
     ----------
     table : DesignTable
     metrics : sequence of str, optional
-        Two; by default the first that vary.
+        Two; by default the first that varies, and that with which most designs are on the front.
 
     Raises
     ------
     InputError
         No such metric, or not two of them.
     """
-    chosen = table.judged_by(metrics, 2)
+    chosen = table.judged_by(metrics, 2) if metrics else _in_conflict(table)
     if len(chosen) != 2:
         raise InputError(
             "a front is of two metrics", field="metric", value=", ".join(chosen), remedy="name two that vary"
@@ -125,6 +127,16 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
     panel.set_xlabel(across)
     panel.set_ylabel(up)
     return lay_out(figure, axes, panel_height=58.0)
+
+
+def _in_conflict(table: DesignTable) -> list[str]:
+    """The first metric that varies, and the one with which it makes the longest fronts."""
+    first, *others = table.judged_by(None, len(table.metrics))
+
+    def length(other: str) -> int:
+        return sum(undominated(runs.metrics[first], runs.metrics[other]).size for runs in table.series.values())
+
+    return [first, max(others, key=length)] if others else [first]
 
 
 def undominated(x: Array, y: Array) -> NDArray[np.intp]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.labels import is_signs, mode_label
+from paraflex.plots.layout import figure_width, is_narrow
 from paraflex.plots.style import BLACK, BLUE, SHADE, look_of
 
 DESIRED: dict[str, Any] = {
@@ -126,4 +127,6 @@ def shade_rest(axes: Axes, data: xr.Dataset) -> None:
     end = float(data.attrs.get("motion_end", time[-1]))
     axes.set_xlim(time[0], time[-1])
     if end < time[-1]:
-        axes.axvspan(end, time[-1], color=SHADE, linewidth=0.0, zorder=0.0, label="after the end of the desired motion")
+        # In one column the longer words would leave the legend one entry a line.
+        label = "after the motion" if is_narrow(figure_width(axes)) else "after the end of the desired motion"
+        axes.axvspan(end, time[-1], color=SHADE, linewidth=0.0, zorder=0.0, label=label)

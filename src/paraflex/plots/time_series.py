@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, symbol
-from paraflex.plots.layout import label_outer_time, lay_out, panels
+from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, draw_curves, draw_desired, one_run, run_label, select_run, shade_rest
 from paraflex.plots.style import journal_style, keep_flat
 
@@ -18,6 +18,8 @@ from paraflex.plots.style import journal_style, keep_flat
 _ALIKE = 0.9
 # Lines that can still be told apart in one panel.
 _MOST = 7
+# Links whose motions a page holds in one column.
+_MOST_NARROW = 4
 
 
 @journal_style()
@@ -113,6 +115,8 @@ def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
 def link_motions(data: xr.Dataset, mode: str) -> Figure:
     """Angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14).
 
+    In one column those of the first four.
+
     Parameters
     ----------
     data : xarray.Dataset
@@ -127,7 +131,7 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
     """
     columns = ("angle", "angular_velocity", "angular_acceleration")
     run, time = select_run(data, mode), data["time"].values
-    bodies = data["body"].values
+    bodies = data["body"].values[: _MOST_NARROW if is_narrow() else None]
     figure, axes = panels(len(bodies), len(columns))
     for column, variable in zip(axes.T, columns, strict=True):
         scale = float(np.ptp(run[f"{variable}_desired"].values, axis=0).max())
