@@ -288,7 +288,10 @@ def test_results_that_are_none(results: Path, tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(content)
         assert said in complaint(tmp_path / name)
     xr.Dataset({"a": ("time", [1.0])}).to_netcdf(tmp_path / "foreign.nc")
-    assert "none that paraflex wrote" in complaint(tmp_path / "foreign.nc")
+    assert "a netCDF file, but" in complaint(tmp_path / "foreign.nc")
+    later = xr.load_dataset(results / "tracking" / "results.nc").assign_attrs(schema=99)
+    later.to_netcdf(tmp_path / "later.nc")
+    assert "later version" in complaint(tmp_path / "later.nc")
     both = tmp_path / "both"
     both.mkdir()
     (both / "results.nc").write_bytes(whole)

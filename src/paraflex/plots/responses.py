@@ -126,7 +126,7 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
         known = np.isfinite(x) & np.isfinite(y)
         x, y, name, look = x[known], y[known], _series_name(pair, table), look_of(k)
         mark: dict[str, Any] = {"marker": _MARKS[k % len(_MARKS)], "color": look["color"], "markersize": 2.4}
-        panel.plot(x, y, linestyle="none", alpha=0.35, markeredgewidth=0.0, **mark, label=name)
+        panel.plot(x, y, linestyle="none", alpha=0.35, markeredgewidth=0.0, **mark, label=f"{name}, designs")
         front = undominated(x, y)
         panel.plot(
             x[front], y[front], **look | mark | {"markersize": 3.4}, drawstyle="steps-post", label=f"{name}, front"
