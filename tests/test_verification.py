@@ -96,12 +96,20 @@ def test_kineto_elastodynamics_holds_the_motors_and_misses(figures):
 def test_the_dataset_has_all_models_and_survives_a_file(verification, tmp_path):
     data = verification.dataset()
     assert list(data["model"].values) == list(MODELS)
-    assert data.sizes == {"model": 7, "mode": 1, "time": 51, "axis": 2, "body": 8, "motor": 4, "joint": 11, "point": 18}
+    sizes = {"model": 7, "mode": 1, "time": 51, "axis": 2, "body": 8, "motor": 4, "joint": 11, "point": 18}
+    assert data.sizes == sizes | {"station": 8 * 17}
     assert data.attrs["reference"] == "second-order"
     assert [str(method).split()[0].strip(",") for method in data["method"].values] == [
         "TR-BDF2", "KED", "TR-BDF2", "TR-BDF2", "TR-BDF2", "Exudyn", "MuJoCo",
     ]  # fmt: skip
     np.testing.assert_array_equal(data["torque"].sel(model="mujoco"), data["torque"].sel(model="rigid"))
+    # Every model tells where the same material points of the links are.
+    shape = data["shape"].isel(mode=0)
+    distance = {name: float(abs(shape.sel(model=name) - shape.sel(model="second-order")).max()) for name in MODELS}
+    assert distance["exudyn"] < 2e-5
+    assert distance["segments"] < 1e-4
+    assert distance["mujoco"] < 1e-4
+    assert distance["rigid"] > 1e-3
     save_results(data, tmp_path / "verify.nc")
     np.testing.assert_array_equal(load_results(tmp_path / "verify.nc")["chord_angle"], data["chord_angle"])
 

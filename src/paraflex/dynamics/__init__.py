@@ -3,7 +3,7 @@
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, end_markers, node_marker
 from paraflex.dynamics.drive import Reach, reach
 from paraflex.dynamics.equilibrium import static_equilibrium
-from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate
+from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate, material_angle
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.numbers import blocks_of, numbers_of, same_layout, with_numbers
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
@@ -44,6 +44,7 @@ __all__ = [
     "dependence",
     "end_markers",
     "joint_coordinate",
+    "material_angle",
     "mobility",
     "moment_signals",
     "momentum",

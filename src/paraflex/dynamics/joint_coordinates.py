@@ -56,6 +56,11 @@ def axis_angle(system: System, joint: AxisJoint, q: NDArray[np.float64]) -> NDAr
     return _marker_angle(system, axis_marker(system, joint), q)[0] + joint.direction
 
 
+def material_angle(system: System, ref: PointRef, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angle (k,) of the material at a point, of its body and the slope there; zero on the ground [rad]."""
+    return _angle(system, ref, q)[0]
+
+
 def _angle(system: System, ref: PointRef, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Angle of the material at a point (k,), and its derivative (k, n)."""
     return _marker_angle(system, system.marker(ref), q)

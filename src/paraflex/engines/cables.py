@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paraflex.fem import BeamMesh, SpanProperties
 from paraflex.mechanism import Joint, PointRef
 from paraflex.results.motion import PointMotion
+from paraflex.results.outlines import Outline
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.int64]
@@ -137,6 +138,15 @@ class RigidLink:
         across = np.column_stack([-arm[:, 1], arm[:, 0]])
         return PointMotion(r + arm, v + w * across, a + dw * across - w**2 * arm)
 
+    def curve(self, drawn: Outline, history: History) -> Array:
+        """Where the stations of the body are (k, s, 2) [m]."""
+        r, angle = history.states[0][:, self.columns[:2]], self.frame(history).angle
+        c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        # Any joint of it tells how far the body's frame is from the centre of mass.
+        point, station = next(iter(drawn.points.items()))
+        x, y = (drawn.places - drawn.places[station] + self.points[point]).T
+        return r[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
     def turn(self, point: str, history: History) -> Turn:
         """Of the material at a named point."""
         return self.frame(history)
@@ -219,6 +229,16 @@ class Cable:
     def motion(self, point: str, history: History) -> PointMotion:
         """Of a named point."""
         return PointMotion(*history.states[:, :, self.columns[2 * self.points[point]]])
+
+    def curve(self, drawn: Outline, history: History) -> Array:
+        """Where the stations of the centre line are (k, s, 2) [m]."""
+        x, nodes = drawn.places[:, 0], self.mesh.nodes
+        element = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, self.mesh.n_elements - 1)
+        rows = np.zeros((x.size, len(self.columns)))
+        for i, (e, along) in enumerate(zip(element, x - nodes[element], strict=True)):
+            length = nodes[e + 1] - nodes[e]
+            rows[i, 2 * e : 2 * e + 4] = _shape(np.array([along / length]), length, 0)
+        return rows @ history.states[0][:, self.columns]
 
     def turn(self, point: str, history: History) -> Turn:
         """Of the tangent at a named point."""

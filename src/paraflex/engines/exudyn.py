@@ -24,6 +24,8 @@ from paraflex.engines.cables import Array, Cable, Columns, Ground, History, Link
 from paraflex.engines.common import check_engine, import_engine, steps_between
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
+from paraflex.results.drawing import Drawing, drawing
+from paraflex.results.outlines import outlines
 from paraflex.results.record import Record
 from paraflex.simulate import TrackingTask
 
@@ -442,6 +444,7 @@ def _record(
         kinetic_energy=kinetic,
         strain_energy=strain,
         work=work,
+        drawing=_drawing(mechanism, linkage, samples),
         figures={
             **figures,
             "constraint_position_max": _largest(gaps[:, 0]),
@@ -451,6 +454,18 @@ def _record(
             "event_time": np.nan,
         },
     )
+
+
+def _drawing(mechanism: Mechanism, linkage: Linkage, history: History) -> Drawing:
+    """Bodies as the engine's own shape functions have them."""
+    bodies = linkage.bodies
+    shapes = {one.body: bodies[one.body].curve(one, history) for one in outlines(mechanism)}
+
+    def frame(name: str) -> tuple[Array, Array]:
+        # Joints that slide along beams, which need more than an angle, are refused.
+        return shapes[name][:, 0], bodies[name].frame(history).angle
+
+    return drawing(mechanism, shapes, lambda ref: linkage.part(ref).turn(ref.point, history).angle, frame)
 
 
 def _largest(values: Array) -> float:

@@ -93,6 +93,32 @@ def mass_points(
     )
 
 
+def slope_squares(
+    mesh: BeamMesh, basis: NDArray[np.float64], x: NDArray[np.float64], u: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """f(x) = int_0^x (N2' u)^2 dx at places along a beam [m]: (k, places), exactly.
+
+    Parameters
+    ----------
+    mesh : BeamMesh
+    basis : (n_nodal, nf) array
+        Nodal coordinates per flexible coordinate.
+    x : (places,) array
+        From 0 to the length [m].
+    u : (k, nf) array
+        Flexible coordinates.
+    """
+    z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    # Within a piece of an element slopes are polynomials.
+    knots = np.union1d(mesh.nodes, x)
+    halves = 0.5 * np.diff(knots)
+    slopes = np.array([mesh.shape_at(a + h * (p + 1.0))[1] for a, h in zip(knots, halves, strict=False) for p in z])
+    squares = (u @ (slopes @ basis).T) ** 2
+    pieces = (squares.reshape(len(u), halves.size, z.size) @ w) * halves
+    f = np.concatenate([np.zeros((len(u), 1)), np.cumsum(pieces, axis=1)], axis=1)
+    return f[:, np.searchsorted(knots, x)]
+
+
 def node_weights(mesh: BeamMesh, node: int) -> NDArray[np.float64]:
     """Weights (g,) of the Gauss points in f at a node: all of the elements before it, exactly."""
     _, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)

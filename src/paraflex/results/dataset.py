@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError, OutputError
 from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import Mechanism
+from paraflex.results.drawing import drawing_coordinates, drawing_variables
 from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
 from paraflex.results.record import FIGURES, Record, record
 from paraflex.simulate import TrackingRun
 
-SCHEMA = 1
+SCHEMA = 2
 UNITS = {
     "time": ("time", "s"),
     "end_effector": ("end-effector position", "m"),
@@ -38,6 +40,17 @@ UNITS = {
     "strain_energy": ("strain energy", "J"),
     "work": ("work of motors, prescribed motion, weight and loads, less what dampers take", "J"),
     "actuation_condition": ("condition number of the actuation matrix", "1"),
+    "shape": ("drawn points of the bodies, deformed", "m"),
+    "shape_base": ("drawn points of the bodies, stiff between the joints that hold them", "m"),
+    "joint_position": ("position of a joint, on its second body", "m"),
+    "joint_direction": ("direction of the axis of a joint that slides", "rad"),
+    "spring_position": ("ends of a spring between points", "m"),
+    "station_body": ("body of a drawn point", "1"),
+    "station_place": ("place of a drawn point in the undeformed body, in its frame", "m"),
+    "point_station": ("drawn point that a named point is", "1"),
+    "joint_kind": ("kind of joint", "1"),
+    "joint_grounded": ("whether the joint is on the ground", "1"),
+    "spring_station": ("drawn points that a spring is at; -1 on the ground", "1"),
     "status": ("how the run ended", "1"),
     "message": ("why it is not complete", "1"),
     "steps": ("accepted steps", "1"),
@@ -74,7 +87,8 @@ def tracking_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions mode, time, axis, body, motor, joint, point; units in the attributes of every variable.
+        Dimensions mode, time, axis, body, motor, joint, point, station, spring, end; units in the attributes of every
+        variable. `shape` and what else drawings are made from is float32.
     """
     if not runs:
         raise InputError("no run to keep", field="runs", remedy="simulate at least one mode")
@@ -111,6 +125,7 @@ def tracking_dataset(
             "motor": [motor.name for motor in mechanism.motors],
             "joint": [joint.name for joint in mechanism.joints],
             "point": points,
+            **drawing_coordinates(mechanism),
         },
     )
     out["tracking_rms"] = tracking_error(out)
@@ -131,7 +146,7 @@ def tracking_dataset(
     return out
 
 
-def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
+def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]:
     """A run's variables over all sample times: extra dimensions and values, NaN where it did not get to."""
     total = one.task.motion.t.size
 
@@ -159,7 +174,13 @@ def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]
         "strain_energy": ((), full(one.strain_energy)),
         "work": ((), full(one.work)),
         "actuation_condition": ((), one.condition),
+        **{name: (dims, full(x).astype(np.float32)) for name, (dims, x) in drawing_variables(one.drawing).items()},
     }
+
+
+def _end_effector(mechanism: Mechanism) -> dict[str, str]:
+    """Which point is followed, for drawings."""
+    return {} if mechanism.end_effector is None else {"end_effector_point": str(mechanism.end_effector.point)}
 
 
 def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> dict:
@@ -167,6 +188,7 @@ def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> d
     ours = options.told() if one.method == options.description.title else {}
     return {
         "mechanism": one.task.mechanism.name,
+        **_end_effector(one.task.mechanism),
         "motion_end": one.task.path.duration,
         "tolerance": options.tolerance,
         "baumgarte_alpha": options.alpha,
@@ -192,13 +214,22 @@ def save_results(data: xr.Dataset, path: str | Path) -> None:
     path = Path(path)
     unfinished = path.with_name(path.name + ".part")
     try:
-        data.to_netcdf(unfinished, engine="netcdf4")
+        data.to_netcdf(unfinished, engine="netcdf4", encoding=_encoding(data))
         unfinished.replace(path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
         raise OutputError(
             f"cannot be written ({error.strerror or error})", field=str(path), remedy="choose another folder"
         ) from error
+
+
+def _encoding(data: xr.Dataset) -> dict[str, dict[str, object]]:
+    """Arrays over time are compressed: bytes of like weight together, at the least effort."""
+    return {
+        str(name): {"zlib": True, "complevel": 1, "shuffle": True}
+        for name, values in data.data_vars.items()
+        if values.ndim >= 2 and values.size and values.dtype.kind in "fiu"
+    }
 
 
 def load_results(path: str | Path) -> xr.Dataset:

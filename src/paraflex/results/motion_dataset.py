@@ -14,6 +14,7 @@ from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.dataset import SCHEMA, UNITS
+from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.motion import joint_forces, point_motion, tip_deflection
 from paraflex.results.record import FIGURES
 from paraflex.results.summary import finite_or_none
@@ -45,7 +46,7 @@ def motion_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions time, coordinate, body, point, joint, row, axis, motor; units in the attributes of every variable.
+        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end; units in the attributes of every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v, a = solution.q, solution.v, solution.a
@@ -72,6 +73,8 @@ def motion_dataset(
         "work": ((), solution.work),
     }
     data: dict[str, Any] = {name: (("time", *dims), _full(array, run)) for name, (dims, array) in values.items()}
+    for name, (dims, array) in drawing_variables(system_drawing(system, q)).items():
+        data[name] = (("time", *dims), _full(array, run).astype(np.float32))
     data |= {name: getattr(solution, name) for name in FIGURES}
     data["applied_torque"] = (("motor",), np.array(list(run.torques.values())))
     out = xr.Dataset(
@@ -85,6 +88,7 @@ def motion_dataset(
             "row": list(system.rows),
             "axis": ["x", "y"],
             "motor": list(run.torques),
+            **drawing_coordinates(mechanism),
         },
     )
     units = UNITS | _OWN_UNITS

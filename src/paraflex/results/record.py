@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import Marker, System, end_markers
+from paraflex.dynamics import Marker, System, end_markers, material_angle
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
+from paraflex.results.drawing import Drawing, drawing, system_drawing
 from paraflex.results.motion import PointMotion, joint_forces, marker_motion, point_motion, tip_deflection
+from paraflex.results.outlines import outline_motion, outlines, segment_motion
 from paraflex.simulate import TrackingRun, TrackingTask
 
 # How a run went: names of the figures every record has.
@@ -65,6 +67,8 @@ class Record:
         On the joint's second body, in the ground frame [N].
     kinetic_energy, strain_energy, work : (k,) arrays
         [J]
+    drawing : Drawing
+        Deformed shapes of all bodies.
     figures : mapping
         The numbers and words named in FIGURES.
     """
@@ -86,6 +90,7 @@ class Record:
     kinetic_energy: NDArray[np.float64]
     strain_energy: NDArray[np.float64]
     work: NDArray[np.float64]
+    drawing: Drawing
     figures: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -124,6 +129,7 @@ def record(run: TrackingRun) -> Record:
         kinetic_energy=solution.kinetic_energy[:k],
         strain_energy=solution.strain_energy[:k],
         work=solution.work[:k],
+        drawing=_drawing(task, parts, q),
         figures={name: getattr(solution, name) for name in FIGURES},
     )
 
@@ -136,6 +142,31 @@ def _parts(task: TrackingTask) -> list[list[str]]:
     for name, (carrier, _) in task.carriers.items():
         parts[carrier].append(name)
     return list(parts.values())
+
+
+def _drawing(task: TrackingTask, parts: list[list[str]], q: NDArray[np.float64]) -> Drawing:
+    """Bodies as their own shape functions have them; cut ones where their segments lie."""
+    system = task.system
+    if task.whole is None:
+        return system_drawing(system, q)
+    mechanism = task.whole.mechanism
+    names = dict(zip([body.name for body in mechanism.bodies], parts, strict=True))
+    shapes = {}
+    for one in outlines(mechanism):
+        pieces = names[one.body]
+        if pieces == [one.body]:
+            shapes[one.body] = outline_motion(system, one, q)
+        else:
+            shapes[one.body] = segment_motion(system, pieces, [task.carriers[piece][1] for piece in pieces], one, q)
+
+    def angle(ref: PointRef) -> NDArray[np.float64]:
+        return material_angle(system, PointRef(_owner(task, names[ref.body], ref.point), ref.point), q)
+
+    def frame(body: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        first = system.body(names[body][0])
+        return q[:, first.position], q[:, first.angle]
+
+    return drawing(mechanism, shapes, angle, frame)
 
 
 def _owner(task: TrackingTask, names: list[str], point: str) -> str:

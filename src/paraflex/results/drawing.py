@@ -1,0 +1,213 @@
+"""What a mechanism is drawn from: stations of all bodies, joints and springs over time, whoever computed them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System, material_angle
+from paraflex.mechanism import (
+    AxisJoint,
+    Joint,
+    Mechanism,
+    PointRef,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    SlidingJoint,
+    SlotJoint,
+    WeldJoint,
+)
+from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape
+
+Array = NDArray[np.float64]
+
+# Joints as files name them, but a revolute one is drawn as a pin and a prismatic one as a slider.
+JOINT_KINDS = {
+    RevoluteJoint: "pin",
+    PrismaticJoint: "slider",
+    SlotJoint: "slot",
+    SlidingJoint: "sliding",
+    WeldJoint: "weld",
+}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Where a mechanism is drawn at k samples; all in the ground frame.
+
+    Magnified by a factor m, stations are at `base + m (shape - base)`: joints keep together whatever m is.
+
+    Attributes
+    ----------
+    shape, base : (k, stations, 2) arrays
+        Bodies as they are, body after body, and drawn stiff between the joints that hold them [m].
+    joints : (k, joints, 2) array
+        Each on its second body [m].
+    directions : (k, joints) array
+        Of the axes of joints that slide, NaN of others [rad].
+    springs : (k, springs, 2, 2) array
+        Both ends of the springs between points [m].
+    """
+
+    shape: Array
+    base: Array
+    joints: Array
+    directions: Array
+    springs: Array
+
+
+def drawing(
+    mechanism: Mechanism,
+    shapes: Mapping[str, Array],
+    angle: Callable[[PointRef], Array],
+    frame: Callable[[str], tuple[Array, Array]],
+) -> Drawing:
+    """A drawing from what a model says of its bodies.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Uncut.
+    shapes : mapping of str to (k, s, 2) array
+        Of each body, where its stations are [m]: see `outlines`.
+    angle : callable
+        Of the material at a point (k,) [rad].
+    frame : callable
+        Origin (k, 2) and angle (k,) of a body's frame.
+    """
+    drawn = {one.body: one for one in outlines(mechanism)}
+    samples = len(next(iter(shapes.values())))
+
+    def place(ref: PointRef) -> Array:
+        if ref.on_ground:
+            return np.broadcast_to(np.array(mechanism.ground[ref.point], dtype=float), (samples, 2))
+        return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
+
+    bases = {name: _base(mechanism, one, shapes[name], place, angle, frame) for name, one in drawn.items()}
+    directions = np.full((samples, len(mechanism.joints)), np.nan)
+    for i, joint in enumerate(mechanism.joints):
+        if isinstance(joint, AxisJoint):
+            directions[:, i] = _direction(joint, angle, frame)
+    springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
+    return Drawing(
+        shape=np.concatenate([shapes[name] for name in drawn], axis=1),
+        base=np.concatenate([bases[name] for name in drawn], axis=1),
+        joints=_second([place(joint.b) for joint in mechanism.joints], samples),
+        directions=directions,
+        springs=np.moveaxis(np.array(springs), 2, 0) if springs else np.zeros((samples, 0, 2, 2)),
+    )
+
+
+def system_drawing(system: System, q: Array) -> Drawing:
+    """The drawing of a system for coordinates (k, n)."""
+
+    def frame(name: str) -> tuple[Array, Array]:
+        body = system.body(name)
+        return q[:, body.position], q[:, body.angle]
+
+    shapes = {one.body: outline_motion(system, one, q) for one in outlines(system.mechanism)}
+    return drawing(system.mechanism, shapes, lambda ref: material_angle(system, ref, q), frame)
+
+
+def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
+    """Variables of a dataset over time: their other dimensions and values (k, ...); of springs where there are some."""
+    springs = {"spring_position": (("spring", "end", "axis"), one.springs)} if one.springs.size else {}
+    return {
+        "shape": (("station", "axis"), one.shape),
+        "shape_base": (("station", "axis"), one.base),
+        "joint_position": (("joint", "axis"), one.joints),
+        "joint_direction": (("joint",), one.directions),
+        **springs,
+    }
+
+
+def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
+    """Labels that go with them: whose the stations are, which station a point is, what the joints are.
+
+    Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
+    -1.
+    """
+    drawn = outlines(mechanism)
+    first = dict(zip([one.body for one in drawn], np.cumsum([0, *(len(one.places) for one in drawn)]), strict=False))
+    stations = {
+        PointRef(body.name, point): int(first[body.name]) + one.points[point]
+        for body, one in zip(mechanism.bodies, drawn, strict=True)
+        for point in body.points
+    }
+    joints, springs = mechanism.joints, mechanism.linear_springs
+    of_springs: dict[str, Any] = {}
+    if springs:
+        ends = [[stations.get(ref, -1) for ref in (spring.a, spring.b)] for spring in springs]
+        of_springs = {
+            "spring": [spring.name for spring in springs],
+            "spring_station": (("spring", "end"), np.array(ends, dtype=np.int32)),
+        }
+    return {
+        "station_body": ("station", [one.body for one in drawn for _ in one.places]),
+        "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
+        "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
+        "joint_kind": ("joint", [JOINT_KINDS[type(joint)] for joint in joints]),
+        "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
+        **of_springs,
+    }
+
+
+def _base(
+    mechanism: Mechanism,
+    one: Outline,
+    shape: Array,
+    place: Callable[[PointRef], Array],
+    angle: Callable[[PointRef], Array],
+    frame: Callable[[str], tuple[Array, Array]],
+) -> Array:
+    """A body drawn stiff between the joints that hold it."""
+    body = mechanism.body(one.body)
+    if isinstance(body, RigidBody) or not body.flexible:
+        return shape
+    held: dict[int, PointRef] = {}
+    moving = []
+    for joint in mechanism.joints:
+        for ref in (joint.a, joint.b):
+            if ref.body != one.body:
+                continue
+            if isinstance(joint, SlidingJoint) and ref is joint.a:
+                moving.append(_contact(place(joint.b), *frame(one.body)))
+            else:
+                held.setdefault(one.points[ref.point], ref)
+    holds = [
+        Hold(np.full(len(shape), complex(*one.places[station])), _complex(shape[:, station])) for station in held
+    ] + moving
+    origin, turn = frame(one.body)
+    if held:
+        turn = angle(next(iter(held.values())))
+    if not holds:
+        holds = [Hold(np.zeros(len(shape), dtype=complex), _complex(origin))]
+    return stiff_shape(one, holds, turn)
+
+
+def _contact(place: Array, origin: Array, angle: Array) -> Hold:
+    """Where something slides along a beam: at the place of the unbent beam that it is abreast of."""
+    local = _complex(place - origin) * np.exp(-1j * angle)
+    return Hold(local.real.astype(complex), _complex(place))
+
+
+def _direction(
+    joint: Joint, angle: Callable[[PointRef], Array], frame: Callable[[str], tuple[Array, Array]]
+) -> Array | float:
+    if isinstance(joint, SlidingJoint):
+        return frame(joint.a.body)[1]
+    assert isinstance(joint, PrismaticJoint | SlotJoint)
+    return joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
+
+
+def _complex(places: Array) -> NDArray[np.complex128]:
+    return places[..., 0] + 1j * places[..., 1]
+
+
+def _second(parts: list[Array], samples: int) -> Array:
+    return np.stack(parts, axis=1) if parts else np.zeros((samples, 0, 2))

@@ -1,0 +1,257 @@
+"""Bodies as they are drawn: stations along each, where they are over time, and where they were if links were stiff."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import BodyCoordinates, System
+from paraflex.fem import slope_squares
+from paraflex.mechanism import (
+    AssumedModesBeam,
+    Body,
+    FlexibleBeam,
+    Mechanism,
+    ModalBody,
+    RigidBody,
+)
+
+Array = NDArray[np.float64]
+
+# Pieces a beam is drawn in, and the fewest between two of its points.
+_PIECES, _FEWEST = 16, 4
+# Points closer than this part of a body's size are drawn as one.
+_SAME = 1e-9
+# Pieces shorter than this part of a body's size say nothing of a direction.
+_SHORT = 1e-6
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What of a body is drawn, in order along it.
+
+    Attributes
+    ----------
+    body : str
+    places : (s, 2) array
+        Its stations undeformed, in the body frame [m].
+    points : mapping of str to int
+        Station of each named point.
+    """
+
+    body: str
+    places: Array
+    points: Mapping[str, int]
+
+    @property
+    def size(self) -> float:
+        """Largest distance of a station from the first [m]."""
+        return float(np.max(np.linalg.norm(self.places - self.places[0], axis=1)))
+
+
+def outline(body: Body) -> Outline:
+    """Stations of a body; they depend on its length and points, not on how it is meshed or cut.
+
+    Of a beam or bar so many along its centre line, named points among them. A rigid body's points in their order on a
+    line, or round their middle, closed; with fewer than two of them, its centre of mass too. A modal body's points.
+    """
+    if isinstance(body, FlexibleBeam | AssumedModesBeam):
+        x = _along(body.length, body.points)
+        return Outline(
+            body.name,
+            np.column_stack([x, np.zeros_like(x)]),
+            {name: int(np.argmin(np.abs(x - place))) for name, place in body.points.items()},
+        )
+    if isinstance(body, ModalBody):
+        places = [point.position for point in body.points.values()] or [(0.0, 0.0)]
+        return Outline(body.name, np.array(places, dtype=float), {name: i for i, name in enumerate(body.points)})
+    named = np.array([*body.points.values()], dtype=float).reshape(-1, 2)
+    distinct = _distinct(named)
+    if len(distinct) < 2:
+        distinct = _distinct(np.vstack([named, body.centre_of_mass]))
+    order = _round(distinct)
+    places = distinct[order]
+    return Outline(
+        body.name,
+        places,
+        {name: int(np.argmin(np.linalg.norm(places - place, axis=1))) for name, place in body.points.items()},
+    )
+
+
+def outlines(mechanism: Mechanism) -> list[Outline]:
+    """Of all bodies of a mechanism, in its order."""
+    return [outline(body) for body in mechanism.bodies]
+
+
+def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
+    """Where the stations of a body are for coordinates (k, n): (k, s, 2) [m], by its own shape functions.
+
+    Of second-order geometry with the shortening of the model: s(x) = x + N u - 1/2 e_x int_0^x (N2' u)^2 dx.
+    """
+    body = system.body(drawn.body)
+    u = q[:, body.flexible]
+    local = drawn.places + np.einsum("kn,sin->ksi", u, _rows(system, body, drawn))
+    if body.points is not None and body.mesh is not None:
+        local[:, :, 0] -= 0.5 * slope_squares(body.mesh, body.integrals.D, drawn.places[:, 0], u)
+    return _turned(q[:, body.position], q[:, body.angle], local)
+
+
+def segment_motion(system: System, names: Sequence[str], starts: Sequence[float], drawn: Outline, q: Array) -> Array:
+    """Where the stations of a beam are (k, s, 2) that was cut into rigid segments, starting so far along it [m]."""
+    x = drawn.places[:, 0]
+    owners = np.searchsorted(starts, x + _SAME * drawn.size, side="right") - 1
+    out = np.empty((q.shape[0], x.size, 2))
+    for i, (name, start) in enumerate(zip(names, starts, strict=True)):
+        body, own = system.body(name), owners == i
+        local = np.broadcast_to(drawn.places[own] - [start, 0.0], (q.shape[0], int(own.sum()), 2))
+        out[:, own] = _turned(q[:, body.position], q[:, body.angle], local)
+    return out
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A place that a joint holds: in the undeformed body and in the ground frame, each (k,) as x + i y [m]."""
+
+    rest: NDArray[np.complex128]
+    place: NDArray[np.complex128]
+
+
+def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
+    """Stations (k, s, 2) of a body drawn stiff between the places that hold it [m].
+
+    Between neighbouring ones the undeformed body, turned and scaled so that both are where they are; beyond the last
+    ones turned as the piece before. A body held at places that are not in line is fitted to them as a whole, what is
+    left shared out by distance; one held at a single place is turned as the material is there.
+
+    Parameters
+    ----------
+    drawn : Outline
+    holds : sequence of Hold
+        One or more; a body that nothing holds is held by its frame.
+    turn : (k,) array
+        Of the material at the first hold [rad].
+    """
+    z = drawn.places[:, 0] + 1j * drawn.places[:, 1]
+    rest = np.stack([hold.rest for hold in holds], axis=1)
+    place = np.stack([hold.place for hold in holds], axis=1)
+    if len(holds) == 1:
+        out = place + np.exp(1j * turn)[:, None] * (z - rest)
+    else:
+        axis = _axis(np.append(z, rest[0]), drawn.size)
+        out = _fitted(z, rest, place) if axis is None and len(holds) > 2 else _pieces(
+            z, rest, place, turn, 1.0 if axis is None else axis, _SHORT * drawn.size
+        )  # fmt: skip
+    return np.stack([out.real, out.imag], axis=-1)
+
+
+def _pieces(
+    z: NDArray[np.complex128],
+    rest: NDArray[np.complex128],
+    place: NDArray[np.complex128],
+    turn: Array,
+    axis: complex,
+    short: float,
+) -> NDArray[np.complex128]:
+    """Similarities between neighbours along an axis."""
+    order = np.argsort((rest * np.conj(axis)).real, axis=1)
+    rest, place = np.take_along_axis(rest, order, axis=1), np.take_along_axis(place, order, axis=1)
+    gap, step = np.diff(rest, axis=1), np.diff(place, axis=1)
+    long = np.abs(gap) > short
+    ratio = np.where(long, step / np.where(long, gap, 1.0), np.exp(1j * turn)[:, None])
+    along = (z * np.conj(axis)).real
+    knots = (rest * np.conj(axis)).real
+    out = np.empty((place.shape[0], z.size), dtype=complex)
+    for i, x in enumerate(along):
+        piece = np.clip(np.sum(x >= knots, axis=1) - 1, 0, ratio.shape[1] - 1)
+        rows = np.arange(piece.size)
+        after, before = x > knots[:, -1], x < knots[:, 0]
+        end = np.where(after, piece + 1, piece)
+        scale = ratio[rows, piece]
+        # A free end keeps its length.
+        scale = np.where(after | before, scale / np.abs(scale), scale)
+        out[:, i] = place[rows, end] + scale * (z[i] - rest[rows, end])
+    return out
+
+
+def _fitted(
+    z: NDArray[np.complex128], rest: NDArray[np.complex128], place: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """The similarity nearest to all holds, and what it misses them by, shared out by squares of distances."""
+    middle, centre = rest.mean(axis=1, keepdims=True), place.mean(axis=1, keepdims=True)
+    arm = rest - middle
+    ratio = np.sum(np.conj(arm) * (place - centre), axis=1, keepdims=True) / np.sum(
+        np.abs(arm) ** 2, axis=1, keepdims=True
+    )
+    missed = place - centre - ratio * arm
+    distance = np.abs(z[:, None] - rest[:, None, :]) ** 2
+    nearest = np.min(distance, axis=2, keepdims=True)
+    weights = np.where(nearest > 0.0, nearest / np.where(distance > 0.0, distance, 1.0), distance == 0.0)
+    weights = weights / weights.sum(axis=2, keepdims=True)
+    return centre + ratio * (z - middle) + np.einsum("ksh,kh->ks", weights, missed)
+
+
+def _axis(z: NDArray[np.complex128], size: float) -> complex | None:
+    """Direction of the line that places lie on; None where they do not."""
+    far = z[np.argmax(np.abs(z - z[0]))] - z[0]
+    if abs(far) == 0.0:
+        return 1.0
+    direction = far / abs(far)
+    across = ((z - z[0]) * np.conj(direction)).imag
+    return complex(direction) if np.max(np.abs(across)) <= _SAME * max(size, abs(far)) else None
+
+
+def _turned(position: Array, angle: Array, local: Array) -> Array:
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y = local[..., 0], local[..., 1]
+    return position[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def _rows(system: System, body: BodyCoordinates, drawn: Outline) -> Array:
+    """Displacements of the stations per modal coordinate (s, 2, nf)."""
+    described = system.mechanism.body(drawn.body)
+    at: Callable[[float], tuple[Array, Array]] | None = None
+    if isinstance(described, FlexibleBeam) and body.mesh is not None:
+        at = body.mesh.shape_at
+    elif isinstance(described, AssumedModesBeam):
+        at = described.shapes.shape_at
+    if at is not None:
+        return np.stack([at(float(x))[0] for x in drawn.places[:, 0]]) @ body.integrals.D
+    if isinstance(described, RigidBody) or not body.shape.points:
+        return np.zeros((len(drawn.places), 2, body.nf))
+    return np.stack([point.N for point in body.shape.points.values()]) @ body.integrals.D
+
+
+def _along(length: float, points: Mapping[str, float]) -> Array:
+    """Stations along a bar, its ends and points among them."""
+    knots = [0.0]
+    for x in sorted([*points.values(), length]):
+        if x - knots[-1] > _SAME * length:
+            knots.append(min(float(x), length))
+    knots[-1] = length
+    spans = [np.linspace(a, b, max(_FEWEST, round(_PIECES * (b - a) / length)) + 1)[1:] for a, b in pairwise(knots)]
+    return np.concatenate([[0.0], *spans])
+
+
+def _distinct(places: Array) -> Array:
+    kept: list[Array] = []
+    size = float(np.max(np.ptp(places, axis=0), initial=0.0))
+    for place in places:
+        if all(np.linalg.norm(place - other) > _SAME * size for other in kept):
+            kept.append(place)
+    return np.array(kept).reshape(-1, 2)
+
+
+def _round(places: Array) -> NDArray[np.int64]:
+    """Order in which places make a figure: along their line, or round their middle and back to the first."""
+    z = places[:, 0] + 1j * places[:, 1]
+    if len(z) < 3:
+        return np.arange(len(z))
+    axis = _axis(z, 0.0)
+    if axis is not None:
+        return np.argsort((z * np.conj(axis)).real)
+    order = np.argsort(np.angle(z - z.mean()))
+    return np.append(order, order[0])
