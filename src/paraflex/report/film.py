@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from paraflex.report.packing import packed
 
 MOST_FRAMES = 350
-_SHAPES = ("shape", "shape_base", "joint_position")
+_SHAPES = ("shape", "shape_base", "joint_position", "joint_direction")
 NO_SHAPES = (
     "These results do not hold the shapes of the links: they are of an earlier version. "
     "Run the study again to see the mechanism move."
@@ -34,6 +34,10 @@ class Film:
         Name, first station and the one after the last.
     joints : (runs, frames, joints, 2) array
         [m]
+    directions : (runs, frames, joints, 2) array
+        Unit vectors along which joints slide; NaN for those that do not.
+    springs : (runs, frames, springs, 2, 2) array, optional
+        Both ends of springs between points [m].
     joint_names, joint_kinds : sequence of str
     grounded : sequence of bool
         Joints with the ground.
@@ -48,9 +52,11 @@ class Film:
     base: NDArray[np.float64]
     bodies: Sequence[tuple[str, int, int]]
     joints: NDArray[np.float64]
+    directions: NDArray[np.float64]
     joint_names: Sequence[str]
     joint_kinds: Sequence[str]
     grounded: Sequence[bool]
+    springs: NDArray[np.float64] | None = None
     tip: NDArray[np.float64] | None = None
     path: NDArray[np.float64] | None = None
 
@@ -62,6 +68,8 @@ class Film:
             "bend": packed(self.shape - self.base),
             "bodies": [list(body) for body in self.bodies],
             "joints": packed(self.joints),
+            "directions": packed(self.directions),
+            "springs": None if self.springs is None else packed(self.springs),
             "jointNames": list(self.joint_names),
             "jointKinds": list(self.joint_kinds),
             "grounded": [bool(one) for one in self.grounded],
@@ -77,7 +85,8 @@ def film(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Film | None:
         return None
     time = data["time"].values
     kept = frames_of(time.size)
-    shape, base, joints = (_runs(data[name].isel(time=kept), dims) for name in _SHAPES)
+    shape, base, joints, angles = (_runs(data[name].isel(time=kept), dims) for name in _SHAPES)
+    springs = _runs(data["spring_position"].isel(time=kept), dims) if "spring_position" in data else None
     tip = _runs(data["end_effector"].isel(time=kept), dims) if "end_effector" in data else None
     path = None
     if "end_effector_desired" in data:
@@ -90,9 +99,11 @@ def film(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Film | None:
         base=base,
         bodies=_bodies(data["station_body"].values),
         joints=joints,
+        directions=np.stack([np.cos(angles), np.sin(angles)], axis=-1),
+        springs=springs,
         joint_names=names,
-        joint_kinds=_told_of_joints(data, "joint_kind", ["pin"] * len(names)),
-        grounded=_told_of_joints(data, "joint_grounded", [False] * len(names)),
+        joint_kinds=[str(kind) for kind in data["joint_kind"].values],
+        grounded=[bool(one) for one in data["joint_grounded"].values],
         tip=tip,
         path=path,
     )
@@ -114,10 +125,6 @@ def _bodies(station_body: ArrayLike) -> list[tuple[str, int, int]]:
     names = [str(name) for name in np.asarray(station_body)]
     starts = [k for k, name in enumerate(names) if k == 0 or name != names[k - 1]]
     return [(names[a], a, b) for a, b in zip(starts, [*starts[1:], len(names)], strict=True)]
-
-
-def _told_of_joints(data: xr.Dataset, name: str, otherwise: list[Any]) -> list[Any]:
-    return data[name].values.tolist() if name in data.variables else otherwise
 
 
 def _view(*places: NDArray[np.float64] | None) -> list[float]:

@@ -259,7 +259,11 @@ def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
 
 
 def _command(command: str) -> str:
-    return f'<p class="command"><code>{escape(command)}</code></p>' if command else ""
+    """The command, broken between its options only."""
+    if not command:
+        return ""
+    parts = command.replace(" --", "\n--").split("\n")
+    return f'<p class="command"><code>{" ".join(f"<span>{escape(part)}</span>" for part in parts)}</code></p>'
 
 
 def _script_json(data: Mapping[str, Any]) -> str:

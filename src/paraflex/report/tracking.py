@@ -71,8 +71,8 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     torques = data["torque"].transpose("mode", "motor", "time").values
     heads = [
         ("mode", ""), ("status", ""), ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
-        *((symbol(motor), f"peak, RMS [{torque_unit(data)}]") for motor in motors),
-        ("deflection", f"largest [{bend.name}]"), ("strain energy", "peak [J]"), ("imbalance", "of energy [J]"),
+        *((symbol(motor), f"[{torque_unit(data)}]") for motor in motors),
+        ("deflection", f"largest [{bend.name}]"), ("strain", "energy [J]"), ("imbalance", "[J]"),
         ("steps", "rejected"), ("iterations", "factorisations"), ("wall time", "[s]"),
     ]  # fmt: skip
     rows = []
@@ -91,10 +91,14 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
             number(one["wall_time"].item()),
         ]))  # fmt: skip
     rows += [(name, ["failed", *[NOTHING] * (len(heads) - 2)]) for name in failed]
-    note = "Errors, torques and deflections of a mode that did not get to its end are those until then."
+    note = (
+        "Torques: peak and, below it, RMS. Strain energy: its peak. Imbalance: the largest difference of energy and work."
+    )
+    if torque_unit(data) == "N":
+        note = note.replace("Torques", "Forces")
     whole = bool((data["status"] == "complete").all()) and not failed
     return table(
-        heads, rows, caption="What every mode came to", note="" if whole else note,
+        heads, rows, caption="What every mode came to", note=note if whole else f"{note} Of a mode that did not get to its end: until then.",
         runs={name: r for r, name in enumerate(runs)},
     )  # fmt: skip
 

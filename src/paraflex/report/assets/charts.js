@@ -40,6 +40,23 @@ const charts = (() => {
     };
   }
 
+  // What is far below the largest value is no more than rounding, or the start at rest.
+  const MOST_DECADES = 5;
+  function decades(chart) {
+    let low = Infinity, high = 0;
+    for (const curve of chart.told.curves) {
+      if (!isShown(chart, curve)) continue;
+      for (const value of report.row(curve.y)) {
+        if (value > 0 && value < low) low = value;
+        if (value > high && value < Infinity) high = value;
+      }
+    }
+    if (!(high > 0)) return undefined;
+    const top = Math.log10(high), bottom = Math.max(Math.log10(low), top - MOST_DECADES);
+    const room = 0.06 * Math.max(top - bottom, 0.3);
+    return [bottom - room, top + room];
+  }
+
   function layout(chart) {
     const { log, equal, over_time: overTime, figure } = chart.told;
     const common = {
@@ -56,7 +73,7 @@ const charts = (() => {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
       xaxis: axis(chart.told.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : {}),
-      yaxis: axis(chart.told.y, { ...(log ? { type: "log", dtick: 1 } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
+      yaxis: axis(chart.told.y, { ...(log ? { type: "log", range: decades(chart), dtick: 1, tickformat: "~g" } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
     };
   }
 
@@ -140,7 +157,8 @@ const charts = (() => {
 
   function refresh() {
     for (const chart of all) {
-      if (chart.inView) draw(chart); else chart.stale = true;
+      chart.stale = true;
+      if (chart.inView && window.Plotly) draw(chart);
     }
   }
 
@@ -175,15 +193,15 @@ const charts = (() => {
       for (const entry of entries) {
         const chart = byFigure.get(entry.target);
         chart.inView = entry.isIntersecting;
-        if (chart.inView && chart.stale) draw(chart);
+        if (chart.inView && chart.stale && window.Plotly) draw(chart);
       }
     }, { rootMargin: "150px" });
     for (const chart of all) watch.observe(chart.figure);
     report.on("run", refresh);
     report.on("theme", refresh);
     report.on("time", () => { for (const chart of all) if (chart.inView) moveCursor(chart); });
-    addEventListener("beforeprint", () => { for (const chart of all) if (chart.stale) draw(chart); });
+    addEventListener("beforeprint", () => { for (const chart of all) if (chart.stale && window.Plotly) draw(chart); });
   }
 
-  return { start, all };
+  return { start, refresh, all };
 })();

@@ -47,6 +47,8 @@ const player = (() => {
   // The screen: metres to pixels, the same scale both ways, y upwards.
   function fit() {
     const ratio = devicePixelRatio || 1;
+    const tall = (film.view[3] - film.view[1]) / Math.max(film.view[2] - film.view[0], 1e-9);
+    canvas.style.height = `${Math.round(Math.min(Math.max(tall * canvas.clientWidth + 60, 240), 620))}px`;
     width = canvas.clientWidth; height = canvas.clientHeight;
     canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -114,22 +116,29 @@ const player = (() => {
     pen.stroke();
   }
 
-  function drawJoints(joints) {
-    film.grounded.forEach((grounded, k) => {
-      if (grounded && isPin(k)) drawGround(px(joints[2 * k]), py(joints[2 * k + 1]));
-    });
-    pen.lineWidth = 1.8; pen.strokeStyle = colours.text; pen.fillStyle = colours.card;
+  function drawJoints(joints, directions) {
+    // The direction of a joint is told as a unit vector, NaN where it has none.
+    const along = (k) => Math.atan2(directions[2 * k + 1], directions[2 * k]);
     film.jointKinds.forEach((kind, k) => {
-      const x = px(joints[2 * k]), y = py(joints[2 * k + 1]);
+      const x = px(joints[2 * k]), y = py(joints[2 * k + 1]), direction = along(k);
       if (!Number.isFinite(x)) return;
+      if (Number.isFinite(direction)) drawRail(x, y, direction, film.grounded[k] ? 2 * Math.max(width, height) : 26);
+      else if (film.grounded[k]) drawGround(x, y);
+    });
+    film.jointKinds.forEach((kind, k) => {
+      const x = px(joints[2 * k]), y = py(joints[2 * k + 1]), direction = along(k);
+      if (!Number.isFinite(x)) return;
+      pen.lineWidth = 1.8; pen.strokeStyle = colours.text; pen.fillStyle = colours.card;
+      pen.save();
+      pen.translate(x, y);
       pen.beginPath();
-      if (isPin(k)) pen.arc(x, y, 4.2, 0, 2 * Math.PI);
-      else if (/weld|fixed|rigid/.test(kind)) pen.rect(x - 3, y - 3, 6, 6);
-      else pen.rect(x - 7, y - 4.5, 14, 9);
+      if (Number.isFinite(direction)) { pen.rotate(-direction); pen.rect(-10, -6, 20, 12); }
+      else if (kind === "weld") pen.rect(-3.5, -3.5, 7, 7);
+      else pen.arc(0, 0, 4.2, 0, 2 * Math.PI);
       pen.fill(); pen.stroke();
+      pen.restore();
     });
   }
-  const isPin = (k) => /pin|revolute|hinge/.test(film.jointKinds[k]);
 
   function drawNames(drawn, joints) {
     pen.font = `600 11.5px ${getComputedStyle(document.body).fontFamily}`;
@@ -168,7 +177,7 @@ const player = (() => {
   function paint() {
     waiting = false;
     if (!arrays || !canvas.clientWidth) return;
-    if (canvas.clientWidth !== width || canvas.clientHeight !== height) fit();
+    if (canvas.clientWidth !== width || canvas.clientHeight !== height || canvas.width !== Math.round(width * (devicePixelRatio || 1))) fit();
     pen.clearRect(0, 0, width, height);
     let [before, share] = report.between(times, state.time);
     const farthest = reached(arrays.base, state.run);
@@ -179,10 +188,15 @@ const player = (() => {
     if (farthest >= 0) {
       const base = at(arrays.base, state.run, before, share), bend = at(arrays.bend, state.run, before, share);
       const joints = at(arrays.joints, state.run, before, share);
+      const directions = at(arrays.directions, state.run, before, share);
       const drawn = base.map((value, k) => value + state.magnify * bend[k]);
       const tip = arrays.tip ? at(arrays.tip, state.run, before, share) : null;
       if (tip) drawTrail(before, share, tip);
       pen.lineCap = pen.lineJoin = "round";
+      if (arrays.springs) {
+        const springs = at(arrays.springs, state.run, before, share);
+        for (let k = 0; k < springs.length; k += 4) drawSpring(springs.subarray(k, k + 4));
+      }
       pen.globalAlpha = stopped ? 0.45 : 1;
       if (byId("ghost").checked && state.magnify > 1) {
         pen.strokeStyle = colours.soft; pen.lineWidth = 1.2; pen.setLineDash([3, 4]);
@@ -193,7 +207,7 @@ const player = (() => {
         pen.strokeStyle = colours.card; pen.lineWidth = 7; line(drawn, from, to);
         pen.strokeStyle = colours.bodies[k % colours.bodies.length]; pen.lineWidth = 3.6; line(drawn, from, to);
       });
-      drawJoints(joints);
+      drawJoints(joints, directions);
       if (tip && Number.isFinite(tip[0])) {
         pen.fillStyle = colours.mark; pen.strokeStyle = colours.card; pen.lineWidth = 1.5;
         pen.beginPath(); pen.arc(px(tip[0]), py(tip[1]), 5, 0, 2 * Math.PI); pen.fill(); pen.stroke();
@@ -203,6 +217,30 @@ const player = (() => {
     }
     drawScale();
     drawCaption(stopped ? (farthest < 0 ? times[0] : times[farthest]) : null);
+  }
+
+  // A line along which something slides.
+  function drawRail(x, y, direction, long) {
+    pen.strokeStyle = colours.soft; pen.lineWidth = 1.6;
+    pen.beginPath();
+    pen.moveTo(x - long * Math.cos(direction), y + long * Math.sin(direction));
+    pen.lineTo(x + long * Math.cos(direction), y - long * Math.sin(direction));
+    pen.stroke();
+  }
+
+  // A spring as a zigzag between its ends, whatever its length.
+  function drawSpring(ends) {
+    const [x0, y0, x1, y1] = [px(ends[0]), py(ends[1]), px(ends[2]), py(ends[3])];
+    const length = Math.hypot(x1 - x0, y1 - y0);
+    if (!(length > 1)) return;
+    const [ex, ey] = [(x1 - x0) / length, (y1 - y0) / length], turns = 12, wide = 5;
+    pen.strokeStyle = colours.soft; pen.lineWidth = 1.6;
+    pen.beginPath(); pen.moveTo(x0, y0);
+    for (let k = 0; k <= turns; k++) {
+      const along = length * (0.12 + 0.76 * k / turns), side = k === 0 || k === turns ? 0 : k % 2 ? wide : -wide;
+      pen.lineTo(x0 + along * ex - side * ey, y0 + along * ey + side * ex);
+    }
+    pen.lineTo(x1, y1); pen.stroke();
   }
 
   // One painting a frame of the screen, however much changes in it.
@@ -273,7 +311,7 @@ const player = (() => {
       canvas.style.display = byId("tools").style.display = "none";
       return;
     }
-    const names = ["base", "bend", "joints", "tip", "path"];
+    const names = ["base", "bend", "joints", "directions", "springs", "tip", "path"];
     const read = await Promise.all(names.map((name) => (film[name] ? report.unpacked(film[name]) : null)));
     arrays = Object.fromEntries(names.map((name, k) => [name, read[k]]));
     recolour();

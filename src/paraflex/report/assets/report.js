@@ -74,9 +74,9 @@ const report = (() => {
     tell(what);
   }
 
-  function setTheme(name) {
+  function setTheme(name, keep = true) {
     root.dataset.theme = name;
-    try { localStorage.setItem("paraflex-theme", name); } catch (refused) { /* a file's storage may be closed */ }
+    if (keep) try { localStorage.setItem("paraflex-theme", name); } catch (refused) { /* a file's storage may be closed */ }
     tell("theme");
   }
   dark.addEventListener("change", () => root.dataset.theme === "auto" && tell("theme"));

@@ -1,5 +1,5 @@
 // Selection, theme and keys; then everything is begun.
-(() => {
+const begin = (() => {
   const { told, state, element } = report;
   const byId = (name) => document.getElementById(name);
   const MOST_BUTTONS = 12;
@@ -12,7 +12,11 @@
     for (const row of document.querySelectorAll("tr[data-run]")) row.classList.toggle("selected", Number(row.dataset.run) === state.run);
     for (const button of document.querySelectorAll("tr[data-run] .pick")) button.setAttribute("aria-pressed", String(Number(button.closest("tr").dataset.run) === state.run));
     const radio = document.querySelector(`#runs input[value="${state.run}"]`);
-    if (radio) radio.checked = true;
+    if (radio) {
+      radio.checked = true;
+      const holder = byId("runs"), chip = radio.parentElement;
+      holder.scrollLeft = chip.offsetLeft - holder.offsetLeft - (holder.clientWidth - chip.offsetWidth) / 2;
+    }
     const select = byId("run");
     if (select) select.value = String(state.run);
     byId("canvas").setAttribute("aria-label", `The mechanism in motion${report.runName() ? `, ${told.selecting} ${report.runName()}` : ""}`);
@@ -56,8 +60,8 @@
     show();
     // Paper is white.
     let before = null;
-    addEventListener("beforeprint", () => { if (report.isDark()) { before = document.documentElement.dataset.theme; report.setTheme("light"); } });
-    addEventListener("afterprint", () => { if (before) { report.setTheme(before); before = null; } });
+    addEventListener("beforeprint", () => { if (report.isDark()) { before = document.documentElement.dataset.theme; report.setTheme("light", false); } });
+    addEventListener("afterprint", () => { if (before) { report.setTheme(before, false); before = null; } });
   }
 
   function listen() {
@@ -84,7 +88,14 @@
     });
   }
 
-  async function begin() {
+  function loadPlotly() {
+    const script = element("script");
+    script.textContent = byId("plotly").textContent;
+    document.head.append(script);
+    document.documentElement.dataset.charts = "true";
+  }
+
+  async function open() {
     makeSelector();
     makeTheme();
     byId("keyed").textContent = told.selecting;
@@ -96,9 +107,14 @@
     charts.start();
     await player.start();
     document.documentElement.dataset.ready = "true";
+    if (!told.panels.length) return;
+    // After the screen shows what there is.
+    await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0)));
+    loadPlotly();
+    charts.refresh();
   }
 
-  begin().catch((error) => {
+  return () => open().catch((error) => {
     const text = typeof DecompressionStream === "undefined" ? "This browser is too old for the charts and the animation." : `The charts cannot be shown: ${error.message}`;
     document.querySelector("main").prepend(element("p", { class: "notice" }, text));
     throw error;
