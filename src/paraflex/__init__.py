@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from paraflex.integrators import METHODS, DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
     from paraflex.mechanism import Mechanism, chain_of_segments, four_bars_in_a_row, raparm_i
-    from paraflex.results import load_results, save_results, summary, tracking_dataset
+    from paraflex.results import load_results, open_results, save_results, summary, tracking_dataset
     from paraflex.simulate import plan_tracking
     from paraflex.studies import (
         identify,
@@ -62,6 +62,7 @@ _HOME = {
     "load_results": "results",
     "load_sensitivities": "studies",
     "load_sweep": "studies",
+    "open_results": "results",
     "optimise": "studies",
     "plan_tracking": "simulate",
     "raparm_i": "mechanism",
@@ -102,6 +103,7 @@ __all__ = [
     "load_results",
     "load_sensitivities",
     "load_sweep",
+    "open_results",
     "optimise",
     "plan_tracking",
     "plots",

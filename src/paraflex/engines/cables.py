@@ -236,7 +236,7 @@ class Cable:
         element = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, self.mesh.n_elements - 1)
         rows = np.zeros((x.size, len(self.columns)))
         for i, (e, along) in enumerate(zip(element, x - nodes[element], strict=True)):
-            length = nodes[e + 1] - nodes[e]
+            length = float(nodes[e + 1] - nodes[e])
             rows[i, 2 * e : 2 * e + 4] = _shape(np.array([along / length]), length, 0)
         return rows @ history.states[0][:, self.columns]
 

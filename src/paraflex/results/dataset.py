@@ -5,21 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError, OutputError
+from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
 from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
 from paraflex.results.record import FIGURES, Record, record
+from paraflex.results.storage import SCHEMA
 from paraflex.simulate import TrackingRun
 
-SCHEMA = 2
 UNITS = {
     "time": ("time", "s"),
     "end_effector": ("end-effector position", "m"),
@@ -178,7 +177,7 @@ def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.floating]
     }
 
 
-def _end_effector(mechanism: Mechanism) -> dict[str, str]:
+def end_effector_point(mechanism: Mechanism) -> dict[str, str]:
     """Which point is followed, for drawings."""
     return {} if mechanism.end_effector is None else {"end_effector_point": str(mechanism.end_effector.point)}
 
@@ -188,7 +187,7 @@ def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> d
     ours = options.told() if one.method == options.description.title else {}
     return {
         "mechanism": one.task.mechanism.name,
-        **_end_effector(one.task.mechanism),
+        **end_effector_point(one.task.mechanism),
         "motion_end": one.task.path.duration,
         "tolerance": options.tolerance,
         "baumgarte_alpha": options.alpha,
@@ -201,53 +200,3 @@ def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> d
         "numpy_version": version("numpy"),
         "schema": SCHEMA,
     }
-
-
-def save_results(data: xr.Dataset, path: str | Path) -> None:
-    """Write a dataset as netCDF; the file appears whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        The folder cannot be written.
-    """
-    path = Path(path)
-    unfinished = path.with_name(path.name + ".part")
-    try:
-        data.to_netcdf(unfinished, engine="netcdf4", encoding=_encoding(data))
-        unfinished.replace(path)
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        raise OutputError(
-            f"cannot be written ({error.strerror or error})", field=str(path), remedy="choose another folder"
-        ) from error
-
-
-def _encoding(data: xr.Dataset) -> dict[str, dict[str, object]]:
-    """Arrays over time are compressed: bytes of like weight together, at the least effort."""
-    return {
-        str(name): {"zlib": True, "complevel": 1, "shuffle": True}
-        for name, values in data.data_vars.items()
-        if values.ndim >= 2 and values.size and values.dtype.kind in "fiu"
-    }
-
-
-def load_results(path: str | Path) -> xr.Dataset:
-    """Read a dataset that `save_results` wrote.
-
-    Raises
-    ------
-    InputError
-        No such file, not a netCDF file, or not one of ours.
-    """
-    try:
-        data = xr.load_dataset(path, engine="netcdf4")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            "not a readable results file", field=str(path), remedy="name a results.nc that paraflex wrote"
-        ) from error
-    if data.attrs.get("schema") != SCHEMA:
-        raise InputError(
-            "not a results file of this version", field=str(path), remedy="run the study again with this version"
-        )
-    return data

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
-from paraflex.results.dataset import SCHEMA, UNITS
+from paraflex.results.dataset import UNITS, end_effector_point
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.motion import joint_forces, point_motion, tip_deflection
 from paraflex.results.record import FIGURES
+from paraflex.results.storage import SCHEMA
 from paraflex.results.summary import finite_or_none
 
 _OWN_UNITS = {
@@ -46,7 +47,8 @@ def motion_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end; units in the attributes of every variable.
+        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end; units in the attributes of
+        every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v, a = solution.q, solution.v, solution.a
@@ -99,6 +101,7 @@ def motion_dataset(
     out.attrs = {
         "mechanism": mechanism.name,
         "kind": "motion",
+        **end_effector_point(mechanism),
         "tolerance": options.tolerance,
         "method": METHODS[solution.method].title,
         **options.told(),

@@ -1,0 +1,149 @@
+"""Results on disk: netCDF with a versioned schema, written whole or not at all, and read again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import xarray as xr
+
+from paraflex.errors import InputError, OutputError, suggestion
+
+# Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from.
+SCHEMA = 2
+# What commands call the file in their folder, and where a sweep keeps its runs.
+FILES = ("results.nc", "verify.nc")
+_TRAJECTORIES = "trajectories"
+_NAMED = 3
+# Smaller arrays are written as they are: what describes the compression takes more than it gains [bytes].
+_LARGE = 16384
+# First bytes of what netCDF files are (HDF5, or the classic formats), and of other files of ours.
+_NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
+_PARQUET = b"PAR1"
+
+
+def save_results(data: xr.Dataset, path: str | Path) -> None:
+    """Write a dataset as netCDF, compressed; the file appears whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    path = Path(path)
+    unfinished = path.with_name(path.name + ".part")
+    try:
+        data.to_netcdf(unfinished, engine="netcdf4", encoding=_encoding(data))
+        unfinished.replace(path)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise OutputError(
+            f"cannot be written ({error.strerror or error})", field=str(path), remedy="choose another folder"
+        ) from error
+
+
+def _encoding(data: xr.Dataset) -> dict[str, dict[str, object]]:
+    """Large arrays are compressed: bytes of like weight together, at the least effort."""
+    return {
+        str(name): {"zlib": True, "complevel": 1, "shuffle": True}
+        for name, values in data.data_vars.items()
+        if values.nbytes >= _LARGE and values.dtype.kind in "fiu"
+    }
+
+
+def open_results(path: str | Path) -> xr.Dataset:
+    """The dataset that a command or `save_results` wrote, read into memory.
+
+    Parameters
+    ----------
+    path : str or Path
+        The folder of a run or verification, or a file. Files of earlier versions of the schema stay readable; what
+        they do not tell (shapes in schema 1) is missing.
+
+    Raises
+    ------
+    InputError
+        Nothing there, a folder without results or of a sweep, a file that is damaged, of something else, or of a
+        later version.
+    """
+    file = results_file(path)
+    return _checked(_read(file), file)
+
+
+def load_results(path: str | Path) -> xr.Dataset:
+    """Read a dataset that `save_results` wrote: the same as `open_results`."""
+    return open_results(path)
+
+
+def results_file(path: str | Path) -> Path:
+    """The netCDF file that a folder of results or a file name means.
+
+    Raises
+    ------
+    InputError
+        See `open_results`.
+    """
+    path = Path(path)
+    if not path.exists():
+        near = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
+        remedy = suggestion(path.name, near) if near and len(near) < 20 else "name the folder of a run"
+        raise InputError("there is no such file or folder", field=str(path), remedy=remedy)
+    if not path.is_dir():
+        return path
+    for name in FILES:
+        if (path / name).is_file():
+            return path / name
+    if (path / "results.parquet").exists() or (path / "study.json").exists():
+        runs = sorted(path.glob(f"{_TRAJECTORIES}/*.nc"))
+        more = ", ..." if len(runs) > _NAMED else ""
+        raise InputError(
+            "the folder of a study of many runs, whose figures are in results.parquet",
+            field=str(path),
+            remedy=f"name one of its runs: {', '.join(str(run.relative_to(path)) for run in runs[:_NAMED])}{more}"
+            if runs
+            else "it kept no runs: set trajectories = true in the study, or run the design you want with paraflex run",
+        )
+    raise InputError(
+        f"no results in this folder (no {' or '.join(FILES)})", field=str(path), remedy="name one that paraflex wrote"
+    )
+
+
+def _read(file: Path) -> xr.Dataset:
+    try:
+        with file.open("rb") as stream:
+            start = stream.read(4)
+    except OSError as error:
+        raise InputError(
+            f"cannot be read ({error.strerror or error})", field=str(file), remedy="check its permissions"
+        ) from error
+    if start == _PARQUET:
+        raise InputError(
+            "a table of many runs, not the results of one", field=str(file), remedy="read it with pandas or pyarrow"
+        )
+    if start not in _NETCDF:
+        raise InputError(
+            "not a netCDF file" if start else "an empty file", field=str(file),
+            remedy="name a results.nc that paraflex wrote",
+        )  # fmt: skip
+    try:
+        return xr.load_dataset(file, engine="netcdf4")
+    except (OSError, ValueError, RuntimeError) as error:
+        raise InputError(
+            "damaged or cut short: not a readable netCDF file", field=str(file),
+            remedy="copy it again, or run the study again",
+        ) from error  # fmt: skip
+
+
+def _checked(data: xr.Dataset, file: Path) -> xr.Dataset:
+    schema = data.attrs.get("schema")
+    if schema is None or "paraflex_version" not in data.attrs:
+        raise InputError(
+            "a netCDF file, but not of paraflex", field=str(file), remedy="name a results.nc that paraflex wrote"
+        )
+    if not 1 <= schema <= SCHEMA:
+        raise InputError(
+            f"written by a later version, paraflex {data.attrs['paraflex_version']} (schema {schema}; this one reads up to "
+            f"{SCHEMA})",
+            field=str(file),
+            remedy="update paraflex",
+        )
+    return data
