@@ -201,7 +201,10 @@ def verify(
     report: ReportOption = True,
     json: Json = False,
 ) -> None:
-    """Run a mechanism at every fidelity and in other engines; write report.html, verify.json, verify.nc and figures/."""
+    """Run a mechanism at every fidelity and in other engines.
+
+    Writes report.html, verify.json, verify.nc and figures/.
+    """
     from paraflex.cli.verify import VerifyRequest, verify_command
 
     request = VerifyRequest(

@@ -11,10 +11,7 @@ import xarray as xr
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.report import Page, motion_page, save_page, tracking_page, verification_page
-from paraflex.results import load_results
-
-# Files of results, and those beside them that say what datasets cannot hold.
-_RESULTS = ("results.nc", "verify.nc")
+from paraflex.results.storage import open_results, results_file
 
 
 def report_command(results: str, output: str | None, *, force: bool) -> None:
@@ -25,31 +22,14 @@ def report_command(results: str, output: str | None, *, force: bool) -> None:
     InputError
         No results of ours, or a file that would be written over.
     """
-    file = results_file(Path(results))
+    file = results_file(results)
     target = file.with_name("report.html") if output is None else Path(output)
     if target.is_dir():
         target = target / "report.html"
     if target.exists() and not force:
         raise InputError("is there already", field=str(target), remedy="say --force to write over it, or --output FILE")
-    save_page(page_of(load_results(file), file.parent), target)
+    save_page(page_of(open_results(file), file.parent), target)
     plain_console(stderr=True).print(f"report in {target}", soft_wrap=True)
-
-
-def results_file(path: Path) -> Path:
-    """The file of results that a path names: itself, or that of its folder.
-
-    Raises
-    ------
-    InputError
-        There is none.
-    """
-    if path.is_file():
-        return path
-    for name in _RESULTS:
-        if (path / name).is_file():
-            return path / name
-    problem = "has no results.nc or verify.nc" if path.is_dir() else "is not there"
-    raise InputError(problem, field=str(path), remedy="name a folder that paraflex run or verify wrote")
 
 
 def page_of(data: xr.Dataset, folder: Path) -> Page:

@@ -2,7 +2,7 @@
 
 from paraflex.report.film import Film, film
 from paraflex.report.motion import motion_page
-from paraflex.report.page import Chart, Curve, Page, Panel, render, save_page
+from paraflex.report.page import Chart, Curve, Look, Page, Panel, render, save_page
 from paraflex.report.tracking import tracking_page
 from paraflex.report.verification import verification_page
 
@@ -10,6 +10,7 @@ __all__ = [
     "Chart",
     "Curve",
     "Film",
+    "Look",
     "Page",
     "Panel",
     "film",

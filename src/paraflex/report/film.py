@@ -42,7 +42,7 @@ class Film:
     grounded : sequence of bool
         Joints with the ground.
     tip : (runs, frames, 2) array, optional
-        The end-effector [m].
+        The end-effector, or another point whose trail is drawn [m].
     path : (samples, 2) array, optional
         Where it should go [m].
     """
@@ -75,7 +75,7 @@ class Film:
             "grounded": [bool(one) for one in self.grounded],
             "tip": None if self.tip is None else packed(self.tip),
             "path": None if self.path is None else packed(self.path[None]),
-            "view": _view(self.shape, self.joints, self.path),
+            "view": _view(self.shape, self.joints, self.path, self.springs),
         }
 
 
@@ -87,7 +87,8 @@ def film(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Film | None:
     kept = frames_of(time.size)
     shape, base, joints, angles = (_runs(data[name].isel(time=kept), dims) for name in _SHAPES)
     springs = _runs(data["spring_position"].isel(time=kept), dims) if "spring_position" in data else None
-    tip = _runs(data["end_effector"].isel(time=kept), dims) if "end_effector" in data else None
+    followed = data["end_effector"] if "end_effector" in data else _free_point(data)
+    tip = None if followed is None else _runs(followed.isel(time=kept), dims)
     path = None
     if "end_effector_desired" in data:
         path = _runs(data["end_effector_desired"], dims)[0]
@@ -119,6 +120,24 @@ def _runs(values: xr.DataArray, dims: Sequence[str]) -> NDArray[np.float64]:
     rest = [dim for dim in values.dims if dim not in dims]
     array = np.asarray(values.transpose(*dims, *rest).values, dtype=float)
     return array.reshape(-1, *array.shape[len(dims) :])
+
+
+def _free_point(data: xr.Dataset) -> xr.DataArray | None:
+    """The end-effector's point, or else the one at no joint that goes farthest; None where there is none."""
+    places = data["point_position"].transpose("point", "time", "axis")
+    names = [str(name) for name in data["point"].values]
+    if data.attrs.get("end_effector_point") in names:
+        return places.isel(point=names.index(data.attrs["end_effector_point"]))
+    joints = data["joint_position"].transpose("joint", "time", "axis").values.astype(float)
+    travelled = []
+    for place in places.values:
+        apart = np.linalg.norm(joints - place, axis=-1)
+        held = bool((np.nanmax(apart, axis=1, initial=0.0) < 1e-6).any()) if len(apart) else False
+        way = np.nansum(np.linalg.norm(np.diff(place, axis=0), axis=-1))
+        travelled.append(0.0 if held else float(way))
+    if not travelled or max(travelled) < 1e-6:
+        return None
+    return places.isel(point=int(np.argmax(travelled)))
 
 
 def _bodies(station_body: ArrayLike) -> list[tuple[str, int, int]]:

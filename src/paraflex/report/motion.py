@@ -11,7 +11,7 @@ from paraflex.report.curves import Unit, followed, look, thinned, unit_for
 from paraflex.report.film import NO_SHAPES, film
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
-from paraflex.report.text import count, number, symbol, table
+from paraflex.report.text import count, number, pairs, symbol
 from paraflex.report.tracking import energies, largest
 
 _ALONE = ("",)
@@ -43,22 +43,22 @@ def motion_page(data: xr.Dataset) -> Page:
 
 
 def _table(data: xr.Dataset) -> str:
-    rows: list[tuple[str, list[str]]] = [
-        ("status", [str(data["status"].item())]),
-        ("steps, rejected", [f"{count(data['steps'].item())}, {count(data['rejected'].item())}"]),
-        ("Newton iterations", [count(data["newton_iterations"].item())]),
-        ("factorisations", [count(data["factorisations"].item())]),
-        ("wall time", [f"{number(data['wall_time'].item())} s"]),
-        ("violation of constraints, position", [f"{number(data['constraint_position_max'].item())} m"]),
-        ("violation of constraints, velocity", [f"{number(data['constraint_velocity_max'].item())} m/s"]),
-        ("imbalance of energy", [f"{number(data['energy_balance_max'].item())} J"]),
+    facts = [
+        ("status", str(data["status"].item())),
+        ("steps, rejected", f"{count(data['steps'].item())}, {count(data['rejected'].item())}"),
+        ("Newton iterations", count(data["newton_iterations"].item())),
+        ("factorisations", count(data["factorisations"].item())),
+        ("wall time", f"{number(data['wall_time'].item())} s"),
+        ("constraint violation, position", f"{number(data['constraint_position_max'].item())} m"),
+        ("constraint violation, velocity", f"{number(data['constraint_velocity_max'].item())} m/s"),
+        ("imbalance of energy", f"{number(data['energy_balance_max'].item())} J"),
     ]
-    rows += [(f"torque of {symbol(str(name))}", [f"{number(float(data['applied_torque'][k]))} N m"])
+    facts += [(f"torque of {symbol(str(name))}", f"{number(float(data['applied_torque'][k]))} N m")
              for k, name in enumerate(data["motor"].values)]  # fmt: skip
     passed = json.loads(data.attrs.get("singular_positions", "[]"))
     if passed:
-        rows.append(("singular positions passed", [", ".join(f"{t:.4g} s" for t in passed[:6])]))
-    return table([("", ""), ("", "")], rows, caption="How the run went").replace("<thead>", "<thead hidden>")
+        facts.append(("singular positions passed", ", ".join(f"{t:.4g} s" for t in passed[:6])))
+    return pairs(facts)
 
 
 def _panels(data: xr.Dataset) -> list[Panel]:
@@ -88,7 +88,7 @@ def _panels(data: xr.Dataset) -> list[Panel]:
 
 def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:
     angle, rate = data["angle"].values, data["angular_velocity"].values
-    curves = [Curve(symbol(body), rate[:, b], angle[:, b], run=0, **look(b)) for b, body in enumerate(bodies)]
+    curves = [Curve(symbol(body), rate[:, b], angle[:, b], run=0, look=look(b)) for b, body in enumerate(bodies)]
     return Chart("phases", "Phase diagram", "angular velocity [rad/s]", curves, x="angle [rad]", over_time=False)
 
 
@@ -104,7 +104,7 @@ def _points(data: xr.Dataset) -> Chart | None:
         return None
     unit = Unit("mm", 1e3) if largest(places[moving]) < 10.0 else Unit("m", 1.0)
     curves = [
-        Curve(names[k], unit.factor * places[k, :, 1], unit.factor * places[k, :, 0], run=0, **look(i))
+        Curve(names[k], unit.factor * places[k, :, 1], unit.factor * places[k, :, 0], run=0, look=look(i))
         for i, k in enumerate(moving)
     ]
     return Chart(
@@ -119,7 +119,7 @@ def _joint_forces(data: xr.Dataset) -> Chart:
     for j in range(len(names)):
         magnitude = np.linalg.norm(force[j], axis=-1)
         parts = (("magnitude", magnitude), ("x", force[j, :, 0]), ("y", force[j, :, 1]))
-        curves += [Curve(name, values, run=0, choice=j, **look(k)) for k, (name, values) in enumerate(parts)]
+        curves += [Curve(name, values, run=0, choice=j, look=look(k)) for k, (name, values) in enumerate(parts)]
     return Chart(
         "forces", "Joint forces", "force [N]", curves, choices=[symbol(name) for name in names], choosing="joint",
         note="On the joint's second body, in the ground frame.",
@@ -137,7 +137,7 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
         for choice, members in kinds:
             if members:
                 curves += [
-                    Curve(names[k].removeprefix(f"{body}."), values[k], run=0, choice=len(choices), **look(i))
+                    Curve(names[k].removeprefix(f"{body}."), values[k], run=0, choice=len(choices), look=look(i))
                     for i, k in enumerate(members)
                 ]
                 choices.append(choice)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from html import escape
 from importlib.metadata import version
@@ -12,7 +12,7 @@ from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
@@ -22,6 +22,19 @@ from paraflex.report.packing import Series
 
 _STYLES = ("page.css",)
 _SCRIPTS = ("report.js", "charts.js", "player.js", "start.js")
+
+
+class Look(NamedTuple):
+    """How a curve is drawn: one of the page's eight colours, or without one that of text, as desired curves are.
+
+    Dashes: 0 solid, 1 dashed, 2 dotted, 3 dash-dotted, 4 long dashes.
+    """
+
+    colour: int | None = None
+    dash: int = 0
+
+
+PLAIN = Look()
 
 
 @dataclass(frozen=True)
@@ -35,26 +48,25 @@ class Curve:
         In the chart's unit; NaN where there is no value.
     x : (k,) array, optional
         The page's time by default.
-    colour : int, optional
-        Which of the page's colours; without one that of text, as desired curves are drawn.
-    dash : int
-        0 solid, 1 dashed, 2 dotted, 3 dash-dotted, 4 long dashes.
+    look : Look
     run : int, optional
         The run it is of: drawn thicker beside others when this run is selected.
     shown : tuple of int, optional
         Runs with whose selection it is shown; always by default.
     choice : int, optional
         Which of the chart's choices shows it; every one by default.
+    quiet : bool
+        Not told of where the pointer is.
     """
 
     name: str
     y: ArrayLike
     x: ArrayLike | None = None
-    colour: int | None = None
-    dash: int = 0
+    look: Look = PLAIN
     run: int | None = None
     shown: tuple[int, ...] | None = None
     choice: int | None = None
+    quiet: bool = False
 
 
 @dataclass(frozen=True)
@@ -119,8 +131,8 @@ class Page:
         The command that gives these results again; empty where it is not known.
     figures : sequence of (str, str, str)
         The few numbers that matter: name, value, and what it is of.
-    tables : sequence of (str, str)
-        Headings and HTML of tables; see `tables.table`.
+    tables, more : sequence of (str, str)
+        Headings and HTML of what stands before the charts and after them; see `text.table`.
     panels : sequence of Panel
     time : (k,) array
         What curves without x are drawn over; empty where nothing moves.
@@ -134,6 +146,8 @@ class Page:
         The animation.
     no_film : str
         Why there is none.
+    notes : sequence of str
+        What the reader has to know first: runs that failed.
     """
 
     title: str
@@ -143,6 +157,7 @@ class Page:
     command: str = ""
     figures: Sequence[tuple[str, str, str]] = ()
     tables: Sequence[tuple[str, str]] = ()
+    more: Sequence[tuple[str, str]] = ()
     panels: Sequence[Panel] = ()
     time: ArrayLike = ()
     runs: Sequence[str] = ()
@@ -150,7 +165,7 @@ class Page:
     selected: int = 0
     film: Film | None = None
     no_film: str = ""
-    notes: Sequence[str] = field(default=())
+    notes: Sequence[str] = ()
 
 
 def render(page: Page) -> str:
@@ -163,9 +178,8 @@ def render(page: Page) -> str:
         command=_command(page.command),
         figures=_figures(page.figures),
         notes="".join(f'<p class="notice">{escape(note)}</p>' for note in page.notes),
-        tables="".join(
-            f'<section class="card"><h2>{escape(heading)}</h2>{html}</section>' for heading, html in page.tables
-        ),
+        tables=_sections(page.tables),
+        more=_sections(page.more),
         no_film=escape(page.no_film),
         no_charts="" if page.panels else "hidden",
         version=escape(version("paraflex")),
@@ -212,7 +226,9 @@ def plotly_script() -> str:
         if script.is_file():
             # A closing tag in one of its strings would end the page's script.
             return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
-    raise InputError("not installed, or without its script", field="plotly", remedy="pip install --force-reinstall plotly")
+    raise InputError(
+        "not installed, or without its script", field="plotly", remedy="pip install --force-reinstall plotly"
+    )
 
 
 def _told(page: Page) -> dict[str, Any]:
@@ -243,16 +259,23 @@ def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
 
 
 def _curve(curve: Curve, series: Series, time: int) -> dict[str, Any]:
-    plain = ("name", "colour", "dash", "run", "shown", "choice")
+    plain = ("name", "run", "shown", "choice", "quiet")
     return {name: getattr(curve, name) for name in plain} | {
+        "colour": curve.look.colour,
+        "dash": curve.look.dash,
         "x": time if curve.x is None else series.add(curve.x),
         "y": series.add(curve.y),
     }
 
 
+def _sections(parts: Sequence[tuple[str, str]]) -> str:
+    return "".join(f'<section class="card"><h2>{escape(heading)}</h2>{html}</section>' for heading, html in parts)
+
+
 def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
     tiles = "".join(
-        f'<div class="tile"><span>{escape(name)}</span><strong>{escape(value)}</strong><small>{escape(of)}</small></div>'
+        f'<div class="tile"><span>{escape(name)}</span><strong>{escape(value)}</strong>'
+        f"<small>{escape(of)}</small></div>"
         for name, value, of in figures
     )
     return f'<div class="tiles">{tiles}</div>' if tiles else ""

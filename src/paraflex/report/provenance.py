@@ -39,9 +39,12 @@ def common_facts(data: xr.Dataset) -> list[tuple[str, str]]:
     method = attrs.get("method")
     if method:
         facts.append(("integration", str(method)))
-    if "tolerance" in attrs:
-        step = asked(data).get("step")
-        facts.append(("tolerance", f"{attrs['tolerance']:g} m") if step is None else ("step", f"{step:g} s"))
+    run = asked(data)
+    tolerance, step = run.get("tolerance", attrs.get("tolerance")), run.get("step")
+    if step is not None:
+        facts.append(("step", f"{step:g} s"))
+    elif tolerance is not None:
+        facts.append(("tolerance", f"{tolerance:g} m"))
     facts += [
         (name.removesuffix("_version"), str(attrs[name]))
         for name in ("paraflex_version", "numba_version", "numpy_version")

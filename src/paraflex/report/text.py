@@ -16,10 +16,11 @@ _GREEK = {
 # Magnitudes written out; others as powers of ten.
 _SMALLEST, _LARGEST = 1e-3, 1e5
 NOTHING = "–"
+_WORDS = ' class="words"'
 
 
 def number(value: float | None, factor: float = 1.0) -> str:
-    """A value to three digits, after it is multiplied by a factor: "0.377", "1.2 × 10⁻⁵"; a dash where there is none."""
+    """A value to three digits after multiplication by a factor: "0.377", "1.2 × 10⁻⁵"; a dash where there is none."""
     if value is None or not math.isfinite(value):
         return NOTHING
     value = factor * value
@@ -57,14 +58,14 @@ def table(
     note: str = "",
     runs: Mapping[str, int] | None = None,
 ) -> str:
-    """An HTML table with a name before each row; it scrolls within the page where it is too wide.
+    r"""An HTML table with a name before each row; it scrolls within the page where it is too wide.
 
     Parameters
     ----------
     heads : sequence of (str, str)
         Names of columns and their units, the rows' own first.
     rows : sequence of (str, sequence of str)
-        Name of a row, and its cells; a cell of two lines is "first\\nsecond".
+        Name of a row, and its cells; a cell of two lines is "first\nsecond".
     caption : str
         For those who hear the page.
     note : str
@@ -73,7 +74,11 @@ def table(
         Which rows select which run of the page.
     """
     runs = runs or {}
-    head = "".join(f'<th scope="col">{escape(name)}{_small(unit)}</th>' for name, unit in heads)
+    wordy = [k > 0 and any(_is_words(cells[k - 1]) for _, cells in rows) for k in range(len(heads))]
+    head = "".join(
+        f'<th scope="col"{_WORDS if words else ""}>{escape(name)}{_small(unit)}</th>'
+        for (name, unit), words in zip(heads, wordy, strict=True)
+    )
     body = "".join(
         f"<tr{_data_run(runs.get(name))}>{_row_head(name, runs.get(name))}{''.join(map(_cell, cells))}</tr>"
         for name, cells in rows
@@ -84,6 +89,11 @@ def table(
         f'<caption class="unseen">{escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{below}"
     )
+
+
+def pairs(facts: Sequence[tuple[str, str]]) -> str:
+    """HTML of names and values."""
+    return f'<dl class="pairs">{"".join(f"<div><dt>{escape(a)}</dt><dd>{escape(b)}</dd></div>" for a, b in facts)}</dl>'
 
 
 def _small(text: str) -> str:
@@ -101,6 +111,9 @@ def _row_head(name: str, run: int | None) -> str:
 
 def _cell(text: str) -> str:
     first, _, second = text.partition("\n")
-    # Words are read, numbers are compared.
-    words = ' class="words"' if re.search(r"[A-Za-z]{4}", first) else ""
-    return f"<td{words}>{escape(first)}{_small(second)}</td>"
+    return f"<td{_WORDS if _is_words(text) else ''}>{escape(first)}{_small(second)}</td>"
+
+
+def _is_words(text: str) -> bool:
+    """Words are read, numbers are compared."""
+    return re.search(r"[A-Za-z]{2}", text.partition("\n")[0]) is not None

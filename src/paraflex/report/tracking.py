@@ -9,9 +9,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.plots.runs import default_mode
-from paraflex.report.curves import compared, followed, look, plane_path, thinned, unit_for
+from paraflex.report.curves import DOTTED, compared, followed, look, plane_path, thinned, unit_for
 from paraflex.report.film import NO_SHAPES, film
-from paraflex.report.page import Chart, Curve, Page, Panel
+from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
 
@@ -91,16 +91,12 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
             number(one["wall_time"].item()),
         ]))  # fmt: skip
     rows += [(name, ["failed", *[NOTHING] * (len(heads) - 2)]) for name in failed]
-    note = (
-        "Torques: peak and, below it, RMS. Strain energy: its peak. Imbalance: the largest difference of energy and work."
-    )
-    if torque_unit(data) == "N":
-        note = note.replace("Torques", "Forces")
-    whole = bool((data["status"] == "complete").all()) and not failed
-    return table(
-        heads, rows, caption="What every mode came to", note=note if whole else f"{note} Of a mode that did not get to its end: until then.",
-        runs={name: r for r, name in enumerate(runs)},
-    )  # fmt: skip
+    efforts = "Forces" if torque_unit(data) == "N" else "Torques"
+    note = f"{efforts}: peak and, below it, RMS. Strain energy: peak. Imbalance: largest, of energy and work."
+    if failed or not bool((data["status"] == "complete").all()):
+        note += " Of a mode that did not get to its end: until then."
+    selects = {name: r for r, name in enumerate(runs)}
+    return table(heads, rows, caption="What every mode came to", note=note, runs=selects)
 
 
 def largest(values: NDArray[np.float64]) -> float:
@@ -124,8 +120,8 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
                      choosing="motor"),
             compared("condition", "Distance from singular positions", "condition number", "1",
                      data["actuation_condition"].values, runs, log=True,
-                     note="Condition number of the matrix from motor torques to forces along the path: it grows without "
-                          "bound where the active motors lose control of a direction."),
+                     note="Condition number of the matrix from motor torques to forces along the path: it grows "
+                          "without bound where the active motors lose control of a direction."),
         ]),
     ]  # fmt: skip
     links = [
@@ -154,7 +150,7 @@ def energies(data: xr.Dataset, runs: list[str]) -> Chart:
     names = {"kinetic_energy": "kinetic", "strain_energy": "strain", "work": "work done on it"}
     values = np.stack([data[name].values.reshape(len(runs), -1) for name in names], axis=-1)
     curves = [
-        Curve(name, values[r, :, k], run=r, shown=(r,), **look(k))
+        Curve(name, values[r, :, k], run=r, shown=(r,), look=look(k))
         for r in range(len(runs))
         for k, name in enumerate(names.values())
     ]
@@ -171,10 +167,10 @@ def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
     angle, rate = data["angle"].values, data["angular_velocity"].values
     way, pace = data["angle_desired"].values[0], data["angular_velocity_desired"].values[0]
     curves = []
-    for b, body in enumerate(bodies):
-        curves.append(Curve("desired", pace[:, b], way[:, b], dash=2, choice=b))
+    for b in range(len(bodies)):
+        curves.append(Curve("desired", pace[:, b], way[:, b], Look(dash=DOTTED), choice=b))
         curves += [
-            Curve(run, rate[r, :, b], angle[r, :, b], run=r, shown=(r,), choice=b, colour=look(b)["colour"])
+            Curve(run, rate[r, :, b], angle[r, :, b], run=r, shown=(r,), choice=b, look=Look(look(b).colour))
             for r, run in enumerate(runs)
         ]
     return Chart(
@@ -232,8 +228,6 @@ def _model(run: Mapping[str, object]) -> str:
     if run.get("segments"):
         return f"{run['segments']} finite segments on the longest link"
     return f"{run.get('geometry', 'linear')} geometry"
-
-
 
 
 def _rms(values: NDArray[np.float64]) -> float:

@@ -46,7 +46,7 @@ class _Runs:
         """Curves of values (modes, models, samples): all models of the selected run's mode."""
         return [
             Curve(printed(model), factor * values[m, k], run=self.of_mode(m)[k], shown=self.of_mode(m), choice=choice,
-                  **look(k))
+                  look=look(k))
             for m in range(len(self.modes))
             for k, model in enumerate(self.models)
         ]  # fmt: skip
@@ -66,14 +66,13 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
     reference = str(data.attrs["reference"])
     moving = film(data, ("mode", "model"))
     few = data.isel(time=thinned(data.sizes["time"]))
-    tables = []
+    tables = [(f"Models, mode {name}", _models(mode, reference, runs, name)) for name, mode in figures["modes"].items()]
+    more = []
     for name, mode in figures["modes"].items():
-        of = f", mode {name}"
-        tables += [
-            (f"Models{of}", _models(mode, reference, runs, name)),
-            (f"Largest distance between paths{of}", _distances(mode)),
+        more += [
+            (f"Largest distance between the paths of two models, mode {name}", _distances(mode)),
+            (f"Difference from {printed(reference)}, mode {name}", _differences(mode, figures["links"], reference)),
         ]
-        tables += [(f"Difference from {printed(reference)}{of}", _differences(mode, figures["links"], reference))]
     facts = [(name, value) for name, value in common_facts(data) if name != "integration"]
     return Page(
         title=data.attrs["mechanism"],
@@ -84,6 +83,7 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
         command=verify_command_line(asked_for, data, _ENGINES),
         figures=_tiles(figures, reference),
         tables=tables,
+        more=more,
         panels=_panels(few, runs, reference),
         time=few["time"].values,
         runs=runs.names,
@@ -222,12 +222,10 @@ def _paths(data: xr.Dataset, runs: _Runs) -> Chart:
     curves = [Curve("desired", desired[:, 1], desired[:, 0])]
     for m in range(len(runs.modes)):
         for k, model in enumerate(runs.models):
-            own = {"run": runs.of_mode(m)[k], "shown": runs.of_mode(m)}
-            curves.append(Curve(printed(model), drawn[m, k, :, 1], drawn[m, k, :, 0], **look(k), **own))
+            x, y = drawn[m, k].T
+            curves.append(Curve(printed(model), y, x, look(k), run=runs.of_mode(m)[k], shown=runs.of_mode(m)))
     note = f"Deviations from the desired path are magnified {times:g} times." if times > 1.0 else ""
-    return Chart(
-        "path", "End-effector paths", "y [mm]", curves, x="x [mm]", equal=True, over_time=False, note=note
-    )
+    return Chart("path", "End-effector paths", "y [mm]", curves, x="x [mm]", equal=True, over_time=False, note=note)
 
 
 def _tiles(figures: Mapping[str, Any], reference: str) -> list[tuple[str, str, str]]:

@@ -23,11 +23,11 @@ const charts = (() => {
         x: report.row(curve.x), y: report.row(curve.y),
         line: {
           color: lineColour(curve), dash: DASHES[curve.dash], width: chosen ? 2.8 : beside ? 1.4 : 1.7,
-          simplify: true,
+          simplify: false,
         },
         opacity: beside && !chosen ? 0.8 : 1,
         visible: chart.hidden.has(curve.name) ? "legendonly" : true,
-        hovertemplate: "%{y:.4~g}<extra>%{fullData.name}</extra>",
+        ...(curve.quiet ? { hoverinfo: "skip" } : { hovertemplate: "%{y:.4~g}<extra>%{fullData.name}</extra>" }),
       };
     });
   }
@@ -155,11 +155,10 @@ const charts = (() => {
     });
   }
 
+  // Charts in view now, others when they come into view.
   function refresh() {
-    for (const chart of all) {
-      chart.stale = true;
-      if (chart.inView && window.Plotly) draw(chart);
-    }
+    for (const chart of all) chart.stale = true;
+    return window.Plotly && Promise.all(all.filter((chart) => chart.inView).map(draw));
   }
 
   function make(described) {

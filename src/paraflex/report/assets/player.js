@@ -96,7 +96,7 @@ const player = (() => {
     pen.setLineDash([]); pen.globalAlpha = 1;
   }
 
-  function drawTrail(before, share, tip) {
+  function drawTrail(before, tip) {
     if (!arrays.tip || !byId("trail").checked) return;
     const start = state.run * arrays.tip.frames * 2;
     const points = arrays.tip.values.subarray(start, start + 2 * (before + 1));
@@ -169,8 +169,8 @@ const player = (() => {
   function drawCaption(stopped) {
     pen.font = `13px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "top"; pen.fillStyle = colours.soft;
     const run = told.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
-    const by = state.magnify === 1 ? "true deflections" : `deflections × ${state.magnify}`;
-    pen.fillText(`${run}t = ${secondsText(state.time)}   ${by}`, 12, 8);
+    const by = state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
+    pen.fillText(`${run}t = ${secondsText(state.time)}${by}`, 12, 8);
     if (stopped !== null) { pen.fillStyle = colours.mark; pen.fillText(`this run ended at ${secondsText(stopped)}`, 12, 27); }
   }
 
@@ -191,7 +191,6 @@ const player = (() => {
       const directions = at(arrays.directions, state.run, before, share);
       const drawn = base.map((value, k) => value + state.magnify * bend[k]);
       const tip = arrays.tip ? at(arrays.tip, state.run, before, share) : null;
-      if (tip) drawTrail(before, share, tip);
       pen.lineCap = pen.lineJoin = "round";
       if (arrays.springs) {
         const springs = at(arrays.springs, state.run, before, share);
@@ -207,6 +206,8 @@ const player = (() => {
         pen.strokeStyle = colours.card; pen.lineWidth = 7; line(drawn, from, to);
         pen.strokeStyle = colours.bodies[k % colours.bodies.length]; pen.lineWidth = 3.6; line(drawn, from, to);
       });
+      // Over the links: they often lie along it.
+      if (tip) drawTrail(before, tip);
       drawJoints(joints, directions);
       if (tip && Number.isFinite(tip[0])) {
         pen.fillStyle = colours.mark; pen.strokeStyle = colours.card; pen.lineWidth = 1.5;
@@ -306,11 +307,10 @@ const player = (() => {
     showTime();
     if (!film) {
       byId("no-film").hidden = !byId("no-film").textContent;
-      for (const name of ["tools"]) byId(name).hidden = true;
-      canvas.hidden = true;
-      canvas.style.display = byId("tools").style.display = "none";
+      for (const name of ["tools", "canvas", "key-magnify"]) byId(name).hidden = true;
       return;
     }
+    byId("has-trail").hidden = !film.tip;
     const names = ["base", "bend", "joints", "directions", "springs", "tip", "path"];
     const read = await Promise.all(names.map((name) => (film[name] ? report.unpacked(film[name]) : null)));
     arrays = Object.fromEntries(names.map((name, k) => [name, read[k]]));

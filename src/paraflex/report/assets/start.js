@@ -24,7 +24,7 @@ const begin = (() => {
 
   function makeSelector() {
     const holder = byId("runs");
-    if (told.runs.length < 2) { holder.hidden = true; holder.style.display = "none"; return; }
+    if (told.runs.length < 2) { holder.hidden = byId("key-run").hidden = true; return; }
     holder.querySelector("legend").textContent = told.selecting;
     if (told.runs.length > MOST_BUTTONS) {
       const select = element("select", { id: "run", "aria-label": told.selecting });
@@ -92,7 +92,6 @@ const begin = (() => {
     const script = element("script");
     script.textContent = byId("plotly").textContent;
     document.head.append(script);
-    document.documentElement.dataset.charts = "true";
   }
 
   async function open() {
@@ -107,11 +106,14 @@ const begin = (() => {
     charts.start();
     await player.start();
     document.documentElement.dataset.ready = "true";
+    performance.mark("ready");
     if (!told.panels.length) return;
     // After the screen shows what there is.
     await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0)));
     loadPlotly();
-    charts.refresh();
+    await charts.refresh();
+    document.documentElement.dataset.charts = "true";
+    performance.mark("charts");
   }
 
   return () => open().catch((error) => {
