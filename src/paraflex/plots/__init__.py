@@ -1,6 +1,7 @@
 """Figures of a tracking study, each a function from its dataset to a Matplotlib figure; their files."""
 
 from paraflex.plots.agreement import compared_links, compared_paths, model_distances
+from paraflex.plots.drawing import mechanism_drawing
 from paraflex.plots.elasticities import elasticities
 from paraflex.plots.modes import motor_torques, tracking_errors
 from paraflex.plots.numerical_damping import numerical_damping
@@ -28,6 +29,7 @@ __all__ = [
     "end_effector_motion",
     "end_effector_path",
     "link_motions",
+    "mechanism_drawing",
     "model_distances",
     "motion_overview",
     "motor_torques",
