@@ -55,6 +55,7 @@ ClusterOption = Annotated[
         "--cluster", metavar="ADDRESS", help="Of a Dask scheduler, tcp://host:8786. Default: one on this machine."
     ),
 ]
+ReportOption = Annotated[bool, typer.Option("--report/--no-report", help="Write report.html, or leave it out.")]
 Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
 
 
@@ -130,11 +131,12 @@ def run(
         bool, typer.Option("--balanced", help="Start from static equilibrium, active motors held; else undeformed.")
     ] = False,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder for results and figures.")] = "results",
+    report: ReportOption = True,
     json: Json = False,
 ) -> None:
     """Simulate a path in several actuation modes, or a model without a path on its own.
 
-    Writes summary.json, results.nc and figures/.
+    Writes report.html, summary.json, results.nc and figures/.
     """
     from paraflex.cli.integration import IntegrationRequest
     from paraflex.cli.run import RunRequest, run_command
@@ -166,6 +168,7 @@ def run(
         segments=segments,
         ked=ked,
         balanced=balanced,
+        report=report,
     )
     raise typer.Exit(run_command(request))
 
@@ -195,9 +198,13 @@ def verify(
     samples: SamplesOption = None,
     assembly: AssemblyOption = None,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder for numbers and figures.")] = "verification",
+    report: ReportOption = True,
     json: Json = False,
 ) -> None:
-    """Run a mechanism at every fidelity and in other engines; write verify.json, verify.nc and figures/."""
+    """Run a mechanism at every fidelity and in other engines.
+
+    Writes report.html, verify.json, verify.nc and figures/.
+    """
     from paraflex.cli.verify import VerifyRequest, verify_command
 
     request = VerifyRequest(
@@ -214,8 +221,25 @@ def verify(
         fidelities=model or [],
         segments=segments,
         method=method,
+        report=report,
     )
     raise typer.Exit(verify_command(request))
+
+
+@app.command()
+def report(
+    results: Annotated[
+        str, typer.Argument(metavar="RESULTS", help="A folder that run or verify wrote, or the .nc file in it.")
+    ],
+    output: Annotated[
+        str | None, typer.Option("--output", metavar="FILE", help="Default: report.html beside the results.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
+) -> None:
+    """Write the report of results that are there: one HTML file that needs no network."""
+    from paraflex.cli.report import report_command
+
+    report_command(results, output, force=force)
 
 
 @app.command("compare-methods")

@@ -11,7 +11,16 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, StudyRequest, at_fault, results_folder, write_json
+from paraflex.cli.request import (
+    COMPLETE,
+    INTERRUPTED,
+    TROUBLE,
+    StudyRequest,
+    at_fault,
+    report_too,
+    results_folder,
+    write_json,
+)
 from paraflex.cli.tables import FINISHED, plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, consistent_state, start_state, static_equilibrium
@@ -58,12 +67,12 @@ def run_motion(
     }
     data = motion_dataset(run, options=options, parameters=parameters)
     figures = motion_summary(data)
-    _write(data, figures, folder)
+    _write(data, figures, folder, report=request.report)
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
         _report(figures, data)
-        console.print(f"{time.perf_counter() - began:.1f} s; results and figures in {folder}")
+        console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
     if run.solution.status in FINISHED:
         return COMPLETE
     console.print(f"error: {run.solution.message}", soft_wrap=True)
@@ -157,10 +166,14 @@ def _report(figures: dict, data: xr.Dataset) -> None:
     )
 
 
-def _write(data: xr.Dataset, figures: dict, folder: Path) -> None:
+def _write(data: xr.Dataset, figures: dict, folder: Path, *, report: bool) -> None:
     from paraflex.plots import save_overview
 
     folder.mkdir(parents=True, exist_ok=True)
     save_results(data, folder / "results.nc")
     write_json(figures, folder / "summary.json")
     save_overview(data, folder / "figures")
+    if report:
+        from paraflex.report import motion_page, save_page
+
+        save_page(motion_page(data), folder / "report.html")

@@ -29,6 +29,7 @@ class StudyRequest:
     out: str
     json: bool
     balanced: bool = field(default=False, kw_only=True)
+    report: bool = field(default=True, kw_only=True)
 
 
 def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
@@ -111,6 +112,11 @@ def results_folder(out: str) -> Path:
             if parent.is_dir() and not any(parent.iterdir()):
                 parent.rmdir()
     return folder
+
+
+def report_too(request: StudyRequest) -> str:
+    """How the last line of a command goes on where it has written a report."""
+    return " and report.html" if request.report else ""
 
 
 def study_folder(study: str, output: str | None) -> Path:

@@ -21,6 +21,7 @@ from paraflex.cli.request import (
     find_modes,
     find_path,
     plan_study,
+    report_too,
     results_folder,
     write_json,
 )
@@ -80,14 +81,14 @@ def run_command(request: RunRequest) -> int:
     if result.data is None:
         failures(console, result)
         return INTERRUPTED if result.interrupted else TROUBLE
-    _write(result, folder)
+    _write(result, folder, report=request.report)
     figures = summary(result.data, result.failed)
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
         plain_console().print(study_table(figures, task, _model_name(request, mechanism)))
         events(plain_console(), figures)
-        console.print(f"{time.perf_counter() - began:.1f} s; results and figures in {folder}")
+        console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
     failures(console, result)
     if result.interrupted:
         return INTERRUPTED
@@ -211,7 +212,7 @@ def _simulate(
         return run_study(task, modes, options=options, parameters=parameters, on_progress=report, method=method)
 
 
-def _write(result: StudyResult, folder: Path) -> None:
+def _write(result: StudyResult, folder: Path, *, report: bool) -> None:
     from paraflex.plots import save_figures
 
     assert result.data is not None
@@ -219,3 +220,7 @@ def _write(result: StudyResult, folder: Path) -> None:
     save_results(result.data, folder / "results.nc")
     write_json(summary(result.data, result.failed), folder / "summary.json")
     save_figures(result.data, folder / "figures")
+    if report:
+        from paraflex.report import save_page, tracking_page
+
+        save_page(tracking_page(result.data, result.failed), folder / "report.html")

@@ -19,6 +19,7 @@ from paraflex.cli.request import (
     find_modes,
     find_path,
     plan_study,
+    report_too,
     results_folder,
     write_json,
 )
@@ -70,14 +71,14 @@ def verify_command(request: VerifyRequest) -> int:
     }
     figures = agreement(verification) | {"parameters": parameters}
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
-        _write(verification, figures, parameters, folder)
+        _write(verification, figures, parameters, folder, report=request.report)
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
         out = plain_console()
         for mode in figures["modes"]:
             print_agreement(out, figures, mode)
-        console.print(f"{time.perf_counter() - began:.1f} s; numbers and figures in {folder}")
+        console.print(f"{time.perf_counter() - began:.1f} s; numbers, figures{report_too(request)} in {folder}")
     for mode, by_model in verification.runs.items():
         for name, runs in by_model.items():
             if runs.failure:
@@ -125,7 +126,7 @@ def _run(
         return verify(task, modes, models=models, options=options, on_progress=report)
 
 
-def _write(verification: Verification, figures: dict, parameters: dict, folder: Path) -> None:
+def _write(verification: Verification, figures: dict, parameters: dict, folder: Path, *, report: bool) -> None:
     from paraflex.plots import save_agreement_figures
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -133,3 +134,7 @@ def _write(verification: Verification, figures: dict, parameters: dict, folder: 
     data = verification.dataset(parameters=parameters)
     save_results(data, folder / "verify.nc")
     save_agreement_figures(data, folder / "figures")
+    if report:
+        from paraflex.report import save_page, verification_page
+
+        save_page(verification_page(data, figures), folder / "report.html")

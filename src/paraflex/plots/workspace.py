@@ -80,7 +80,7 @@ def deviated_paths(
     desired = 1e3 * first["end_effector_desired"].transpose("time", "axis").values
     deviations = [1e3 * run["end_effector"].transpose("time", "axis").values - desired for run in runs.values()]
     if magnification is None:
-        magnification = _round_magnification(np.concatenate(deviations), float(np.ptp(desired, axis=0).max()))
+        magnification = round_magnification(np.concatenate(deviations), float(np.ptp(desired, axis=0).max()))
     elif not (math.isfinite(magnification) and magnification > 0.0):
         raise InputError(
             "not a magnification", field="magnification", value=magnification, remedy="give a positive number"
@@ -95,7 +95,7 @@ def deviated_paths(
     return finish_workspace(figure, axes)
 
 
-def _round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
+def round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
     """Largest of 1, 2, 5, 10, ... at which the deviation [mm] stays small beside a path of this extent [mm]."""
     lengths = np.linalg.norm(deviation, axis=1)
     largest = peak(lengths)

@@ -1,0 +1,55 @@
+"""`paraflex report`: the report of results that are there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from paraflex.cli.tables import plain_console
+from paraflex.errors import InputError
+from paraflex.report import Page, motion_page, save_page, tracking_page, verification_page
+from paraflex.results.storage import open_results, results_file
+
+
+def report_command(results: str, output: str | None, *, force: bool) -> None:
+    """Write a report.
+
+    Raises
+    ------
+    InputError
+        No results of ours, or a file that would be written over.
+    """
+    file = results_file(results)
+    target = file.with_name("report.html") if output is None else Path(output)
+    if target.is_dir():
+        target = target / "report.html"
+    if target.exists() and not force:
+        raise InputError("is there already", field=str(target), remedy="say --force to write over it, or --output FILE")
+    save_page(page_of(open_results(file), file.parent), target)
+    plain_console(stderr=True).print(f"report in {target}", soft_wrap=True)
+
+
+def page_of(data: xr.Dataset, folder: Path) -> Page:
+    """The report of a dataset and of what stands in its folder."""
+    if "model" in data.dims:
+        return verification_page(data, _beside(folder / "verify.json"))
+    if data.attrs.get("kind") == "motion":
+        return motion_page(data)
+    summary = folder / "summary.json"
+    modes = _beside(summary)["modes"] if summary.is_file() else {}
+    # Modes that could not start are in the summary only.
+    failed = {name: mode.get("message", "") for name, mode in modes.items() if name not in data["mode"].values}
+    return tracking_page(data, failed)
+
+
+def _beside(file: Path) -> dict[str, Any]:
+    try:
+        figures = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError("cannot be read", field=str(file), remedy="run the command again") from error
+    if not isinstance(figures.get("modes") if isinstance(figures, dict) else None, dict):
+        raise InputError("is not ours", field=str(file), remedy="run the command again")
+    return figures

@@ -1,0 +1,206 @@
+// Charts: drawn by Plotly when they come into view, again when what they show changes.
+const charts = (() => {
+  const { told, state, element } = report;
+  const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
+  const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
+  const all = [];
+
+  // Plotly reads tags in text; names are not to be read so.
+  const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+  const lineColour = (curve) => (curve.colour === null ? report.colour("text") : report.palette()[curve.colour]);
+  const isShown = (chart, curve) =>
+    (curve.shown === null || curve.shown.includes(state.run)) && (curve.choice === null || curve.choice === chart.choice);
+
+  function traces(chart) {
+    const own = chart.told.figure;
+    if (own) return own.data;
+    const shown = chart.told.curves.filter((curve) => isShown(chart, curve));
+    const beside = new Set(shown.filter((curve) => curve.run !== null).map((curve) => curve.run)).size > 1;
+    return shown.map((curve) => {
+      const chosen = beside && curve.run === state.run;
+      return {
+        type: "scatter", mode: "lines", name: plain(curve.name),
+        x: report.row(curve.x), y: report.row(curve.y),
+        line: {
+          color: lineColour(curve), dash: DASHES[curve.dash], width: chosen ? 2.8 : beside ? 1.4 : 1.7,
+          simplify: false,
+        },
+        opacity: beside && !chosen ? 0.8 : 1,
+        visible: chart.hidden.has(curve.name) ? "legendonly" : true,
+        ...(curve.quiet ? { hoverinfo: "skip" } : { hovertemplate: "%{y:.4~g}<extra>%{fullData.name}</extra>" }),
+      };
+    });
+  }
+
+  function axis(title, more) {
+    return {
+      title: { text: plain(title), standoff: 8, font: { size: 12.5 } }, gridcolor: report.colour("grid"),
+      linecolor: report.colour("line"), zeroline: false, showline: true, ticks: "outside", ticklen: 4,
+      tickcolor: report.colour("line"), exponentformat: "power", ...more,
+    };
+  }
+
+  // What is far below the largest value is no more than rounding, or the start at rest.
+  const MOST_DECADES = 5;
+  function decades(chart) {
+    let low = Infinity, high = 0;
+    for (const curve of chart.told.curves) {
+      if (!isShown(chart, curve)) continue;
+      for (const value of report.row(curve.y)) {
+        if (value > 0 && value < low) low = value;
+        if (value > high && value < Infinity) high = value;
+      }
+    }
+    if (!(high > 0)) return undefined;
+    const top = Math.log10(high), bottom = Math.max(Math.log10(low), top - MOST_DECADES);
+    const room = 0.06 * Math.max(top - bottom, 0.3);
+    return [bottom - room, top + room];
+  }
+
+  function layout(chart) {
+    const { log, equal, over_time: overTime, figure } = chart.told;
+    const common = {
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false,
+      font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: report.colour("text") },
+      margin: { l: 62, r: 14, t: 10, b: 44 }, colorway: report.palette(),
+      hoverlabel: { bgcolor: report.colour("card"), bordercolor: report.colour("line"), font: { color: report.colour("text") } },
+      modebar: { color: report.colour("soft"), activecolor: report.colour("accent"), bgcolor: "rgba(0,0,0,0)" },
+      // What the reader zoomed to stays while other runs are looked at.
+      uirevision: `${chart.choice}`,
+    };
+    if (figure) return { ...common, xaxis: axis(chart.told.x), yaxis: axis(chart.told.y), ...figure.layout };
+    return {
+      ...common,
+      hovermode: overTime ? "x unified" : "closest",
+      xaxis: axis(chart.told.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : {}),
+      yaxis: axis(chart.told.y, { ...(log ? { type: "log", range: decades(chart), dtick: 1, tickformat: "~g" } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
+    };
+  }
+
+  const config = {
+    displaylogo: false, responsive: true,
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "zoomIn2d", "zoomOut2d", "pan2d"],
+  };
+
+  async function draw(chart) {
+    chart.stale = false;
+    const first = !chart.drawn;
+    chart.drawn = true;
+    await Plotly.react(chart.plot, traces(chart), layout(chart), { ...config, toImageButtonOptions: { filename: chart.told.identity, format: "svg" } });
+    if (first) {
+      chart.plot.on("plotly_afterplot", () => moveCursor(chart));
+      if (chart.told.over_time && !chart.told.figure) chart.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
+    }
+    drawLegend(chart);
+    moveCursor(chart);
+  }
+
+  function sample(curve, mixed) {
+    const stroke = mixed ? report.colour("text") : lineColour(curve);
+    const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    svg.setAttribute("width", "26"); svg.setAttribute("height", "10"); svg.setAttribute("aria-hidden", "true");
+    const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
+    for (const [name, value] of Object.entries({ x1: 0, x2: 26, y1: 5, y2: 5, stroke, "stroke-width": 2, "stroke-dasharray": SAMPLES[curve.dash] })) line.setAttribute(name, value);
+    svg.append(line);
+    return svg;
+  }
+
+  function drawLegend(chart) {
+    const byName = new Map();
+    for (const curve of chart.told.curves) {
+      if (isShown(chart, curve)) byName.set(curve.name, [...(byName.get(curve.name) || []), curve]);
+    }
+    chart.legend.replaceChildren();
+    if (byName.size < 2) return;
+    for (const [name, curves] of byName) {
+      const button = element("button", { type: "button", "aria-pressed": String(!chart.hidden.has(name)), title: "show or hide" });
+      button.append(sample(curves[0], curves.some((curve) => curve.colour !== curves[0].colour)), name);
+      button.addEventListener("click", () => {
+        if (!chart.hidden.delete(name)) chart.hidden.add(name);
+        button.setAttribute("aria-pressed", String(!chart.hidden.has(name)));
+        Plotly.restyle(chart.plot, { visible: traces(chart).map((trace) => trace.visible) });
+      });
+      chart.legend.append(button);
+    }
+  }
+
+  // A line at the time over time; else a dot on every curve of the selected run.
+  function moveCursor(chart) {
+    const drawn = chart.plot._fullLayout;
+    if (!chart.drawn || chart.told.figure || !drawn || !drawn.xaxis || !drawn.xaxis._length) return;
+    const { xaxis, yaxis } = drawn;
+    const inside = (x, y) => x >= -1 && x <= xaxis._length + 1 && y >= -1 && y <= yaxis._length + 1;
+    const put = (mark, x, y) => {
+      const shows = Number.isFinite(x) && Number.isFinite(y) && inside(x, y);
+      mark.style.visibility = shows ? "visible" : "hidden";
+      if (shows) mark.style.transform = `translate(${xaxis._offset + x}px, ${yaxis._offset + y}px)`;
+    };
+    if (chart.told.over_time) {
+      chart.cursor.style.height = `${yaxis._length}px`;
+      put(chart.cursor, xaxis.d2p(state.time), 0);
+      return;
+    }
+    const curves = chart.told.curves.filter(
+      (curve) => curve.run === state.run && isShown(chart, curve) && !chart.hidden.has(curve.name));
+    while (chart.dots.length < curves.length) {
+      chart.dots.push(element("div", { class: "dot" }));
+      chart.plot.parentElement.append(chart.dots.at(-1));
+    }
+    const [before, share] = report.between(report.row(told.time), state.time);
+    chart.dots.forEach((dot, k) => {
+      if (k >= curves.length) { dot.style.visibility = "hidden"; return; }
+      const at = (row) => row[before] + (share ? share * (row[before + 1] - row[before]) : 0);
+      dot.style.background = lineColour(curves[k]);
+      put(dot, xaxis.d2p(at(report.row(curves[k].x))), yaxis.d2p(at(report.row(curves[k].y))));
+    });
+  }
+
+  // Charts in view now, others when they come into view.
+  function refresh() {
+    for (const chart of all) chart.stale = true;
+    return window.Plotly && Promise.all(all.filter((chart) => chart.inView).map(draw));
+  }
+
+  function make(described) {
+    const plot = element("div", { style: "width:100%;height:100%" });
+    const kind = described.figure ? " own" : described.equal ? " square" : "";
+    const holder = element("div", { class: `plot${kind}`, role: "img", "aria-label": `${described.title}: ${described.y} over ${described.x}` }, plot);
+    const chart = { told: described, plot, choice: 0, hidden: new Set(), dots: [], drawn: false, stale: true, inView: false };
+    const header = element("header", {}, element("h3", {}, described.title));
+    if (described.choices.length) {
+      const select = element("select", { "aria-label": `${described.title}: ${described.choosing}` });
+      described.choices.forEach((name, k) => select.append(new Option(name, k)));
+      select.addEventListener("change", () => { chart.choice = Number(select.value); draw(chart); });
+      header.append(select);
+    }
+    chart.cursor = element("div", { class: "cursor" });
+    holder.append(chart.cursor);
+    chart.legend = element("div", { class: "legend", role: "group", "aria-label": `Curves of ${described.title}` });
+    const note = described.note ? [element("figcaption", { class: "note" }, described.note)] : [];
+    chart.figure = element("figure", { class: "card chart", id: `chart-${described.identity}` }, header, holder, chart.legend, ...note);
+    all.push(chart);
+    return chart.figure;
+  }
+
+  function start() {
+    const holder = document.getElementById("panels");
+    for (const panel of told.panels) {
+      holder.append(element("h2", {}, panel.title), element("div", { class: "charts" }, ...panel.charts.map(make)));
+    }
+    const byFigure = new Map(all.map((chart) => [chart.figure, chart]));
+    const watch = new IntersectionObserver((entries) => {
+      for (const entry of entries) {
+        const chart = byFigure.get(entry.target);
+        chart.inView = entry.isIntersecting;
+        if (chart.inView && chart.stale && window.Plotly) draw(chart);
+      }
+    }, { rootMargin: "150px" });
+    for (const chart of all) watch.observe(chart.figure);
+    report.on("run", refresh);
+    report.on("theme", refresh);
+    report.on("time", () => { for (const chart of all) if (chart.inView) moveCursor(chart); });
+    addEventListener("beforeprint", () => { for (const chart of all) if (chart.stale && window.Plotly) draw(chart); });
+  }
+
+  return { start, refresh, all };
+})();

@@ -1,0 +1,321 @@
+// The animation: bodies at base + m (shape - base), joints, path and trail on a canvas.
+const player = (() => {
+  const { told, state, element } = report;
+  const MAGNIFICATIONS = [1, 2, 5, 10, 20, 50, 100, 200];
+  const LARGEST = MAGNIFICATIONS.at(-1);
+  const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5];
+  const byId = (name) => document.getElementById(name);
+  const canvas = byId("canvas"), pen = canvas.getContext("2d");
+  const { film } = told;
+  let arrays = null, times = [0], speed = 1, last = 0, width = 0, height = 0, place = null, colours = {}, waiting = false;
+
+  const end = () => times[times.length - 1];
+  const secondsText = (time) => `${time.toFixed(end() < 20 ? 3 : 2)} s`;
+
+  function seek(time) {
+    report.set("time", Math.min(Math.max(Number(time), times[0]), end()));
+  }
+
+  function play(on) {
+    if (on && state.time >= end()) seek(times[0]);
+    report.set("playing", on);
+    if (on) { last = performance.now(); requestAnimationFrame(tick); }
+  }
+
+  function tick(now) {
+    if (!state.playing) return;
+    let time = state.time + speed * Math.min(now - last, 100) / 1000;
+    last = now;
+    if (time > end()) time = times[0];
+    seek(time);
+    requestAnimationFrame(tick);
+  }
+
+  function step(frames) {
+    play(false);
+    const [before, share] = report.between(times, state.time);
+    const now = before + share;
+    const next = frames > 0 ? Math.floor(now + 1e-6) + frames : Math.ceil(now - 1e-6) + frames;
+    seek(times[Math.min(Math.max(next, 0), times.length - 1)]);
+  }
+
+  function magnify(by) {
+    const next = by > 0 ? MAGNIFICATIONS.find((m) => m > state.magnify * 1.001) : MAGNIFICATIONS.findLast((m) => m < state.magnify * 0.999);
+    if (next) report.set("magnify", next);
+  }
+
+  // The screen: metres to pixels, the same scale both ways, y upwards.
+  function fit() {
+    const ratio = devicePixelRatio || 1;
+    const tall = (film.view[3] - film.view[1]) / Math.max(film.view[2] - film.view[0], 1e-9);
+    canvas.style.height = `${Math.round(Math.min(Math.max(tall * canvas.clientWidth + 60, 240), 620))}px`;
+    width = canvas.clientWidth; height = canvas.clientHeight;
+    canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const [x0, y0, x1, y1] = film.view;
+    const edge = Math.min(34, 0.08 * width);
+    const scale = Math.min((width - 2 * edge) / Math.max(x1 - x0, 1e-9), (height - 2 * edge - 26) / Math.max(y1 - y0, 1e-9));
+    place = { scale, x: width / 2 - scale * (x0 + x1) / 2, y: (height - 26) / 2 + 18 + scale * (y0 + y1) / 2 };
+  }
+  const px = (x) => place.x + place.scale * x;
+  const py = (y) => place.y - place.scale * y;
+
+  // Values of an array (runs, frames, wide) at a time: between frames, as motion is.
+  function at(array, run, before, share) {
+    const start = (run * array.frames + before) * array.wide;
+    const out = array.values.slice(start, start + array.wide);
+    if (share > 0) for (let k = 0; k < out.length; k++) out[k] += share * (array.values[start + array.wide + k] - out[k]);
+    return out;
+  }
+
+  // The last frame a run got to.
+  function reached(array, run) {
+    for (let frame = array.frames - 1; frame >= 0; frame--) {
+      const start = (run * array.frames + frame) * array.wide;
+      for (let k = 0; k < array.wide; k++) if (Number.isFinite(array.values[start + k])) return frame;
+    }
+    return -1;
+  }
+
+  function line(points, from, to) {
+    pen.beginPath();
+    let begun = false;
+    for (let k = from; k < to; k++) {
+      const x = points[2 * k], y = points[2 * k + 1];
+      if (!Number.isFinite(x) || !Number.isFinite(y)) { begun = false; continue; }
+      if (begun) pen.lineTo(px(x), py(y)); else pen.moveTo(px(x), py(y));
+      begun = true;
+    }
+    pen.stroke();
+  }
+
+  function drawPath() {
+    if (!arrays.path) return;
+    pen.setLineDash([6, 5]); pen.lineWidth = 1.4; pen.strokeStyle = colours.text; pen.globalAlpha = 0.75;
+    line(arrays.path.values, 0, arrays.path.values.length / 2);
+    pen.setLineDash([]); pen.globalAlpha = 1;
+  }
+
+  function drawTrail(before, tip) {
+    if (!arrays.tip || !byId("trail").checked) return;
+    const start = state.run * arrays.tip.frames * 2;
+    const points = arrays.tip.values.subarray(start, start + 2 * (before + 1));
+    pen.lineWidth = 2; pen.strokeStyle = colours.mark; pen.lineJoin = "round";
+    line([...points, ...tip], 0, before + 2);
+  }
+
+  function drawGround(x, y) {
+    const size = 13;
+    pen.strokeStyle = colours.soft; pen.lineWidth = 1.4;
+    pen.beginPath();
+    pen.moveTo(x, y); pen.lineTo(x - size * 0.75, y + size); pen.lineTo(x + size * 0.75, y + size); pen.closePath();
+    pen.fillStyle = colours.card; pen.fill(); pen.stroke();
+    pen.beginPath();
+    pen.moveTo(x - size * 1.15, y + size); pen.lineTo(x + size * 1.15, y + size);
+    for (let k = -3; k <= 2; k++) { pen.moveTo(x + k * 5 + 4, y + size); pen.lineTo(x + k * 5 - 1, y + size + 5); }
+    pen.stroke();
+  }
+
+  function drawJoints(joints, directions) {
+    // The direction of a joint is told as a unit vector, NaN where it has none.
+    const along = (k) => Math.atan2(directions[2 * k + 1], directions[2 * k]);
+    film.jointKinds.forEach((kind, k) => {
+      const x = px(joints[2 * k]), y = py(joints[2 * k + 1]), direction = along(k);
+      if (!Number.isFinite(x)) return;
+      if (Number.isFinite(direction)) drawRail(x, y, direction, film.grounded[k] ? 2 * Math.max(width, height) : 26);
+      else if (film.grounded[k]) drawGround(x, y);
+    });
+    film.jointKinds.forEach((kind, k) => {
+      const x = px(joints[2 * k]), y = py(joints[2 * k + 1]), direction = along(k);
+      if (!Number.isFinite(x)) return;
+      pen.lineWidth = 1.8; pen.strokeStyle = colours.text; pen.fillStyle = colours.card;
+      pen.save();
+      pen.translate(x, y);
+      pen.beginPath();
+      if (Number.isFinite(direction)) { pen.rotate(-direction); pen.rect(-10, -6, 20, 12); }
+      else if (kind === "weld") pen.rect(-3.5, -3.5, 7, 7);
+      else pen.arc(0, 0, 4.2, 0, 2 * Math.PI);
+      pen.fill(); pen.stroke();
+      pen.restore();
+    });
+  }
+
+  function drawNames(drawn, joints) {
+    pen.font = `600 11.5px ${getComputedStyle(document.body).fontFamily}`;
+    pen.textBaseline = "middle"; pen.lineJoin = "round"; pen.lineWidth = 4; pen.strokeStyle = colours.card;
+    const write = (text, x, y, colour) => {
+      pen.strokeText(text, x, y); pen.fillStyle = colour; pen.fillText(text, x, y);
+    };
+    film.bodies.forEach(([name, from, to], k) => {
+      const middle = (from + to - 1) / 2, a = Math.floor(middle), b = Math.ceil(middle);
+      write(name, px((drawn[2 * a] + drawn[2 * b]) / 2) + 7, py((drawn[2 * a + 1] + drawn[2 * b + 1]) / 2), colours.bodies[k % colours.bodies.length]);
+    });
+    film.jointNames.forEach((name, k) => write(name, px(joints[2 * k]) + 8, py(joints[2 * k + 1]) - 9, colours.soft));
+  }
+
+  function drawScale() {
+    const target = 110 / place.scale, power = 10 ** Math.floor(Math.log10(target));
+    const length = power * [5, 2, 1].find((digit) => digit * power <= target);
+    const text = length >= 1 ? `${length} m` : `${+(1000 * length).toPrecision(1)} mm`;
+    const x = 12, y = height - 12;
+    pen.strokeStyle = colours.soft; pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.moveTo(x, y - 4); pen.lineTo(x, y); pen.lineTo(x + length * place.scale, y); pen.lineTo(x + length * place.scale, y - 4);
+    pen.stroke();
+    pen.fillStyle = colours.soft; pen.font = `12px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "alphabetic";
+    pen.fillText(text, x + 5, y - 5);
+  }
+
+  function drawCaption(stopped) {
+    pen.font = `13px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "top"; pen.fillStyle = colours.soft;
+    const run = told.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
+    const by = state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
+    pen.fillText(`${run}t = ${secondsText(state.time)}${by}`, 12, 8);
+    if (stopped !== null) { pen.fillStyle = colours.mark; pen.fillText(`this run ended at ${secondsText(stopped)}`, 12, 27); }
+  }
+
+  function paint() {
+    waiting = false;
+    if (!arrays || !canvas.clientWidth) return;
+    if (canvas.clientWidth !== width || canvas.clientHeight !== height || canvas.width !== Math.round(width * (devicePixelRatio || 1))) fit();
+    pen.clearRect(0, 0, width, height);
+    let [before, share] = report.between(times, state.time);
+    const farthest = reached(arrays.base, state.run);
+    const stopped = farthest < times.length - 1 && (farthest < 0 || state.time > times[farthest]);
+    if (stopped) [before, share] = [Math.max(farthest, 0), 0];
+    else if (before >= farthest) share = before + 1 > farthest ? 0 : share;
+    drawPath();
+    if (farthest >= 0) {
+      const base = at(arrays.base, state.run, before, share), bend = at(arrays.bend, state.run, before, share);
+      const joints = at(arrays.joints, state.run, before, share);
+      const directions = at(arrays.directions, state.run, before, share);
+      const drawn = base.map((value, k) => value + state.magnify * bend[k]);
+      const tip = arrays.tip ? at(arrays.tip, state.run, before, share) : null;
+      pen.lineCap = pen.lineJoin = "round";
+      if (arrays.springs) {
+        const springs = at(arrays.springs, state.run, before, share);
+        for (let k = 0; k < springs.length; k += 4) drawSpring(springs.subarray(k, k + 4));
+      }
+      pen.globalAlpha = stopped ? 0.45 : 1;
+      if (byId("ghost").checked && state.magnify > 1) {
+        pen.strokeStyle = colours.soft; pen.lineWidth = 1.2; pen.setLineDash([3, 4]);
+        for (const [, from, to] of film.bodies) line(base, from, to);
+        pen.setLineDash([]);
+      }
+      film.bodies.forEach(([, from, to], k) => {
+        pen.strokeStyle = colours.card; pen.lineWidth = 7; line(drawn, from, to);
+        pen.strokeStyle = colours.bodies[k % colours.bodies.length]; pen.lineWidth = 3.6; line(drawn, from, to);
+      });
+      // Over the links: they often lie along it.
+      if (tip) drawTrail(before, tip);
+      drawJoints(joints, directions);
+      if (tip && Number.isFinite(tip[0])) {
+        pen.fillStyle = colours.mark; pen.strokeStyle = colours.card; pen.lineWidth = 1.5;
+        pen.beginPath(); pen.arc(px(tip[0]), py(tip[1]), 5, 0, 2 * Math.PI); pen.fill(); pen.stroke();
+      }
+      if (byId("names").checked) drawNames(drawn, joints);
+      pen.globalAlpha = 1;
+    }
+    drawScale();
+    drawCaption(stopped ? (farthest < 0 ? times[0] : times[farthest]) : null);
+  }
+
+  // A line along which something slides.
+  function drawRail(x, y, direction, long) {
+    pen.strokeStyle = colours.soft; pen.lineWidth = 1.6;
+    pen.beginPath();
+    pen.moveTo(x - long * Math.cos(direction), y + long * Math.sin(direction));
+    pen.lineTo(x + long * Math.cos(direction), y - long * Math.sin(direction));
+    pen.stroke();
+  }
+
+  // A spring as a zigzag between its ends, whatever its length.
+  function drawSpring(ends) {
+    const [x0, y0, x1, y1] = [px(ends[0]), py(ends[1]), px(ends[2]), py(ends[3])];
+    const length = Math.hypot(x1 - x0, y1 - y0);
+    if (!(length > 1)) return;
+    const [ex, ey] = [(x1 - x0) / length, (y1 - y0) / length], turns = 12, wide = 5;
+    pen.strokeStyle = colours.soft; pen.lineWidth = 1.6;
+    pen.beginPath(); pen.moveTo(x0, y0);
+    for (let k = 0; k <= turns; k++) {
+      const along = length * (0.12 + 0.76 * k / turns), side = k === 0 || k === turns ? 0 : k % 2 ? wide : -wide;
+      pen.lineTo(x0 + along * ex - side * ey, y0 + along * ey + side * ex);
+    }
+    pen.lineTo(x1, y1); pen.stroke();
+  }
+
+  // One painting a frame of the screen, however much changes in it.
+  function repaint() {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(paint);
+  }
+
+  function recolour() {
+    colours = { bodies: report.palette() };
+    for (const name of ["text", "soft", "card", "mark"]) colours[name] = report.colour(name);
+    repaint();
+  }
+
+  function showTime() {
+    const scrub = byId("scrub");
+    scrub.value = String(Math.round(1000 * (state.time - times[0]) / Math.max(end() - times[0], 1e-12)));
+    scrub.setAttribute("aria-valuetext", secondsText(state.time));
+    byId("time").textContent = secondsText(state.time);
+    repaint();
+  }
+
+  function showMagnification() {
+    const text = state.magnify < 10 ? String(+state.magnify.toPrecision(2)) : String(Math.round(state.magnify));
+    byId("magnified").textContent = text;
+    const slider = byId("magnify");
+    slider.setAttribute("aria-valuetext", `${text} times`);
+    if (document.activeElement !== slider) slider.value = String(Math.round(100 * Math.log(state.magnify) / Math.log(LARGEST)));
+    repaint();
+  }
+
+  function connect() {
+    byId("play").addEventListener("click", () => play(!state.playing));
+    byId("scrub").addEventListener("input", (event) => { play(false); seek(times[0] + event.target.value / 1000 * (end() - times[0])); });
+    byId("magnify").addEventListener("input", (event) => {
+      const exact = LARGEST ** (event.target.value / 100);
+      report.set("magnify", exact < 10 ? +exact.toPrecision(2) : Math.round(exact));
+    });
+    const choose = byId("speed");
+    const nearest = SPEEDS.reduce((a, b) => (Math.abs(Math.log(b * 7 / end())) < Math.abs(Math.log(a * 7 / end())) ? b : a));
+    speed = Math.min(nearest, 1);
+    for (const one of SPEEDS) choose.append(new Option(`${one} ×`, one, one === speed, one === speed));
+    choose.addEventListener("change", () => { speed = Number(choose.value); });
+    for (const name of ["ghost", "trail", "names"]) byId(name).addEventListener("change", repaint);
+    report.on("time", showTime);
+    report.on("magnify", showMagnification);
+    report.on("run", repaint);
+    report.on("theme", recolour);
+    report.on("playing", (on) => {
+      byId("play").textContent = on ? "❚❚" : "▶";
+      byId("play").setAttribute("aria-label", on ? "Pause" : "Play");
+    });
+    new ResizeObserver(repaint).observe(canvas);
+    canvas.addEventListener("click", () => play(!state.playing));
+  }
+
+  async function start() {
+    times = film ? film.time : report.row(told.time);
+    if (!(times.length > 1)) times = [0, 1];
+    seek(times[0]);
+    connect();
+    showTime();
+    if (!film) {
+      byId("no-film").hidden = !byId("no-film").textContent;
+      for (const name of ["tools", "canvas", "key-magnify"]) byId(name).hidden = true;
+      return;
+    }
+    byId("has-trail").hidden = !film.tip;
+    const names = ["base", "bend", "joints", "directions", "springs", "tip", "path"];
+    const read = await Promise.all(names.map((name) => (film[name] ? report.unpacked(film[name]) : null)));
+    arrays = Object.fromEntries(names.map((name, k) => [name, read[k]]));
+    recolour();
+  }
+
+  return { start, seek, play, step, magnify, end };
+})();

@@ -1,0 +1,124 @@
+// Selection, theme and keys; then everything is begun.
+const begin = (() => {
+  const { told, state, element } = report;
+  const byId = (name) => document.getElementById(name);
+  const MOST_BUTTONS = 12;
+
+  function selectRun(run) {
+    report.set("run", (run + told.runs.length) % told.runs.length);
+  }
+
+  function showRun() {
+    for (const row of document.querySelectorAll("tr[data-run]")) row.classList.toggle("selected", Number(row.dataset.run) === state.run);
+    for (const button of document.querySelectorAll("tr[data-run] .pick")) button.setAttribute("aria-pressed", String(Number(button.closest("tr").dataset.run) === state.run));
+    const radio = document.querySelector(`#runs input[value="${state.run}"]`);
+    if (radio) {
+      radio.checked = true;
+      const holder = byId("runs"), chip = radio.parentElement;
+      holder.scrollLeft = chip.offsetLeft - holder.offsetLeft - (holder.clientWidth - chip.offsetWidth) / 2;
+    }
+    const select = byId("run");
+    if (select) select.value = String(state.run);
+    byId("canvas").setAttribute("aria-label", `The mechanism in motion${report.runName() ? `, ${told.selecting} ${report.runName()}` : ""}`);
+  }
+
+  function makeSelector() {
+    const holder = byId("runs");
+    if (told.runs.length < 2) { holder.hidden = byId("key-run").hidden = true; return; }
+    holder.querySelector("legend").textContent = told.selecting;
+    if (told.runs.length > MOST_BUTTONS) {
+      const select = element("select", { id: "run", "aria-label": told.selecting });
+      told.runs.forEach((name, k) => select.append(new Option(name, k)));
+      select.addEventListener("change", () => selectRun(Number(select.value)));
+      holder.append(select);
+    } else {
+      if (told.runs.every((name) => /^[+-]+$/.test(name))) holder.classList.add("signs");
+      told.runs.forEach((name, k) => {
+        const radio = element("input", { type: "radio", name: "run", value: k });
+        radio.addEventListener("change", () => selectRun(k));
+        holder.append(element("label", {}, radio, name));
+      });
+    }
+    for (const row of document.querySelectorAll("tr[data-run]")) row.addEventListener("click", () => selectRun(Number(row.dataset.run)));
+    report.on("run", () => {
+      showRun();
+      byId("said").textContent = `${told.selecting} ${report.runName()}`;
+    });
+  }
+
+  function makeTheme() {
+    const button = byId("theme"), names = ["auto", "light", "dark"];
+    const show = () => {
+      const name = document.documentElement.dataset.theme;
+      button.textContent = { auto: "◐ auto", light: "☀ light", dark: "☾ dark" }[name];
+      button.setAttribute("aria-label", `Theme: ${name}`);
+    };
+    button.addEventListener("click", () => {
+      report.setTheme(names[(names.indexOf(document.documentElement.dataset.theme) + 1) % names.length]);
+    });
+    report.on("theme", show);
+    show();
+    // Paper is white.
+    let before = null;
+    addEventListener("beforeprint", () => { if (report.isDark()) { before = document.documentElement.dataset.theme; report.setTheme("light", false); } });
+    addEventListener("afterprint", () => { if (before) { report.setTheme(before, false); before = null; } });
+  }
+
+  function listen() {
+    if (!told.panels.length) return;
+    const keys = {
+      " ": () => player.play(!state.playing),
+      ArrowRight: (event) => player.step(event.shiftKey ? 10 : 1),
+      ArrowLeft: (event) => player.step(event.shiftKey ? -10 : -1),
+      "+": () => player.magnify(1), "=": () => player.magnify(1), "-": () => player.magnify(-1),
+      m: () => selectRun(state.run + 1), M: () => selectRun(state.run - 1),
+      0: () => player.seek(0), Home: () => player.seek(0), End: () => player.seek(player.end()),
+    };
+    addEventListener("keydown", (event) => {
+      const act = keys[event.key];
+      if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
+      // Elements with keys of their own keep them.
+      const { target } = event;
+      const own = target.closest("select, textarea, input:not([type=checkbox])") && !/^[mM+=-]$/.test(event.key);
+      const pressed = event.key === " " && target.closest("button, a, input, select, summary");
+      const scrolls = /^(Arrow|Home|End)/.test(event.key) && target.closest(".scroll, .runs");
+      if (own || pressed || scrolls) return;
+      event.preventDefault();
+      act(event);
+    });
+  }
+
+  function loadPlotly() {
+    const script = element("script");
+    script.textContent = byId("plotly").textContent;
+    document.head.append(script);
+  }
+
+  async function open() {
+    makeSelector();
+    makeTheme();
+    byId("keyed").textContent = told.selecting;
+    listen();
+    await report.readSeries();
+    const time = report.row(told.time);
+    report.timeRange = time.length > 1 ? [time[0], time[time.length - 1]] : undefined;
+    showRun();
+    charts.start();
+    await player.start();
+    document.documentElement.dataset.ready = "true";
+    performance.mark("ready");
+    if (!told.panels.length) return;
+    // After the screen shows what there is.
+    await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0)));
+    loadPlotly();
+    await charts.refresh();
+    document.documentElement.dataset.charts = "true";
+    performance.mark("charts");
+  }
+
+  return () => open().catch((error) => {
+    const text = typeof DecompressionStream === "undefined" ? "This browser is too old for the charts and the animation." : `The charts cannot be shown: ${error.message}`;
+    document.querySelector("main").prepend(element("p", { class: "notice" }, text));
+    throw error;
+  });
+})();

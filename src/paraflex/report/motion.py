@@ -1,0 +1,168 @@
+"""The report of a mechanism without a path, left to what acts on it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import xarray as xr
+
+from paraflex.report.curves import Unit, followed, look, thinned, unit_for
+from paraflex.report.film import NO_SHAPES, film
+from paraflex.report.page import Chart, Curve, Page, Panel
+from paraflex.report.provenance import asked, common_facts, run_command_line
+from paraflex.report.text import count, number, pairs, symbol
+from paraflex.report.tracking import energies, largest
+
+_ALONE = ("",)
+# Charts choose among so many points and joints; results.nc has them all.
+_MOST = 60
+
+
+def motion_page(data: xr.Dataset) -> Page:
+    """The report of a run from `results.motion_dataset`."""
+    data = data.transpose("time", ...)
+    moving = film(data, ())
+    few = data.isel(time=thinned(data.sizes["time"]))
+    status = str(data["status"].item())
+    return Page(
+        title=data.attrs["mechanism"],
+        kind="run",
+        subtitle="left to its loads, prescribed motion and constant torques",
+        facts=common_facts(data),
+        command=run_command_line(asked(data)),
+        figures=_figures(data),
+        tables=[("Run", _table(data))],
+        panels=_panels(few),
+        time=few["time"].values,
+        runs=_ALONE,
+        film=moving,
+        no_film="" if moving else NO_SHAPES,
+        notes=[] if status == "complete" else [f"{status}: {data['message'].item()}"],
+    )
+
+
+def _table(data: xr.Dataset) -> str:
+    facts = [
+        ("status", str(data["status"].item())),
+        ("steps, rejected", f"{count(data['steps'].item())}, {count(data['rejected'].item())}"),
+        ("Newton iterations", count(data["newton_iterations"].item())),
+        ("factorisations", count(data["factorisations"].item())),
+        ("wall time", f"{number(data['wall_time'].item())} s"),
+        ("constraint violation, position", f"{number(data['constraint_position_max'].item())} m"),
+        ("constraint violation, velocity", f"{number(data['constraint_velocity_max'].item())} m/s"),
+        ("imbalance of energy", f"{number(data['energy_balance_max'].item())} J"),
+    ]
+    facts += [(f"torque of {symbol(str(name))}", f"{number(float(data['applied_torque'][k]))} N m")
+             for k, name in enumerate(data["motor"].values)]  # fmt: skip
+    passed = json.loads(data.attrs.get("singular_positions", "[]"))
+    if passed:
+        facts.append(("singular positions passed", ", ".join(f"{t:.4g} s" for t in passed[:6])))
+    return pairs(facts)
+
+
+def _panels(data: xr.Dataset) -> list[Panel]:
+    bodies = [str(name) for name in data["body"].values]
+
+    def of_bodies(identity: str, title: str, label: str, unit: str, variable: str) -> Chart:
+        return followed(identity, title, label, unit, data[variable].values[None], bodies, _ALONE, choosing="body")
+
+    motion = [
+        of_bodies("angles", "Angles", "angle", "rad", "angle"),
+        of_bodies("rates", "Angular velocities", "angular velocity", "rad/s", "angular_velocity"),
+    ]
+    bent = [b for b in range(len(bodies)) if largest(data["tip_transverse"].values[:, b]) > 0.0]
+    if bent:
+        names, values = [bodies[b] for b in bent], data["tip_transverse"].values[None, :, bent]
+        motion.append(followed("deflections", "Deflections", "transverse deflection of the tip", "m", values, names,
+                               _ALONE, note="Of a body's last end, across the body, in its own frame."))  # fmt: skip
+    motion.append(_phases(data, bodies))
+    points = _points(data)
+    if points is not None:
+        motion.append(points)
+    panels = [Panel("Motion", motion), Panel("Energies", [energies(data, list(_ALONE))])]
+    if data.sizes["joint"]:
+        panels.append(Panel("Joints", [_joint_forces(data)]))
+    return [*panels, Panel("Coordinates", [_coordinates(data, bodies)])]
+
+
+def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:
+    angle, rate = data["angle"].values, data["angular_velocity"].values
+    curves = [Curve(symbol(body), rate[:, b], angle[:, b], run=0, look=look(b)) for b, body in enumerate(bodies)]
+    return Chart("phases", "Phase diagram", "angular velocity [rad/s]", curves, x="angle [rad]", over_time=False)
+
+
+def _points(data: xr.Dataset) -> Chart | None:
+    """Paths of the points that move and that no joint made by the program holds."""
+    places = data["point_position"].transpose("point", "time", "axis").values
+    names = [str(name) for name in data["point"].values]
+    moving = [
+        k for k, name in enumerate(names)
+        if "._" not in name and np.isfinite(places[k, :, 0]).any() and np.nanmax(np.nanstd(places[k], axis=0)) > 1e-9
+    ][:_MOST]  # fmt: skip
+    if not moving:
+        return None
+    unit = Unit("mm", 1e3) if largest(places[moving]) < 10.0 else Unit("m", 1.0)
+    curves = [
+        Curve(names[k], unit.factor * places[k, :, 1], unit.factor * places[k, :, 0], run=0, look=look(i))
+        for i, k in enumerate(moving)
+    ]
+    return Chart(
+        "points", "Paths of points", f"y [{unit.name}]", curves, x=f"x [{unit.name}]", equal=True, over_time=False
+    )
+
+
+def _joint_forces(data: xr.Dataset) -> Chart:
+    force = data["joint_force"].transpose("joint", "time", "axis").values
+    names = [str(name) for name in data["joint"].values][:_MOST]
+    curves = []
+    for j in range(len(names)):
+        magnitude = np.linalg.norm(force[j], axis=-1)
+        parts = (("magnitude", magnitude), ("x", force[j, :, 0]), ("y", force[j, :, 1]))
+        curves += [Curve(name, values, run=0, choice=j, look=look(k)) for k, (name, values) in enumerate(parts)]
+    return Chart(
+        "forces", "Joint forces", "force [N]", curves, choices=[symbol(name) for name in names], choosing="joint",
+        note="On the joint's second body, in the ground frame.",
+    )  # fmt: skip
+
+
+def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
+    """Coordinates of one body at a time: its frame's place and angle, and its flexible ones."""
+    names = [str(name) for name in data["coordinate"].values]
+    values = data["coordinate_value"].transpose("coordinate", "time").values
+    curves, choices = [], []
+    for body in bodies[:_MOST]:
+        own = [k for k, name in enumerate(names) if name.startswith(f"{body}.")]
+        kinds = ((f"{symbol(body)}: x, y [m], φ [rad]", own[:3]), (f"{symbol(body)}: flexible [m √kg]", own[3:]))
+        for choice, members in kinds:
+            if members:
+                curves += [
+                    Curve(names[k].removeprefix(f"{body}."), values[k], run=0, choice=len(choices), look=look(i))
+                    for i, k in enumerate(members)
+                ]
+                choices.append(choice)
+    return Chart(
+        "coordinates", "Generalised coordinates", "coordinate", curves, choices=choices, choosing="body",
+        note="Flexible ones are mass-normalised modes.",
+    )  # fmt: skip
+
+
+def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
+    tiles = [("status", str(data["status"].item()), f"t = {_last_time(data):.4g} s")]
+    deflections = np.abs(data["tip_transverse"].values)
+    if largest(deflections) > 0.0:
+        unit = unit_for("m", deflections)
+        body = int(np.argmax([largest(one) for one in deflections.T]))
+        value = f"{number(largest(deflections), unit.factor)} {unit.name}"
+        tiles.append(("largest deflection", value, symbol(str(data["body"].values[body]))))
+    force = np.linalg.norm(data["joint_force"].transpose("joint", "time", "axis").values, axis=-1)
+    if largest(force) > 0.0:
+        joint = int(np.argmax([np.nan_to_num(largest(one)) for one in force]))
+        tiles.append(("largest joint force", f"{number(largest(force))} N", symbol(str(data["joint"].values[joint]))))
+    tiles.append(("computed in", f"{number(data['wall_time'].item())} s", f"{count(data['steps'].item())} steps"))
+    return tiles
+
+
+def _last_time(data: xr.Dataset) -> float:
+    reached = np.isfinite(data["angle"].values).all(axis=1)
+    return float(data["time"].values[reached][-1]) if reached.any() else 0.0

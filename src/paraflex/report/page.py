@@ -1,0 +1,303 @@
+"""The page that every report is: one file with its style, its scripts, Plotly and the numbers; nothing is loaded."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from html import escape
+from importlib.metadata import version
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+from string import Template
+from typing import Any, NamedTuple
+
+from numpy.typing import ArrayLike
+
+from paraflex.errors import InputError, OutputError
+from paraflex.report.film import Film
+from paraflex.report.packing import Series
+
+_STYLES = ("page.css",)
+_SCRIPTS = ("report.js", "charts.js", "player.js", "start.js")
+
+
+class Look(NamedTuple):
+    """How a curve is drawn: one of the page's eight colours, or without one that of text, as desired curves are.
+
+    Dashes: 0 solid, 1 dashed, 2 dotted, 3 dash-dotted, 4 long dashes.
+    """
+
+    colour: int | None = None
+    dash: int = 0
+
+
+PLAIN = Look()
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve of a chart.
+
+    Attributes
+    ----------
+    name : str
+    y : (k,) array
+        In the chart's unit; NaN where there is no value.
+    x : (k,) array, optional
+        The page's time by default.
+    look : Look
+    run : int, optional
+        The run it is of: drawn thicker beside others when this run is selected.
+    shown : tuple of int, optional
+        Runs with whose selection it is shown; always by default.
+    choice : int, optional
+        Which of the chart's choices shows it; every one by default.
+    quiet : bool
+        Not told of where the pointer is.
+    """
+
+    name: str
+    y: ArrayLike
+    x: ArrayLike | None = None
+    look: Look = PLAIN
+    run: int | None = None
+    shown: tuple[int, ...] | None = None
+    choice: int | None = None
+    quiet: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A diagram.
+
+    Attributes
+    ----------
+    identity : str
+        A word of its own within the page.
+    title, y, x : str
+        What it shows; labels of its axes with units.
+    curves : sequence of Curve
+    choices : sequence of str
+        Names of what it shows one at a time: links, motors.
+    choosing : str
+        What is chosen, for those who hear the page.
+    log, equal : bool
+        A logarithmic vertical axis; the same scale both ways.
+    over_time : bool
+        Whether x is time: a line then moves with the animation, else a dot on every curve of a run.
+    note : str
+        A sentence under it.
+    figure : mapping, optional
+        Plotly's own `data` and `layout` instead of curves; colours and fonts of the page are added.
+    """
+
+    identity: str
+    title: str
+    y: str
+    curves: Sequence[Curve] = ()
+    x: str = "time [s]"
+    choices: Sequence[str] = ()
+    choosing: str = "shown"
+    log: bool = False
+    equal: bool = False
+    over_time: bool = True
+    note: str = ""
+    figure: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Charts under one heading."""
+
+    title: str
+    charts: Sequence[Chart]
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a report says.
+
+    Attributes
+    ----------
+    title, subtitle : str
+    kind : str
+        What it is a report of, for the browser's title.
+    facts : sequence of (str, str)
+        Names and values below the title.
+    command : str
+        The command that gives these results again; empty where it is not known.
+    figures : sequence of (str, str, str)
+        The few numbers that matter: name, value, and what it is of.
+    tables, more : sequence of (str, str)
+        Headings and HTML of what stands before the charts and after them; see `text.table`.
+    panels : sequence of Panel
+    time : (k,) array
+        What curves without x are drawn over; empty where nothing moves.
+    runs : sequence of str
+        Names of what can be selected.
+    selecting : str
+        What a run is called in this page: "mode", "model", "design".
+    selected : int
+        The run selected at first.
+    film : Film, optional
+        The animation.
+    no_film : str
+        Why there is none.
+    notes : sequence of str
+        What the reader has to know first: runs that failed.
+    """
+
+    title: str
+    kind: str
+    subtitle: str = ""
+    facts: Sequence[tuple[str, str]] = ()
+    command: str = ""
+    figures: Sequence[tuple[str, str, str]] = ()
+    tables: Sequence[tuple[str, str]] = ()
+    more: Sequence[tuple[str, str]] = ()
+    panels: Sequence[Panel] = ()
+    time: ArrayLike = ()
+    runs: Sequence[str] = ()
+    selecting: str = "mode"
+    selected: int = 0
+    film: Film | None = None
+    no_film: str = ""
+    notes: Sequence[str] = ()
+
+
+def render(page: Page) -> str:
+    """The page as HTML."""
+    return Template(_asset("page.html")).substitute(
+        title=escape(page.title),
+        kind=escape(page.kind),
+        subtitle=escape(page.subtitle),
+        facts="".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in page.facts),
+        command=_command(page.command),
+        figures=_figures(page.figures),
+        notes="".join(f'<p class="notice">{escape(note)}</p>' for note in page.notes),
+        tables=_sections(page.tables),
+        more=_sections(page.more),
+        no_film=escape(page.no_film),
+        no_charts="" if page.panels else "hidden",
+        version=escape(version("paraflex")),
+        style="\n".join(map(_asset, _STYLES)),
+        data=_script_json(_told(page)),
+        scripts="\n".join(map(_asset, _SCRIPTS)),
+        plotly=plotly_script(),
+    )
+
+
+def save_page(page: Page, path: str | Path) -> None:
+    """Write the page; the file appears whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    path = Path(path)
+    unfinished = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished.write_text(render(page), encoding="utf-8")
+        unfinished.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            unfinished.unlink()
+        raise OutputError(
+            f"cannot be written ({error.strerror or error})", field=str(path), remedy="choose another file"
+        ) from error
+
+
+@cache
+def plotly_script() -> str:
+    """Plotly's own script, from its Python package, which is not imported for it: that would take a second.
+
+    Raises
+    ------
+    InputError
+        The package is not installed, or has no script in it.
+    """
+    found = find_spec("plotly")
+    for folder in (found.submodule_search_locations or []) if found else []:
+        script = Path(folder) / "package_data" / "plotly.min.js"
+        if script.is_file():
+            # A closing tag in one of its strings would end the page's script.
+            return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
+    raise InputError(
+        "not installed, or without its script", field="plotly", remedy="pip install --force-reinstall plotly"
+    )
+
+
+def _told(page: Page) -> dict[str, Any]:
+    """What the scripts are told."""
+    series = Series()
+    time = series.add(page.time, exact=True)
+    return {
+        "time": time,
+        "runs": list(page.runs),
+        "selecting": page.selecting,
+        "selected": page.selected,
+        "panels": [
+            {"title": panel.title, "charts": [_chart(chart, series, time) for chart in panel.charts]}
+            for panel in page.panels
+        ],
+        "film": None if page.film is None else page.film.told(),
+        "series": series.told(),
+    }
+
+
+def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
+    plain = ("identity", "title", "y", "x", "choosing", "log", "equal", "over_time", "note")
+    return {name: getattr(chart, name) for name in plain} | {
+        "choices": list(chart.choices),
+        "figure": None if chart.figure is None else dict(chart.figure),
+        "curves": [_curve(curve, series, time) for curve in chart.curves],
+    }
+
+
+def _curve(curve: Curve, series: Series, time: int) -> dict[str, Any]:
+    plain = ("name", "run", "shown", "choice", "quiet")
+    return {name: getattr(curve, name) for name in plain} | {
+        "colour": curve.look.colour,
+        "dash": curve.look.dash,
+        "x": time if curve.x is None else series.add(curve.x),
+        "y": series.add(curve.y),
+    }
+
+
+def _sections(parts: Sequence[tuple[str, str]]) -> str:
+    return "".join(f'<section class="card"><h2>{escape(heading)}</h2>{html}</section>' for heading, html in parts)
+
+
+def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
+    tiles = "".join(
+        f'<div class="tile"><span>{escape(name)}</span><strong>{escape(value)}</strong>'
+        f"<small>{escape(of)}</small></div>"
+        for name, value, of in figures
+    )
+    return f'<div class="tiles">{tiles}</div>' if tiles else ""
+
+
+def _command(command: str) -> str:
+    """The command, broken between its options only."""
+    if not command:
+        return ""
+    parts = command.replace(" --", "\n--").split("\n")
+    return f'<p class="command"><code>{" ".join(f"<span>{escape(part)}</span>" for part in parts)}</code></p>'
+
+
+def _script_json(data: Mapping[str, Any]) -> str:
+    """JSON that no name in it can break out of."""
+    text = json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    for mark in "<>&\u2028\u2029":
+        text = text.replace(mark, f"\\u{ord(mark):04x}")
+    return text
+
+
+def _asset(name: str) -> str:
+    return (files("paraflex.report") / "assets" / name).read_text(encoding="utf-8")

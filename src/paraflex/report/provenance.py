@@ -1,0 +1,103 @@
+"""Where results come from: facts of a run, and the command that gives it again."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Sequence
+from typing import Any
+
+import xarray as xr
+
+from paraflex.files import library_names
+
+# What a run takes where nothing is said.
+_FLAGS = ("rigid", "ked", "balanced")
+_GIVEN = {
+    "duration": "--duration",
+    "samples": "--samples",
+    "tolerance": "--tol",
+    "method": "--method",
+    "step": "--step",
+    "constraints": "--constraints",
+    "segments": "--segments",
+}
+
+
+def asked(data: xr.Dataset) -> dict[str, Any]:
+    """What was asked for; empty where it is not known."""
+    try:
+        return json.loads(data.attrs["parameters"]).get("run", {})
+    except (KeyError, ValueError):
+        return {}
+
+
+def common_facts(data: xr.Dataset) -> list[tuple[str, str]]:
+    """Duration, method, tolerance and versions."""
+    time, attrs = data["time"].values, data.attrs
+    facts = [("duration", f"{time[-1]:g} s, {time.size} samples")]
+    method = attrs.get("method")
+    if method:
+        facts.append(("integration", str(method)))
+    run = asked(data)
+    tolerance, step = run.get("tolerance", attrs.get("tolerance")), run.get("step")
+    if step is not None:
+        facts.append(("step", f"{step:g} s"))
+    elif tolerance is not None:
+        facts.append(("tolerance", f"{tolerance:g} m"))
+    facts += [
+        (name.removesuffix("_version"), str(attrs[name]))
+        for name in ("paraflex_version", "numba_version", "numpy_version")
+        if name in attrs
+    ]
+    return facts
+
+
+def mechanism_argument(source: str) -> str:
+    """How a command names the mechanism of a file."""
+    name = source.removesuffix(".toml")
+    return name if name in library_names() else source
+
+
+def run_command_line(run: dict[str, Any]) -> str:
+    """The `paraflex run` that was asked for so; empty where it is not known."""
+    if "mechanism" not in run:
+        return ""
+    words = ["paraflex", "run", "--mechanism", mechanism_argument(run["mechanism"])]
+    if "path" in run:
+        words += ["--path", run["path"], *_modes(run.get("modes", []))]
+    for name, flag in _GIVEN.items():
+        if run.get(name) is not None:
+            words += [flag, str(run[name])]
+    for name, value in (run.get("method_parameters") or {}).items():
+        words += ["--method-parameter", f"{name}={value}"]
+    if run.get("constraints") == "baumgarte" and not run.get("automatic_gains"):
+        words += [f"--{name}={run[name]}" for name in ("alpha", "beta") if name in run]
+    if run.get("automatic_gains"):
+        words.append("--automatic-gains")
+    words += [f"--{name}" for name in _FLAGS if run.get(name)]
+    if run.get("geometry") and not any(run.get(name) for name in ("rigid", "ked", "segments")):
+        words += ["--geometry", run["geometry"]]
+    for event in run.get("stop_at") or []:
+        words += ["--stop-at", event]
+    return shlex.join(words)
+
+
+def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence[str]) -> str:
+    """The `paraflex verify` that was asked for so; empty where it is not known."""
+    if "mechanism" not in run:
+        return ""
+    words = ["paraflex", "verify", "--mechanism", mechanism_argument(run["mechanism"]), "--path", run["path"]]
+    words += _modes(run.get("modes", []))
+    for name in (str(model) for model in data["model"].values):
+        words += ["--engine" if name in engines else "--model", name]
+    time = data["time"].values
+    words += ["--duration", str(time[-1]), "--samples", str(time.size)]
+    for name in ("tolerance", "method", "segments"):
+        if run.get(name) is not None:
+            words += [_GIVEN[name], str(run[name])]
+    return shlex.join(words)
+
+
+def _modes(names: Sequence[str]) -> list[str]:
+    return [word for name in names for word in ("--mode", name)]

@@ -1,0 +1,119 @@
+"""Numbers, names and tables of a page."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from html import escape
+
+_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_GREEK = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ",
+    "omega": "ω",
+}  # fmt: skip
+# Magnitudes written out; others as powers of ten.
+_SMALLEST, _LARGEST = 1e-3, 1e5
+NOTHING = "–"
+_WORDS = ' class="words"'
+
+
+def number(value: float | None, factor: float = 1.0) -> str:
+    """A value to three digits after multiplication by a factor: "0.377", "1.2 × 10⁻⁵"; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    value = factor * value
+    if value == 0.0:
+        return "0"
+    if not _SMALLEST <= abs(value) < _LARGEST:
+        digits, power = f"{value:.2e}".split("e")
+        return f"{digits} × 10{str(int(power)).translate(_RAISED)}".replace("-", "−")
+    # Whole numbers of four or five digits are kept.
+    text = f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:#.3g}".rstrip(".")
+    return text.replace("-", "−")
+
+
+def count(value: float | None) -> str:
+    """A whole number, thousands apart: "43 708"."""
+    return NOTHING if value is None or not math.isfinite(value) else f"{int(value):,}".replace(",", "\u2009")
+
+
+def symbol(name: str) -> str:
+    """A name as print shows it: "τ₁" for "tau1", "A₁" for "A1", "link 1" for "link1", others unchanged."""
+    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
+    if parts is None:
+        return name
+    letters, digits = parts.groups()
+    if len(letters) == 1 or letters in _GREEK:
+        return _GREEK.get(letters, letters) + digits.translate(_LOWERED)
+    return f"{letters} {digits}".rstrip()
+
+
+def table(
+    heads: Sequence[tuple[str, str]],
+    rows: Sequence[tuple[str, Sequence[str]]],
+    *,
+    caption: str,
+    note: str = "",
+    runs: Mapping[str, int] | None = None,
+) -> str:
+    r"""An HTML table with a name before each row; it scrolls within the page where it is too wide.
+
+    Parameters
+    ----------
+    heads : sequence of (str, str)
+        Names of columns and their units, the rows' own first.
+    rows : sequence of (str, sequence of str)
+        Name of a row, and its cells; a cell of two lines is "first\nsecond".
+    caption : str
+        For those who hear the page.
+    note : str
+        A sentence under it.
+    runs : mapping of str to int, optional
+        Which rows select which run of the page.
+    """
+    runs = runs or {}
+    wordy = [k > 0 and any(_is_words(cells[k - 1]) for _, cells in rows) for k in range(len(heads))]
+    head = "".join(
+        f'<th scope="col"{_WORDS if words else ""}>{escape(name)}{_small(unit)}</th>'
+        for (name, unit), words in zip(heads, wordy, strict=True)
+    )
+    body = "".join(
+        f"<tr{_data_run(runs.get(name))}>{_row_head(name, runs.get(name))}{''.join(map(_cell, cells))}</tr>"
+        for name, cells in rows
+    )
+    below = f'<p class="note">{escape(note)}</p>' if note else ""
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}"><table>'
+        f'<caption class="unseen">{escape(caption)}</caption>'
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{below}"
+    )
+
+
+def pairs(facts: Sequence[tuple[str, str]]) -> str:
+    """HTML of names and values."""
+    return f'<dl class="pairs">{"".join(f"<div><dt>{escape(a)}</dt><dd>{escape(b)}</dd></div>" for a, b in facts)}</dl>'
+
+
+def _small(text: str) -> str:
+    return f"<small>{escape(text)}</small>" if text else ""
+
+
+def _data_run(run: int | None) -> str:
+    return "" if run is None else f' data-run="{run}"'
+
+
+def _row_head(name: str, run: int | None) -> str:
+    inner = escape(name) if run is None else f'<button type="button" class="pick">{escape(name)}</button>'
+    return f'<th scope="row">{inner}</th>'
+
+
+def _cell(text: str) -> str:
+    first, _, second = text.partition("\n")
+    return f"<td{_WORDS if _is_words(text) else ''}>{escape(first)}{_small(second)}</td>"
+
+
+def _is_words(text: str) -> bool:
+    """Words are read, numbers are compared."""
+    return re.search(r"[A-Za-z]{2}", text.partition("\n")[0]) is not None

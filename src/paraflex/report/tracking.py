@@ -1,0 +1,243 @@
+"""The report of a tracking study: every mode, compared and one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.plots.runs import default_mode
+from paraflex.report.curves import DOTTED, compared, followed, look, plane_path, thinned, unit_for
+from paraflex.report.film import NO_SHAPES, film
+from paraflex.report.page import Chart, Curve, Look, Page, Panel
+from paraflex.report.provenance import asked, common_facts, run_command_line
+from paraflex.report.text import NOTHING, count, number, symbol, table
+
+
+def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> Page:
+    """The report of a tracking study.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.tracking_dataset`.
+    failed : mapping of str to str, optional
+        Modes that could not start, each with its reason.
+    """
+    data = data.transpose("mode", "time", ...)
+    runs = [str(name) for name in data["mode"].values]
+    run = asked(data)
+    path = run.get("path")
+    modes = f"{len(runs)} actuation modes" if len(runs) > 1 else f"actuation mode {runs[0]}"
+    moving = film(data)
+    few = data.isel(time=thinned(data.sizes["time"]))
+    return Page(
+        title=data.attrs["mechanism"],
+        kind="run",
+        subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
+        facts=[*([("model", _model(run))] if run else []), *common_facts(data)],
+        command=run_command_line(run),
+        figures=_figures(data),
+        tables=[("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {}))],
+        panels=_panels(few, runs),
+        time=few["time"].values,
+        runs=runs,
+        selected=runs.index(default_mode(data)),
+        film=moving,
+        no_film="" if moving else NO_SHAPES,
+        notes=_unfinished(data, failed or {}),
+    )
+
+
+def errors(data: xr.Dataset) -> NDArray[np.float64]:
+    """Distance of the end-effector from its desired place [m]; dimensions as those of the runs, time last."""
+    gaps = (data["end_effector"] - data["end_effector_desired"]).transpose(..., "axis").values
+    return np.linalg.norm(gaps, axis=-1)
+
+
+def torque_unit(data: xr.Dataset) -> str:
+    """Of the motors: "N m", or "N" of those that slide."""
+    return str(data["torque"].attrs.get("units", "N m"))
+
+
+def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
+    """What every mode came to."""
+    runs = [str(name) for name in data["mode"].values]
+    gaps, deflections = errors(data), np.abs(data["tip_transverse"].values)
+    length, bend = unit_for("m", gaps), unit_for("m", deflections)
+    motors = [str(name) for name in data["motor"].values]
+    torques = data["torque"].transpose("mode", "motor", "time").values
+    heads = [
+        ("mode", ""), ("status", ""), ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
+        *((symbol(motor), f"[{torque_unit(data)}]") for motor in motors),
+        ("deflection", f"largest [{bend.name}]"), ("strain", "energy [J]"), ("imbalance", "[J]"),
+        ("steps", "rejected"), ("iterations", "factorisations"), ("wall time", "[s]"),
+    ]  # fmt: skip
+    rows = []
+    for r, name in enumerate(runs):
+        one = data.isel(mode=r)
+        rows.append((name, [
+            str(one["status"].item()),
+            number(one["tracking_rms"].item(), length.factor),
+            number(largest(gaps[r]), length.factor),
+            *(f"{number(largest(torque))}\n{number(_rms(torque))}" for torque in torques[r]),
+            _deflection(deflections[r], data["body"].values, bend.factor),
+            number(largest(one["strain_energy"].values)),
+            number(one["energy_balance_max"].item()),
+            f"{count(one['steps'].item())}\n{count(one['rejected'].item())}",
+            f"{count(one['newton_iterations'].item())}\n{count(one['factorisations'].item())}",
+            number(one["wall_time"].item()),
+        ]))  # fmt: skip
+    rows += [(name, ["failed", *[NOTHING] * (len(heads) - 2)]) for name in failed]
+    efforts = "Forces" if torque_unit(data) == "N" else "Torques"
+    note = f"{efforts}: peak and, below it, RMS. Strain energy: peak. Imbalance: largest, of energy and work."
+    if failed or not bool((data["status"] == "complete").all()):
+        note += " Of a mode that did not get to its end: until then."
+    selects = {name: r for r, name in enumerate(runs)}
+    return table(heads, rows, caption="What every mode came to", note=note, runs=selects)
+
+
+def largest(values: NDArray[np.float64]) -> float:
+    """Largest finite magnitude; NaN where there is none."""
+    magnitudes = np.abs(values[np.isfinite(values)])
+    return float(magnitudes.max()) if magnitudes.size else float("nan")
+
+
+def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
+    motors, bodies = ([str(name) for name in data[dim].values] for dim in ("motor", "body"))
+    effort = "Motor forces" if torque_unit(data) == "N" else "Motor torques"
+    bent = [b for b in range(len(bodies)) if largest(data["tip_transverse"].values[:, :, b]) > 0.0]
+    charts = [
+        Panel("Following the path", [
+            compared("errors", "Tracking error", "distance", "m", errors(data), runs, log=True,
+                     note="Distance of the end-effector from its desired place."),
+            plane_path(data["end_effector"].values, data["end_effector_desired"].values[0], runs),
+        ]),
+        Panel("Motors", [
+            followed("torques", effort, effort.split()[1][:-1], torque_unit(data), data["torque"].values, motors, runs,
+                     choosing="motor"),
+            compared("condition", "Distance from singular positions", "condition number", "1",
+                     data["actuation_condition"].values, runs, log=True,
+                     note="Condition number of the matrix from motor torques to forces along the path: it grows "
+                          "without bound where the active motors lose control of a direction."),
+        ]),
+    ]  # fmt: skip
+    links = [
+        followed("angles", "Link angles", "angle", "rad", data["angle"].values, bodies, runs,
+                 desired=data["angle_desired"].values[0]),
+        followed("rates", "Link angular velocities", "angular velocity", "rad/s", data["angular_velocity"].values,
+                 bodies, runs, desired=data["angular_velocity_desired"].values[0]),
+        _phases(data, bodies, runs),
+    ]  # fmt: skip
+    if bent:
+        names = [bodies[b] for b in bent]
+        links.insert(0, followed(
+            "deflections", "Deflections of the links", "transverse deflection of the tip", "m",
+            data["tip_transverse"].values[:, :, bent], names, runs,
+            note="Of a link's last end, across the link, in its own frame.",
+        ))  # fmt: skip
+        links.insert(1, followed(
+            "axial", "Axial displacements", "axial displacement of the tip", "m",
+            data["tip_axial"].values[:, :, bent], names, runs,
+        ))  # fmt: skip
+    return [*charts, Panel("Links", links), Panel("Energies", [energies(data, runs), _strain(data, runs)])]
+
+
+def energies(data: xr.Dataset, runs: list[str]) -> Chart:
+    """Kinetic and strain energy and work of the selected run."""
+    names = {"kinetic_energy": "kinetic", "strain_energy": "strain", "work": "work done on it"}
+    values = np.stack([data[name].values.reshape(len(runs), -1) for name in names], axis=-1)
+    curves = [
+        Curve(name, values[r, :, k], run=r, shown=(r,), look=look(k))
+        for r in range(len(runs))
+        for k, name in enumerate(names.values())
+    ]
+    return Chart("energies", "Energies", "energy [J]", curves)
+
+
+def _strain(data: xr.Dataset, runs: list[str]) -> Chart:
+    strain = data["strain_energy"].values
+    return compared("strain", "Strain energy", "strain energy", "J", strain, runs)
+
+
+def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
+    """Angular velocity over angle, which a link of a repeated motion goes round."""
+    angle, rate = data["angle"].values, data["angular_velocity"].values
+    way, pace = data["angle_desired"].values[0], data["angular_velocity_desired"].values[0]
+    curves = []
+    for b in range(len(bodies)):
+        curves.append(Curve("desired", pace[:, b], way[:, b], Look(dash=DOTTED), choice=b))
+        curves += [
+            Curve(run, rate[r, :, b], angle[r, :, b], run=r, shown=(r,), choice=b, look=Look(look(b).colour))
+            for r, run in enumerate(runs)
+        ]
+    return Chart(
+        "phases", "Phase diagram", "angular velocity [rad/s]", curves, x="angle [rad]",
+        choices=[symbol(body) for body in bodies], choosing="link", over_time=False,
+    )  # fmt: skip
+
+
+def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
+    """The few numbers to see first."""
+    errors_rms = data["tracking_rms"].values
+    several = data.sizes["mode"] > 1
+    peaks = np.array([largest(one) for one in data["torque"].values])
+    tiles = []
+    if np.isfinite(errors_rms).any():
+        best = int(np.nanargmin(errors_rms))
+        unit = unit_for("m", errors_rms[best : best + 1])
+        value = f"{number(errors_rms[best], unit.factor)} {unit.name}"
+        tiles.append(("least tracking error" if several else "tracking error (RMS)", value, _name(data, best)))
+    if np.isfinite(peaks).any():
+        least = int(np.nanargmin(peaks))
+        effort = "force" if torque_unit(data) == "N" else "torque"
+        value = f"{number(peaks[least])} {torque_unit(data)}"
+        tiles.append((f"least peak {effort}" if several else f"peak {effort}", value, _name(data, least)))
+    deflections = np.array([largest(one) for one in data["tip_transverse"].values])
+    if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
+        most = int(np.nanargmax(deflections))
+        unit = unit_for("m", deflections[most : most + 1])
+        value = f"{number(deflections[most], unit.factor)} {unit.name}"
+        tiles.append(("largest deflection", value, _name(data, most)))
+    total = float(np.nansum(data["wall_time"].values))
+    tiles.append(("computed in", f"{number(total)} s", f"{data.sizes['mode']} runs" if several else "one run"))
+    return tiles
+
+
+def _name(data: xr.Dataset, run: int) -> str:
+    return f"mode {data['mode'].values[run]}"
+
+
+def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
+    """Why modes did not get to their ends."""
+    out = [f"Mode {name} could not be run: {reason}" for name, reason in failed.items()]
+    for r, name in enumerate(data["mode"].values):
+        status = str(data["status"].values[r])
+        if status != "complete":
+            out.append(f"Mode {name}: {status}. {data['message'].values[r]}".rstrip())
+    return out
+
+
+def _model(run: Mapping[str, object]) -> str:
+    if run.get("rigid"):
+        return "rigid links"
+    if run.get("ked"):
+        return "kineto-elastodynamics"
+    if run.get("segments"):
+        return f"{run['segments']} finite segments on the longest link"
+    return f"{run.get('geometry', 'linear')} geometry"
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
+
+def _deflection(values: NDArray[np.float64], bodies: NDArray[np.str_], factor: float) -> str:
+    """The largest deflection (samples, bodies), and whose it is."""
+    if not np.isfinite(values).any() or np.nanmax(values) == 0.0:
+        return NOTHING
+    where = int(np.nanargmax(np.nanmax(np.where(np.isfinite(values), values, -1.0), axis=0)))
+    return f"{number(largest(values), factor)}\n{symbol(str(bodies[where]))}"
