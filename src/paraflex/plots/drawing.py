@@ -182,7 +182,7 @@ def mechanism_drawing(
     mode : str, optional
         Actuation mode; the first by default.
     time : float, optional
-        [s]; the run's start by default.
+        [s]; half way by default.
     magnify : float
         How many times deflections are drawn: joints stay where they are, links bend more.
     model : str, optional
@@ -200,7 +200,7 @@ def mechanism_drawing(
     look = theme(theme_name)
     run = select(data, mode, model)
     first, last = run_times(run)
-    time = first if time is None else time
+    time = 0.5 * (first + last) if time is None else time
     if not first <= time <= last:
         raise InputError("outside the run", field="time", value=time, remedy=f"choose it from {first:g} to {last:g} s")
     until = run["time"].values
