@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.labels import mode_label, three_digits
+from paraflex.plots.layout import page_width
 from paraflex.plots.scene import (
     Limits,
     Scene,
@@ -197,7 +198,7 @@ def mechanism_drawing(
     InputError
         No such mode, model or theme, a time outside the run, or results without shapes.
     """
-    look = theme(theme_name)
+    look, width = theme(theme_name), page_width(width)
     run = select(data, mode, model)
     first, last = run_times(run)
     time = 0.5 * (first + last) if time is None else time
