@@ -52,11 +52,10 @@ def blocks_of(page: Path) -> list[Block]:
 def run_page(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> int:
     """Run all blocks of a page in a folder; how many were run.
 
-    Python blocks share their names. Of a shell block every line is a `paraflex` command. A `diff` block edits the file of
-    its title, a `toml` block with a title is added to that file, one without must stand in a file of the folder or
-    of the library. A `text`
-    block is what the block above printed. A block of another kind, or one that is not to be run, has a comment above it
-    that says so: `<!-- not run: REASON -->`.
+    Python blocks share their names. Of a shell block every line is a `paraflex` command. A `diff` block edits the
+    file of its title, a `toml` block with a title is added to that file, one without must stand in a file of the
+    folder or of the library. A `text` block is what the block above printed. A block of another kind, or one that is
+    not to be run, has a comment above it that says so: `<!-- not run: REASON -->`.
     """
     monkeypatch.chdir(folder)
     monkeypatch.setenv("COLUMNS", "80")
@@ -71,7 +70,8 @@ def run_page(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> int:
         elif block.language == "sh":
             printed, count = _run_shell(block.text), count + 1
         elif block.language == "text":
-            assert before is not None and before.language in ("python", "sh"), block
+            assert before is not None
+            assert before.language in ("python", "sh"), block
             check_output(block.text, printed, last_differs=block.note == "last column differs")
         elif block.language == "diff":
             apply_diff(folder / block.title, block.text)
@@ -83,7 +83,7 @@ def run_page(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> int:
 
 
 def check_output(shown: str, printed: str, *, last_differs: bool = False) -> None:
-    """Lines as shown, in order; `...` stands for any lines; numbers within `TOLERANCE`, or half the last digit shown."""
+    """Lines as shown, in order; `...` stands for any lines; numbers within `TOLERANCE`, or a last digit shown."""
     actual = [tokens for line in printed.splitlines() if (tokens := _tokens(line))]
     position, skipping = 0, False
     for line in shown.splitlines():
@@ -96,9 +96,10 @@ def check_output(shown: str, printed: str, *, last_differs: bool = False) -> Non
         while skipping and position < len(actual) and not _same(tokens, actual[position], last_differs):
             position += 1
         found = actual[position] if position < len(actual) else None
-        assert found is not None and _same(tokens, found, last_differs), f"shown {line!r}, printed:\n{printed}"
+        assert found is not None, f"shown {line!r}, printed:\n{printed}"
+        assert _same(tokens, found, last_differs), f"shown {line!r}, printed:\n{printed}"
         position, skipping = position + 1, False
-    assert skipping or position == len(actual) or shown.lstrip().startswith("..."), f"more was printed:\n{printed}"
+    assert skipping or position == len(actual), f"more was printed:\n{printed}"
 
 
 def _same(shown: list[str], printed: list[str], last_differs: bool) -> bool:
@@ -146,7 +147,7 @@ def _run_shell(text: str) -> str:
 
 
 def apply_diff(path: Path, diff: str) -> None:
-    """Change a file as a diff says: hunks of lines that stand there (first column blank or minus) and of what they become.
+    """Change a file as a diff says: hunks of lines that stand there (blank or minus first) and of what they become.
 
     The last line of a hunk may be cut short. Hunks are parted by `@@`, or where a minus follows a plus.
     """

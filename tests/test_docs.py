@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+
 from pages import blocks_of, check_output, run_page
 
 ROOT = Path(__file__).parents[1]
@@ -63,9 +64,9 @@ def hooks(monkeypatch):
 
 @pytest.mark.usefixtures("hooks")
 def test_every_command_and_option_stands_on_the_page():
-    from command_line import command_line_page
     from typer.main import get_command
 
+    from command_line import command_line_page
     from paraflex.cli.app import app
 
     page = command_line_page()
@@ -78,7 +79,6 @@ def test_every_command_and_option_stands_on_the_page():
 @pytest.mark.usefixtures("hooks")
 def test_every_field_of_a_model_file_stands_on_the_page():
     from file_format import file_format_page
-
     from paraflex.files import model_schema
 
     page, schema = file_format_page(), model_schema()
@@ -92,9 +92,8 @@ def test_every_field_of_a_model_file_stands_on_the_page():
 
 @pytest.mark.usefixtures("hooks")
 def test_every_public_name_stands_on_one_page():
-    from api import PACKAGES, _origin, on_files, public_names
-
     import paraflex
+    from api import PACKAGES, _origin, on_files, public_names
 
     files = on_files([], _Config())
     pages = {file.src_uri: file.content_string for file in files}
@@ -118,8 +117,9 @@ class _Config:
 
 @pytest.mark.usefixtures("hooks")
 def test_formulas_are_understood_or_refused():
-    from mathematics import mathml
     from mkdocs.exceptions import PluginError
+
+    from mathematics import mathml
 
     made = mathml(
         r"\begin{aligned} a &amp;= \tfrac12 b \\ c &amp;= \Phi_q^{\mathsf T} \lambda \end{aligned}", "block", "page.md"
@@ -134,8 +134,9 @@ def test_formulas_are_understood_or_refused():
 def test_benchmark_tables_come_from_what_was_measured():
     import json
 
-    from benchmarks import MEASURED, on_page_markdown
     from mkdocs.exceptions import PluginError
+
+    from benchmarks import MEASURED, on_page_markdown
 
     page = type("Page", (), {"file": type("File", (), {"src_uri": "benchmarks.md"})})
     table = on_page_markdown("<!-- measured: peers -->", page)

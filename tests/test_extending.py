@@ -6,9 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from pages import apply_diff, blocks_of, check_output
-
 import paraflex
+from pages import apply_diff, blocks_of, check_output
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 

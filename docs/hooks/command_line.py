@@ -16,8 +16,8 @@ HEAD = """# The command line
 
 This page is made from the commands themselves; `paraflex COMMAND --help` says the same.
 
-Exit codes: 0 done, 1 numerical trouble (what was computed is kept and marked), 2 bad input (one line says which file, field
-and value, and what to do), 130 interrupted (what was computed is kept and marked).
+Exit codes: 0 done, 1 numerical trouble (what was computed is kept and marked), 2 bad input (one line says which file,
+field and value, and what to do), 130 interrupted (what was computed is kept and marked).
 
 A mode that begins with a minus sign needs an equals sign: `--mode=-+-+`.
 

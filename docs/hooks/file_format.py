@@ -13,12 +13,12 @@ PAGE = "reference/model-file.md"
 
 HEAD = """# The model file, field by field
 
-This page is made from the schema that files are checked by; `paraflex schema` prints the same as JSON Schema, for editors.
-[Your own mechanism](../model-file.md) explains the tables with examples.
+This page is made from the schema that files are checked by; `paraflex schema` prints the same as JSON Schema, for
+editors. [Your own mechanism](../model-file.md) explains the tables with examples.
 
-SI units and radians throughout. Wherever a *number* may stand, so may an expression in quotes: `"l1 - 0.5 * l2"` of numbers, of
-names from `[parameters]`, `pi`, `+ - * / **`, brackets, and `sin cos tan asin acos atan sinh cosh tanh exp log sqrt` of one
-argument. Where *of the time* is said it may hold `t` as well. A name stands for one that you choose.
+SI units and radians throughout. Wherever a *number* may stand, so may an expression in quotes, `"l1 - 0.5 * l2"`: of
+numbers, names from `[parameters]`, `pi`, `+ - * / **`, brackets, and of one argument `sin cos tan asin acos atan`
+`sinh cosh tanh exp log sqrt`. Where *of the time* is said it may hold `t` as well. NAME stands for one that you choose.
 
 """
 
@@ -72,7 +72,7 @@ class _Writer:
     def fields(self, properties: dict[str, Any], required: list[str], *, skip_type: bool = False) -> str:
         """A row a field: name, what it holds, default, meaning."""
         rows = [
-            f"| `{name}` | {self.kind(field)} | {_default(field, name in required)} | {_escape(field.get('description', ''))} |"
+            f"| `{name}` | {self.kind(field)} | {_default(field, name in required)} | {_meaning(field)} |"
             for name, field in properties.items()
             if not (skip_type and name == "type")
         ]
@@ -145,6 +145,10 @@ def _default(field: dict[str, Any], required: bool) -> str:
     if value in (None, "", [], {}):
         return ""
     return f"`{str(value).lower() if isinstance(value, bool) else value!r}`".replace("'", '"')
+
+
+def _meaning(field: dict[str, Any]) -> str:
+    return _escape(field.get("description", ""))
 
 
 def _sentence(text: str) -> str:

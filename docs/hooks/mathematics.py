@@ -13,6 +13,12 @@ from mkdocs.exceptions import PluginError
 _INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
 _BLOCK = re.compile(r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', re.DOTALL)
 
+# A letter with a prime, and maybe an index.
+_PRIME = re.compile(
+    r"<(?P<tag>msup|msubsup)>(?P<base><mi>[^<]*</mi>)(?P<below><m[in]>[^<]*</m[in]>)?"
+    r"<mi>(?P<prime>&#x0203[2-4];)</mi></(?P=tag)>"
+)
+
 
 def on_page_content(html: str, page: Any, **_: Any) -> str:
     """Every formula of a page as MathML."""
@@ -33,4 +39,10 @@ def mathml(latex: str, display: str, place: str) -> str:
     made = convert(latex.replace("{aligned}", "{align*}"), display=display)
     if "\\" in made or "<mi>&</mi>" in made:
         raise PluginError(f"{place}: not understood: {latex}")
-    return made
+    return _PRIME.sub(_beside, made)
+
+
+def _beside(found: re.Match[str]) -> str:
+    """A prime beside what it belongs to: raised as a superscript once more, it is a speck in fonts of text."""
+    base = f"<msub>{found['base']}{found['below']}</msub>" if found["below"] else found["base"]
+    return f'<mrow>{base}<mo lspace="0" rspace="0.05em">{found["prime"]}</mo></mrow>'
