@@ -12,8 +12,8 @@ run: $(VENV)/.run
 test: lint types imports tests docs
 
 lint: $(VENV)/.dev
-	$(BIN)/ruff format --check src tests benchmarks examples docs/hooks
-	$(BIN)/ruff check src tests benchmarks examples docs/hooks
+	$(BIN)/ruff format --check src tests benchmarks examples docs/hooks docs/notebooks
+	$(BIN)/ruff check src tests benchmarks examples docs/hooks docs/notebooks
 
 types: $(VENV)/.dev
 	$(BIN)/pyright

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from pages import check_output
 
 NOTEBOOKS = Path(__file__).parents[1] / "docs" / "notebooks"

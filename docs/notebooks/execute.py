@@ -15,7 +15,8 @@ HERE = Path(__file__).parent
 def execute(path: Path, folder: str | Path) -> Any:
     """A notebook with the outputs of a run in a folder; nothing is written to the notebook's file."""
     notebook = nbformat.read(path, as_version=4)
-    NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(folder)}}).execute()
+    resources = {"metadata": {"path": str(folder)}}
+    NotebookClient(notebook, timeout=600, kernel_name="python3", resources=resources).execute()
     for cell in notebook.cells:
         cell.metadata = {}
         cell.pop("id", None)
