@@ -12,8 +12,8 @@ run: $(VENV)/.run
 test: lint types imports tests docs
 
 lint: $(VENV)/.dev
-	$(BIN)/ruff format --check src tests benchmarks examples
-	$(BIN)/ruff check src tests benchmarks examples
+	$(BIN)/ruff format --check src tests benchmarks examples docs/hooks docs/notebooks
+	$(BIN)/ruff check src tests benchmarks examples docs/hooks docs/notebooks
 
 types: $(VENV)/.dev
 	$(BIN)/pyright
@@ -34,7 +34,7 @@ $(VENV)/.run: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,engines,sundials,cluster,optuna,indices]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,all]'
 	touch $@
 
 $(VENV)/.kernels: $(VENV)/.run $(KERNELS)

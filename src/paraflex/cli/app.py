@@ -63,7 +63,7 @@ def _show_version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
 
-        typer.echo(version("paraflex"))
+        typer.echo(f"paraflex {version('paraflex')}")
         raise typer.Exit
 
 

@@ -17,7 +17,8 @@ from paraflex.mechanism.mechanism import Assembly, Mechanism
 from paraflex.mechanism.poses import approximate_poses
 
 # Points at which segments hang together.
-FIRST_END, LAST_END = "_first", "_last"
+FIRST_END = "_first"
+LAST_END = "_last"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,114 @@
+"""The API pages: every public name, where it lives, in the words of its docstring."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+SOURCE = Path(__file__).parents[2] / "src" / "paraflex"
+
+# In the order of the theory; a name is told once, in the first of these that has it.
+PACKAGES = (
+    "files",
+    "mechanism",
+    "kinematics",
+    "actuation",
+    "simulate",
+    "motion",
+    "elastodynamics",
+    "integrators",
+    "dynamics",
+    "fem",
+    "results",
+    "plots",
+    "report",
+    "studies.sweeps",
+    "studies.sensitivities",
+    "studies.optimisation",
+    "studies",
+    "engines",
+    "errors",
+    "compilation",
+)
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add a page a package, and one for `paraflex` itself."""
+    homes: dict[str, str] = {}
+    told: set[str] = set()
+    for package in PACKAGES:
+        names = [name for name in public_names(package) if _origin(package, name) not in told]
+        told |= {_origin(package, name) for name in names}
+        homes |= {name: f"paraflex.{package}.{name}" for name in public_names(package) if name not in homes}
+        files.append(File.generated(config, _page(package), content=_package_page(package, names)))
+    files.append(File.generated(config, "reference/api/index.md", content=_index_page(homes)))
+    return files
+
+
+def public_names(package: str) -> list[str]:
+    """`__all__` of a package; of a module without one its functions and classes that are not private."""
+    tree = _tree(package)
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__":
+            return ast.literal_eval(node.value)
+    return [
+        node.name
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
+    ]
+
+
+def _page(package: str) -> str:
+    return f"reference/api/{package}.md"
+
+
+def _tree(package: str) -> ast.Module:
+    path = SOURCE / package.replace(".", "/")
+    file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+def _origin(package: str, name: str) -> str:
+    """The module a package takes a name from, followed as far as packages hand it on; and the name."""
+    for node in _tree(package).body:
+        if isinstance(node, ast.ImportFrom) and any((alias.asname or alias.name) == name for alias in node.names):
+            module = (node.module or "").removeprefix("paraflex.")
+            return _origin(module, name) if (SOURCE / module.replace(".", "/")).is_dir() else f"{module}.{name}"
+    return f"{package}.{name}"
+
+
+def _package_page(package: str, names: list[str]) -> str:
+    about = ast.get_docstring(_tree(package)) or ""
+    names = sorted(names, key=str.isupper)  # constants last
+    return f"# paraflex.{package}\n\n{about}\n\n" + "\n".join(f"::: paraflex.{package}.{name}\n" for name in names)
+
+
+def _index_page(homes: dict[str, str]) -> str:
+    tree = _tree("")
+    names = public_names("")
+    rows = [f"| `pf.{name}` | {_link(name, homes)} |" for name in names]
+    packages = [f"| [paraflex.{package}]({package}.md) | {_summary(_tree(package))} |" for package in PACKAGES]
+    return "\n".join(
+        [
+            "# Python, name by name",
+            "",
+            "Made from the docstrings. `import paraflex as pf`; what stands here is public.",
+            "",
+            *["| Name | Told under |", "|---|---|", *rows, ""],
+            *["| Package | |", "|---|---|", *packages, ""],
+            _summary(tree),
+        ]
+    )
+
+
+def _link(name: str, homes: dict[str, str]) -> str:
+    if name == "plots":
+        return "[paraflex.plots](plots.md)"
+    return f"[{homes[name]}][]"
+
+
+def _summary(tree: ast.Module) -> str:
+    return (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")

@@ -1,0 +1,148 @@
+"""Pages for newcomers are run block by block; pages made from the code say what the code says."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from pages import blocks_of, check_output, run_page
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+
+
+@pytest.mark.parametrize(
+    ("page", "least"),
+    [("tutorial.md", 8), ("first-mechanism.md", 7), ("modes.md", 3), ("index.md", 2)],
+)
+def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):
+    assert run_page(DOCS / page, tmp_path, monkeypatch) >= least
+
+
+def test_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    block, *others = [block for block in blocks_of(ROOT / "README.md") if block.language == "python"]
+    assert not others
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block.text, "README.md", "exec"), {})
+    assert (tmp_path / "path.png").stat().st_size > 10_000
+    # The block prints the tracking error in ++++; converged 6.288e-4 m, the default tolerance gives it to 1 %.
+    assert float(capsys.readouterr().out) == pytest.approx(6.288e-4, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed", "same"),
+    [
+        ("error 0.630 mm", "error 0.634 mm", True),
+        ("error 0.630 mm", "error 0.640 mm", False),
+        ("error 0.630 mm", "errors 0.630 mm", False),
+        ("a 1\n...\nb 2", "a 1\nc\nd\nb 2", True),
+        ("a 1\n...\nb 2", "a 1\nc\nd\nb 3", False),
+        ("a 1", "a 1\nb 2", False),
+        ("peak 5 at 12", "peak 5", False),
+        ("", "said something", False),
+    ],
+)
+def test_output_is_compared(shown, printed, same):
+    if same:
+        check_output(shown, printed)
+    else:
+        with pytest.raises(AssertionError):
+            check_output(shown, printed)
+
+
+def test_links_between_pages_and_images_exist():
+    """MkDocs checks links of pages; those of files outside it are checked here."""
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md"):
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
+            assert (ROOT / target).exists(), f"{page.name}: {target}"
+
+
+@pytest.fixture
+def hooks(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS / "hooks"))
+
+
+@pytest.mark.usefixtures("hooks")
+def test_every_command_and_option_stands_on_the_page():
+    from typer.main import get_command
+
+    from command_line import command_line_page
+    from paraflex.cli.app import app
+
+    page = command_line_page()
+    for name, command in get_command(app).commands.items():
+        assert (f"\n## {name}\n" in page) == (not command.hidden), name
+        for parameter in command.params:
+            assert all(f"`{option}`" in page for option in parameter.opts if option.startswith("-"))
+
+
+@pytest.mark.usefixtures("hooks")
+def test_every_field_of_a_model_file_stands_on_the_page():
+    from file_format import file_format_page
+    from paraflex.files import model_schema
+
+    page, schema = file_format_page(), model_schema()
+    tables = {"": schema, **schema["$defs"]}
+    for name, table in tables.items():
+        for field, content in table.get("properties", {}).items():
+            if "const" not in content and (name or "$ref" not in str(content)):
+                assert f"| `{field}` |" in page, (name, field)
+                assert "description" in content or "$ref" in str(content), (name, field)
+
+
+@pytest.mark.usefixtures("hooks")
+def test_every_public_name_stands_on_one_page():
+    import paraflex
+    from api import PACKAGES, _origin, on_files, public_names
+
+    files = on_files([], _Config())
+    pages = {file.src_uri: file.content_string for file in files}
+    told = re.findall(r"^::: (\S+)$", "\n".join(pages.values()), flags=re.MULTILINE)
+    origins = [_origin(*name.removeprefix("paraflex.").rsplit(".", 1)) for name in told]
+    assert len(origins) == len(set(origins))
+    for package in PACKAGES:
+        for name in public_names(package):
+            assert _origin(package, name) in origins, (package, name)
+    index = pages["reference/api/index.md"]
+    assert all(f"`pf.{name}`" in index for name in paraflex.__all__)
+
+
+class _Config:
+    """As much of MkDocs' configuration as a generated file asks for."""
+
+    site_dir = "site"
+    use_directory_urls = True
+    plugins = type("Plugins", (), {"_current_plugin": "api"})()
+
+
+@pytest.mark.usefixtures("hooks")
+def test_formulas_are_understood_or_refused():
+    from mkdocs.exceptions import PluginError
+
+    from mathematics import mathml
+
+    made = mathml(
+        r"\begin{aligned} a &amp;= \tfrac12 b \\ c &amp;= \Phi_q^{\mathsf T} \lambda \end{aligned}", "block", "page.md"
+    )
+    assert made.count("<mtr>") == 2
+    assert "\N{GREEK SMALL LETTER LAMDA}" in made or "&#x003BB;" in made
+    with pytest.raises(PluginError, match=r"page\.md"):
+        mathml(r"\nosuchcommand{x}", "inline", "page.md")
+
+
+@pytest.mark.usefixtures("hooks")
+def test_benchmark_tables_come_from_what_was_measured():
+    import json
+
+    from mkdocs.exceptions import PluginError
+
+    from benchmarks import MEASURED, on_page_markdown
+
+    page = type("Page", (), {"file": type("File", (), {"src_uri": "benchmarks.md"})})
+    table = on_page_markdown("<!-- measured: peers -->", page)
+    results = json.loads((MEASURED / "peers.json").read_text(encoding="utf-8"))["results"]
+    first = next(line for line in table.splitlines() if line.startswith("| paraflex"))
+    assert f"{min(result['seconds'] for result in results):.3f}" in first
+    assert all(result["name"] in table for result in results)
+    with pytest.raises(PluginError, match="no table 'pears'"):
+        on_page_markdown("<!-- measured: pears -->", page)
