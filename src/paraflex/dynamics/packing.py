@@ -84,8 +84,8 @@ def pack_system(
         places=np.concatenate([_places(body).ravel() for body in bodies]),
         spans=np.concatenate([_spans(body).ravel() for body in bodies]),
         inertias=np.concatenate([_inertias(body).ravel() for body in bodies]),
-        total_mass=float(sum(body.integrals.m for body in bodies)),
-        gravity=np.array(mechanism.gravity, dtype=float),
+        total_mass=np.sum([body.integrals.m for body in bodies]).item(),
+        gravity=np.array(mechanism.gravity) * 1.0,
     )
     return packed, tuple(packer.labels)
 
@@ -211,7 +211,7 @@ def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
 def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix with columns of zeros up to whole vectors."""
     rows, columns = matrix.shape
-    out = np.zeros((rows, padded(columns)))
+    out = np.zeros((rows, padded(columns)), dtype=matrix.dtype)
     out[:, :columns] = matrix
     return out
 
@@ -292,7 +292,10 @@ def _mass_records(bodies: tuple[BodyCoordinates, ...]) -> NDArray[np.void]:
 
 def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
     blank = dict.fromkeys(dtype.names or (), 0)
-    return np.array([tuple((blank | value).values()) for value in values], dtype=dtype)
+    rows = [tuple((blank | value).values()) for value in values]
+    if any(isinstance(number, complex) for row in rows for number in row):
+        dtype = np.dtype([(name, complex if dtype[name].kind == "f" else dtype[name]) for name in blank])
+    return np.array(rows, dtype=dtype)
 
 
 def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:

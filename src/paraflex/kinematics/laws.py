@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ class TrapezoidalLaw:
     @property
     def period(self) -> float:
         """T [s]."""
-        return sqrt(pi * self.length / self.max_acceleration)
+        return np.sqrt(pi * self.length / self.max_acceleration)
 
     @property
     def duration(self) -> float:
