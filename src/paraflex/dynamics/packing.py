@@ -63,14 +63,14 @@ def pack_system(
         bodies=_body_records(bodies, packer.ports, packer.efforts, columns),
         markers=_marker_records(markers),
         ports=_port_records(packer.ports),
-        efforts=_records(EFFORT, [effort for group in packer.efforts for effort in group]),
-        loads=_records(LOAD, loads),
-        lines=_records(LINE, lines),
-        axes=_records(AXIS_RECORD, packer.axes),
-        tracks=_records(TRACK, tracks),
+        efforts=records(EFFORT, [effort for group in packer.efforts for effort in group]),
+        loads=records(LOAD, loads),
+        lines=records(LINE, lines),
+        axes=records(AXIS_RECORD, packer.axes),
+        tracks=records(TRACK, tracks),
         track_breaks=breaks,
         track_coefficients=coefficients,
-        rows=_records(ROW, _with_envelope(packer.rows, packer.ports)),
+        rows=records(ROW, _with_envelope(packer.rows, packer.ports)),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
         G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
@@ -287,10 +287,11 @@ def _mass_records(bodies: tuple[BodyCoordinates, ...]) -> NDArray[np.void]:
             )
             shape += body.nf
             start += weights.size
-    return _records(MASS, values)
+    return records(MASS, values)
 
 
-def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
+def records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
+    """Records of dictionaries by field, zero where one has none; complex where a number is."""
     blank = dict.fromkeys(dtype.names or (), 0)
     rows = [tuple((blank | value).values()) for value in values]
     if any(isinstance(number, complex) for row in rows for number in row):
@@ -355,7 +356,7 @@ def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
         inertias += 3 * padded(masses)
         dense += size**2 if slopes else 0
         inverse += size * padded(size) if slopes else 0
-    return _records(BODY, values)
+    return records(BODY, values)
 
 
 def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
@@ -376,7 +377,7 @@ def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
         )
         shape += marker.slope.size
         bending += marker.slope.size * padded(marker.slope.size) if bends else 0
-    return _records(MARKER, values)
+    return records(MARKER, values)
 
 
 def _port_records(ports) -> NDArray[np.void]:
@@ -386,7 +387,7 @@ def _port_records(ports) -> NDArray[np.void]:
         for port in body_ports:
             values.append(port | {"local": local})
             local += port["parts"]
-    return _records(PORT, values)
+    return records(PORT, values)
 
 
 def _with_envelope(rows: list[dict], ports: list[list[dict]]) -> list[dict]:

@@ -8,8 +8,8 @@ give i h times their own derivatives, without any loss of digits.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from typing import Any, TypeVar
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,14 @@ T = TypeVar("T")
 STEP = 1e-40
 
 
+@dataclass(frozen=True)
+class Stepped(Generic[T]):
+    """A description with a complex step, and the largest part of a number's derivative that differences leave."""
+
+    value: T
+    error: float
+
+
 def part(values: Any) -> NDArray[np.float64]:
     """The derivative in numbers with a complex step; zero of real ones."""
     return np.imag(values) / STEP
@@ -33,7 +41,7 @@ def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> NDA
     return values + 1j * STEP * derivative
 
 
-def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> T:
+def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> Stepped[T]:
     """A description with a complex step.
 
     Parameters
@@ -48,7 +56,9 @@ def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> T:
     InputError
         Something else than numbers changes.
     """
-    return _Walk(stencil).step(here, list(near))
+    walk = _Walk(stencil)
+    value = walk.step(here, list(near))
+    return Stepped(value, walk.error)
 
 
 def with_fields(record: T, **changes: Any) -> T:
@@ -63,7 +73,7 @@ class _Walk:
     """Down a description and those near it."""
 
     def __init__(self, stencil: Stencil) -> None:
-        self.stencil = stencil
+        self.stencil, self.error = stencil, 0.0
 
     def step(self, here: Any, near: list[Any]) -> Any:
         if isinstance(here, bool | np.bool_ | str | type) or here is None:
@@ -83,8 +93,9 @@ class _Walk:
     def number(self, here: Any, near: list[Any]) -> Any:
         if all(each == here for each in near):
             return here
-        derivative = self.stencil.derivative([np.array(each, dtype=float) for each in near]).value
-        return np.complex128(complex(here, STEP * float(derivative)))
+        found = self.stencil.derivative([np.array(each, dtype=float) for each in near])
+        self.error = max(self.error, float(found.error / max(abs(found.value), abs(here))))
+        return np.complex128(complex(here, STEP * float(found.value)))
 
     def array(self, here: NDArray, near: list[NDArray]) -> NDArray:
         if here.dtype.kind != "f" or all(np.array_equal(each, here) for each in near):
