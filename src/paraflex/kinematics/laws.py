@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,8 @@ class TrapezoidalLaw:
     @property
     def period(self) -> float:
         """T [s]."""
-        return np.sqrt(pi * self.length / self.max_acceleration)
+        squared = pi * self.length / self.max_acceleration
+        return np.sqrt(squared) if isinstance(squared, complex) else sqrt(squared)
 
     @property
     def duration(self) -> float:

@@ -91,7 +91,8 @@ class Polygon:
     @property
     def duration(self) -> float:
         """Of the motion [s]."""
-        return self._starts[-1].item()
+        end = self._starts[-1]
+        return end if np.iscomplexobj(end) else float(end)
 
     @property
     def knots(self) -> tuple[float, ...]:
