@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.actuation import Effort, FeedForward, actuation_condition, required_effort
+from paraflex.actuation import Effort, FeedForward, required_effort
 from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
 from paraflex.dynamics import (
@@ -34,8 +34,8 @@ from paraflex.kinematics.variation import MotionChange, Nearby, vary_motion
 from paraflex.mechanism import Mechanism, RigidBody
 from paraflex.simulate import TrackingTask, path_knots
 from paraflex.studies.sensitivities.plans import Given
-from paraflex.studies.sensitivities.steps import Stepped, complex_step, part, stepped, with_fields
 from paraflex.studies.sensitivities.stencil import STENCILS, Difference, Stencil
+from paraflex.studies.sensitivities.steps import Stepped, complex_step, part, stepped, with_fields
 from paraflex.studies.sweeps.run import Task
 from paraflex.studies.sweeps.study import Setting
 
@@ -123,7 +123,7 @@ class Change:
             self.system = build_system(self.there.mechanism, planned.system)
             self._check_layout()
         except InputError as error:
-            raise InputError(error.problem, field=f"vary.{self.name}", remedy=error.remedy) from None
+            raise InputError(error.problem, field=f"vary.{self.name}", value=error.value, remedy=error.remedy) from None
         self.closure = PathClosure(planned.mechanism.rigid(), here.orientation, here.end)
         self.end = here.end
 
@@ -317,21 +317,18 @@ class _Planned:
     def d_effort(self) -> tuple[Array, Array]:
         """Derivatives of the required effort (k, tasks) and of the actuation matrix (k, tasks, motors)."""
         motion, change = self.motion, self.change
-        q, v, basis = (stepped(x, dx) for x, dx in zip((motion.q, motion.v, motion.basis), (change.q, change.v, change.basis), strict=True))  # fmt: skip
-        moved = replace(motion, mechanism=self.owner.there.mechanism, system=self._rigid(), q=q, v=v, basis=basis)
+        q, v, basis = (stepped(getattr(motion, name), getattr(change, name)) for name in ("q", "v", "basis"))
+        moved = replace(motion, mechanism=self.owner.there.mechanism, system=self.owner.rigid, q=q, v=v, basis=basis)
         forces = self._forces()
         add_springs_and_dampers(moved, forces)
         transposed = np.swapaxes(basis, 1, 2)
         required = np.einsum("kij,kj->ki", transposed, forces)
         return part(required), part(transposed @ motor_rows(moved))
 
-    def _rigid(self) -> System:
-        return self.owner.rigid
-
     def _forces(self) -> NDArray:
         """Of inertia, weight and loads, with a complex step."""
         motion, change, here = self.motion, self.change, self.motion.system.packed
-        numbers, d_numbers = numbers_of(here), part(numbers_of(self._rigid().packed))
+        numbers, d_numbers = numbers_of(here), part(numbers_of(self.owner.rigid.packed))
 
         def at(place: float) -> Array:
             forces = apart(motion.q.shape)

@@ -133,7 +133,7 @@ def _with_motion(run: TrackingRun, nominal: Given, motion: Motion) -> TrackingRu
 def _slopes(
     setting: Setting, run: TrackingRun, here: Traces, nominal: Given, found: RunDerivatives, k: int, change: ModeChange
 ) -> Array:
-    """Derivatives of the numbers that metrics give by parameter k as a part of its size: of a run with a complex step."""
+    """Derivatives of the numbers of metrics by parameter k as a part of its size: by a run with a complex step."""
     direction, along = change.direction, Motion(*(each[k] for each in found.derivatives))
     q, v, a, multipliers, work = (stepped(x, dx) for x, dx in zip(found.motion, along, strict=True))
     energy = _stepped_energies(nominal, found.motion, along, direction)
