@@ -182,6 +182,7 @@ class PathClosure:
         self.packed, self.marker = with_marker(system, effector.point)
 
     def check_degrees_of_freedom(self) -> None:
+        """Nothing, if there are as many task coordinates as degrees of freedom."""
         free, tasks = self.system.n - self.system.n_constraints, self.coordinates.size
         if free != tasks:
             raise InputError(
@@ -192,9 +193,11 @@ class PathClosure:
             )
 
     def assemble(self, assembly: Assembly) -> NDArray[np.float64]:
+        """The pose of an assembly, loops closed."""
         return project_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
     def task(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Task coordinates of a pose."""
         zero, out = np.zeros_like(q), apart((3, self.coordinates.size))
         task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero, out)
         return out[0]
