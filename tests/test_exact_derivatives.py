@@ -1,7 +1,5 @@
 """Derivatives of what comes before a run: eigenpairs, systems, planned motion and torques, and laws they must obey."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -32,7 +30,7 @@ samples = 7
 [integration]
 method = "tr-bdf2"
 step = 2e-3
-tolerance = 1e-7
+tolerance = 1e-11
 
 [vary.density]
 fields = ["material.aluminium.density"]
@@ -168,6 +166,14 @@ def test_paths(path, near):
     assert found.real == pytest.approx(np.stack(path.evaluate(t)), rel=1e-13, abs=1e-16)
 
 
+def test_what_is_no_number_must_not_change():
+    near = [(1.0, 2.0)] * len(STENCIL.places)
+    assert complex_step((1.0, 2.0), near, STENCIL).value == (1.0, 2.0)
+    for other in ((1.0, 2.0, 3.0), [1.0, 2.0]):
+        with pytest.raises(InputError, match="more than numbers changes"):
+            complex_step((1.0, 2.0), [other] * len(STENCIL.places), STENCIL)  # pyright: ignore[reportArgumentType]
+
+
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     file = tmp_path_factory.mktemp("study") / "study.toml"
@@ -206,7 +212,7 @@ def test_what_a_run_is_given(study, name):
 
 def test_laws_of_scale(study):
     """All masses and stiffnesses grown alike leave the motion alone; forces, work and energies grow with them."""
-    found = sensitivities(replace(study, setting=replace(study.setting)))
+    found = sensitivities(study)
     scaled = [found.parameters.index(name) for name in SCALES]
     total = dict(zip(found.metrics, found.relative[0][:, scaled].sum(axis=1), strict=True))
     # Metrics of less digits than others are differences of nearly equal positions.
@@ -215,4 +221,5 @@ def test_laws_of_scale(study):
     for name in ("deflection_max", "actuation_condition_max"):
         assert total[name] == pytest.approx(0.0, abs=1e-11)
     for name in ("peak_torque_max", "rms_torque_norm", "work", "kinetic_energy_max", "strain_energy_max", "total_mass"):
-        assert total[name] == pytest.approx(1.0, abs=1e-11), name
+        # What these are divided by is the run's own, whose Newton iterations end at its tolerance.
+        assert total[name] == pytest.approx(1.0, abs=1e-10), name

@@ -145,7 +145,9 @@ class Change:
 
     def _check_layout(self) -> None:
         if not all(same_layout(each.packed, self.planned.system.packed) for each in self.beside):
-            raise InputError("more than numbers changes with it: no derivative", remedy="move it a little with --at")
+            raise InputError(
+                "more than numbers changes with it: no derivative", field="vary", remedy="move it a little with --at"
+            )
 
     @cached_property
     def packed(self) -> Array:
