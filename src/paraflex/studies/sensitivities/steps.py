@@ -36,7 +36,7 @@ def part(values: Any) -> NDArray[np.float64]:
     return np.imag(values) / STEP
 
 
-def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> NDArray[np.complex128]:
+def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> NDArray[Any]:
     """Numbers with a complex step along a derivative."""
     return values + 1j * STEP * derivative
 
