@@ -207,7 +207,7 @@ def plan_tracking(
         path=path,
         motion=motion,
         effort=required_effort(motion),
-        plan=plan_torques(follow, _knots(path, end)),
+        plan=plan_torques(follow, path_knots(path, end)),
         start=_start(system, motion, _in_place(system)),
     )
 
@@ -279,6 +279,7 @@ def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str
     return State(float(motion.t[0]), q, v)
 
 
-def _knots(path: Path, end: float) -> NDArray[np.float64]:
+def path_knots(path: Path, end: float) -> NDArray[np.float64]:
+    """Times of a run to an end between which the motion along a path is smooth, both ends among them [s]."""
     knots = np.unique(np.concatenate([[0.0, end], [knot for knot in path.knots if 0.0 < knot < end]]))
     return knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]

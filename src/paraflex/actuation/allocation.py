@@ -51,14 +51,18 @@ def required_effort(motion: RigidMotion) -> Effort:
     system = motion.system
     forces = apart(motion.q.shape)
     motion_forces(system.packed, motion.q, motion.v, motion.a, forces, make_scratch(system.packed))
-    _add_springs_and_dampers(motion, forces)
+    add_springs_and_dampers(motion, forces)
     transposed = np.swapaxes(motion.basis, 1, 2)
-    rows = [joint_coordinate(system, motor.joint, motion.q).rows for motor in system.mechanism.motors]
-    selection = np.stack(rows, axis=2) if rows else np.zeros((*motion.q.shape, 0))
-    return Effort(motion, np.einsum("kij,kj->ki", transposed, forces), transposed @ selection)
+    return Effort(motion, np.einsum("kij,kj->ki", transposed, forces), transposed @ motor_rows(motion))
 
 
-def _add_springs_and_dampers(motion: RigidMotion, forces: NDArray[np.float64]) -> None:
+def motor_rows(motion: RigidMotion) -> NDArray[np.float64]:
+    """Derivatives (k, n, motors) of the motors' joint coordinates by all coordinates."""
+    rows = [joint_coordinate(motion.system, motor.joint, motion.q).rows for motor in motion.system.mechanism.motors]
+    return np.stack(rows, axis=2) if rows else np.zeros((*motion.q.shape, 0))
+
+
+def add_springs_and_dampers(motion: RigidMotion, forces: NDArray[np.float64]) -> None:
     """What springs, dampers and friction at joints ask for besides inertia, into forces (k, n)."""
     for spring in motion.mechanism.springs:
         value, _, rows = joint_coordinate(motion.system, spring.joint, motion.q)

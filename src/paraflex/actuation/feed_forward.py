@@ -93,10 +93,10 @@ class TorquePlan:
         for refined in range(_REFINEMENTS):
             effort = self._effort(refined)
             t, torques = effort.motion.t, allocate(effort, mode)
-            checked = FeedForward(mode, tuple(_splines(t[::2], torques[::2], self.knots)), self.knots, t[::2])
+            checked = FeedForward(mode, tuple(splines(t[::2], torques[::2], self.knots)), self.knots, t[::2])
             error = np.max(np.abs(checked.evaluate(t) - torques))
             if error <= _GAIN * _ACCURACY * max(np.max(np.abs(torques)), np.finfo(float).tiny):
-                return FeedForward(mode, tuple(_splines(t, torques, self.knots)), self.knots, t)
+                return FeedForward(mode, tuple(splines(t, torques, self.knots)), self.knots, t)
         raise NumericalError(f'the torques of mode "{mode.name}" are too steep to interpolate: near a singularity')
 
     def feed_forward_like(self, other: FeedForward) -> FeedForward:
@@ -118,7 +118,7 @@ class TorquePlan:
         times[np.searchsorted(other.times, other.knots)] = self.knots
         effort = required_effort(self.follow(times))
         torques = allocate(effort, other.mode)
-        return FeedForward(other.mode, tuple(_splines(times, torques, self.knots)), self.knots, times)
+        return FeedForward(other.mode, tuple(splines(times, torques, self.knots)), self.knots, times)
 
     def _effort(self, refined: int) -> Effort:
         """On the fine grid with every interval halved so often."""
@@ -168,7 +168,7 @@ def _interleaved(effort: Effort, between: Effort) -> Effort:
     )
 
 
-def _splines(t: NDArray[np.float64], values: NDArray[np.float64], knots: NDArray[np.float64]) -> list[InputSignals]:
+def splines(t: NDArray[np.float64], values: NDArray[np.float64], knots: NDArray[np.float64]) -> list[InputSignals]:
     """A quintic spline of each column between neighbouring knots, joined."""
     breaks, coefficients = [], []
     edges = np.searchsorted(t, knots)

@@ -6,6 +6,7 @@ from paraflex.dynamics.equilibrium import static_equilibrium
 from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate, material_angle
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.numbers import blocks_of, numbers_of, same_layout, with_numbers
+from paraflex.dynamics.packing import records
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.singularity import SingularityMeasure
@@ -56,6 +57,7 @@ __all__ = [
     "project_position",
     "project_velocity",
     "reach",
+    "records",
     "redundant_rows",
     "reference_pose",
     "same_layout",

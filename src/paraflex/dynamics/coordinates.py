@@ -170,7 +170,7 @@ def make_marker(
 ) -> Marker:
     """The material point of that name; of the ground, a place without a body."""
     if ref.on_ground:
-        return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point], dtype=float), np.zeros((2, 0)), np.zeros(0))
+        return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point]) * 1.0, np.zeros((2, 0)), np.zeros(0))
     i = index[ref.body]
     body = bodies[i]
     if body.mesh is None:
@@ -193,7 +193,7 @@ def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
     """The material point at a node of a beam, counted from its first end."""
     mesh, points = body.mesh, body.points
     assert mesh is not None
-    x = float(mesh.nodes[node])
+    x = mesh.nodes[node]
     N, slope = mesh.shape_at_node(node)
     bending = points.bending(node_weights(mesh, node)) if points is not None and node > 0 else None
     return Marker(index, np.array([x, 0.0]), N @ body.integrals.D, slope @ body.integrals.D, bending)

@@ -69,7 +69,7 @@ def _angle(system: System, ref: PointRef, q: NDArray[np.float64]) -> tuple[NDArr
 def _marker_angle(
     system: System, marker: Marker, q: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    rows = np.zeros(q.shape)
+    rows = np.zeros(q.shape, dtype=np.result_type(q, marker.slope))
     if marker.body == GROUND_INDEX:
         return np.zeros(q.shape[0]), rows
     body = system.bodies[marker.body]
@@ -82,7 +82,7 @@ def marker_place(
     system: System, marker: Marker, q: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Position (k, 2) of a material point in the ground frame, and its derivative (k, 2, n): [1, R E s, R ds/du]."""
-    rows = np.zeros((q.shape[0], 2, q.shape[1]))
+    rows = np.zeros((q.shape[0], 2, q.shape[1]), dtype=np.result_type(q, marker.x0, marker.N))
     if marker.body == GROUND_INDEX:
         return np.broadcast_to(marker.x0, (q.shape[0], 2)), rows
     body = system.bodies[marker.body]

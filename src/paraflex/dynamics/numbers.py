@@ -45,12 +45,12 @@ def same_layout(a: tuple, b: tuple) -> bool:
 
 def _parts(record: tuple) -> Iterator[Any]:
     for field in record:
-        if isinstance(field, float):
+        if isinstance(field, float | complex):
             yield np.array([field])
         elif isinstance(field, np.ndarray):
             if field.dtype.names is not None:
                 yield from (field[name] for name in _floating(field))
-            elif field.dtype.kind == "f":
+            elif field.dtype.kind in "fc":
                 yield field
 
 
@@ -80,4 +80,4 @@ def _same(x: Any, y: Any) -> bool:
 
 def _floating(records: NDArray[np.void]) -> list[str]:
     names = records.dtype.names or ()
-    return [name for name in names if records.dtype[name].kind == "f"]
+    return [name for name in names if records.dtype[name].kind in "fc"]

@@ -63,14 +63,14 @@ def pack_system(
         bodies=_body_records(bodies, packer.ports, packer.efforts, columns),
         markers=_marker_records(markers),
         ports=_port_records(packer.ports),
-        efforts=_records(EFFORT, [effort for group in packer.efforts for effort in group]),
-        loads=_records(LOAD, loads),
-        lines=_records(LINE, lines),
-        axes=_records(AXIS_RECORD, packer.axes),
-        tracks=_records(TRACK, tracks),
+        efforts=records(EFFORT, [effort for group in packer.efforts for effort in group]),
+        loads=records(LOAD, loads),
+        lines=records(LINE, lines),
+        axes=records(AXIS_RECORD, packer.axes),
+        tracks=records(TRACK, tracks),
         track_breaks=breaks,
         track_coefficients=coefficients,
-        rows=_records(ROW, _with_envelope(packer.rows, packer.ports)),
+        rows=records(ROW, _with_envelope(packer.rows, packer.ports)),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
         G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
@@ -84,8 +84,8 @@ def pack_system(
         places=np.concatenate([_places(body).ravel() for body in bodies]),
         spans=np.concatenate([_spans(body).ravel() for body in bodies]),
         inertias=np.concatenate([_inertias(body).ravel() for body in bodies]),
-        total_mass=float(sum(body.integrals.m for body in bodies)),
-        gravity=np.array(mechanism.gravity, dtype=float),
+        total_mass=np.sum([body.integrals.m for body in bodies]).item(),
+        gravity=np.array(mechanism.gravity) * 1.0,
     )
     return packed, tuple(packer.labels)
 
@@ -211,7 +211,7 @@ def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
 def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix with columns of zeros up to whole vectors."""
     rows, columns = matrix.shape
-    out = np.zeros((rows, padded(columns)))
+    out = np.zeros((rows, padded(columns)), dtype=matrix.dtype)
     out[:, :columns] = matrix
     return out
 
@@ -287,12 +287,16 @@ def _mass_records(bodies: tuple[BodyCoordinates, ...]) -> NDArray[np.void]:
             )
             shape += body.nf
             start += weights.size
-    return _records(MASS, values)
+    return records(MASS, values)
 
 
-def _records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
+def records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
+    """Records of dictionaries by field, zero where one has none; complex where a number is."""
     blank = dict.fromkeys(dtype.names or (), 0)
-    return np.array([tuple((blank | value).values()) for value in values], dtype=dtype)
+    rows = [tuple((blank | value).values()) for value in values]
+    if any(isinstance(number, complex) for row in rows for number in row):
+        dtype = np.dtype([(name, complex if dtype[name].kind == "f" else dtype[name]) for name in blank])
+    return np.array(rows, dtype=dtype)
 
 
 def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
@@ -352,7 +356,7 @@ def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
         inertias += 3 * padded(masses)
         dense += size**2 if slopes else 0
         inverse += size * padded(size) if slopes else 0
-    return _records(BODY, values)
+    return records(BODY, values)
 
 
 def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
@@ -373,7 +377,7 @@ def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
         )
         shape += marker.slope.size
         bending += marker.slope.size * padded(marker.slope.size) if bends else 0
-    return _records(MARKER, values)
+    return records(MARKER, values)
 
 
 def _port_records(ports) -> NDArray[np.void]:
@@ -383,7 +387,7 @@ def _port_records(ports) -> NDArray[np.void]:
         for port in body_ports:
             values.append(port | {"local": local})
             local += port["parts"]
-    return _records(PORT, values)
+    return records(PORT, values)
 
 
 def _with_envelope(rows: list[dict], ports: list[list[dict]]) -> list[dict]:

@@ -60,7 +60,7 @@ def body_shape(body: Body) -> BodyShape:
     """
     if isinstance(body, RigidBody):
         points = {
-            name: PointShape(np.array(place, dtype=float), np.zeros((2, 0)), np.zeros(0))
+            name: PointShape(np.array(place) * 1.0, np.zeros((2, 0)), np.zeros(0))
             for name, place in body.points.items()
         }
         return BodyShape(rigid_integrals(body.mass, body.centre_of_mass, body.inertia), points=points)

@@ -49,8 +49,8 @@ class Polynomial:
 
     def evaluate(self, z: Array, derivative: int = 0) -> Array:
         """Values at z (k,), or those of a derivative by z."""
-        derived = np.polynomial.polynomial.polyder(np.array(self.coefficients, dtype=float), derivative)
-        return np.asarray(np.polynomial.polynomial.polyval(z, derived), dtype=float)
+        derived = np.polynomial.polynomial.polyder(np.array(self.coefficients) * 1.0, derivative)
+        return np.asarray(np.polynomial.polynomial.polyval(z, derived))
 
 
 ShapeFunction = Sine | Polynomial
@@ -87,8 +87,9 @@ class AssumedShapes:
 
     def shape_at(self, x: float) -> tuple[Array, Array]:
         """Shape matrix N (2, count) and slope row N2' (count,) of the point at x [m]."""
-        place, n = np.array([x], dtype=float), len(self.transverse)
-        N, slope = np.zeros((2, self.count)), np.zeros(self.count)
+        place, n = np.array([x]) * 1.0, len(self.transverse)
+        kind = np.result_type(place, self.length)
+        N, slope = np.zeros((2, self.count), kind), np.zeros(self.count, kind)
         N[0, n:], N[1, :n] = self.axial_rows(place)[0], self.transverse_rows(place)[0]
         slope[:n] = self.transverse_rows(place, derivative=1)[0]
         return N, slope
@@ -140,7 +141,8 @@ def assumed_integrals(shapes: AssumedShapes, span: SpanProperties, lumps: Sequen
     bent = _basis(np.concatenate([root * across, np.sqrt(inertias)[:, None] * turns]), bending, "transverse")
     stretched = _basis(root * along, stretch, "axial")
     n = len(shapes.transverse)
-    N, slopes = np.zeros((everywhere.size, 2, shapes.count)), np.zeros((places.size, shapes.count))
+    kind = np.result_type(bent, stretched, across, along)
+    N, slopes = np.zeros((everywhere.size, 2, shapes.count), kind), np.zeros((places.size, shapes.count), kind)
     N[:, 0, n:], N[:, 1, :n], slopes[:, :n] = along @ stretched, across @ bent, turns @ bent
     roots = np.asarray(scipy.linalg.block_diag(bending @ bent, stretch @ stretched))
     return bar_integrals(
@@ -157,18 +159,18 @@ def _columns(functions: Sequence[ShapeFunction], z: Array, derivative: int) -> A
 
 def _basis(moving: Array, strains: Array, field: str) -> Array:
     """Combinations (n, n) of n functions with unit mass matrix, from square roots of mass and stiffness matrices."""
-    sizes = np.linalg.norm(moving, axis=0)
+    sizes = np.linalg.norm(moving.real, axis=0)
     if not sizes.size:
         return np.zeros((0, 0))
-    singular = np.linalg.svd(moving / np.where(sizes > 0.0, sizes, 1.0), compute_uv=False)
+    singular = np.linalg.svd(moving.real / np.where(sizes > 0.0, sizes, 1.0), compute_uv=False)
     if singular.size < sizes.size or singular[-1] <= _DEPENDENT * singular[0]:
         raise InputError(
             "its shape functions are linearly dependent, or nearly so",
             field=field,
             remedy="leave out those that others make up (powers of x nearly do from the 15th on)",
         )
-    basis = np.linalg.inv(np.linalg.qr(moving / sizes, mode="r")) / sizes[:, None]
-    strained = np.linalg.svd(strains @ basis, compute_uv=False)
+    basis = np.linalg.inv(_triangle(moving / sizes)) / sizes[:, None]
+    strained = np.linalg.svd((strains @ basis).real, compute_uv=False)
     if strained[-1] <= _RIGID * strained[0]:
         raise InputError(
             "its shape functions contain a rigid motion of the bar",
@@ -176,3 +178,12 @@ def _basis(moving: Array, strains: Array, field: str) -> Array:
             remedy="leave out what moves it as a whole: its body frame does that",
         )
     return basis
+
+
+def _triangle(matrix: Array) -> Array:
+    """R of a matrix Q R, of a complex step with its derivative: R^T R = A^T A."""
+    R = np.linalg.qr(matrix.real, mode="r")
+    if not np.iscomplexobj(matrix):
+        return R
+    change = np.linalg.solve(R.T, np.linalg.solve(R.T, (matrix.T @ matrix).imag).T)
+    return R + 1j * (np.triu(change) - 0.5 * np.diag(np.diag(change))) @ R

@@ -56,8 +56,8 @@ def axial_shape(x: NDArray[np.float64], length: float, derivative: int = 0) -> N
     -------
     (n, 8) array
     """
-    z = np.asarray(x, dtype=float) / length
-    rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE))
+    z = np.asarray(x) / length
+    rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE), dtype=z.dtype)
     if derivative == 0:
         rows[:, _AXIAL_COLUMNS] = np.column_stack([1.0 - z, z])
     elif derivative == 1:
@@ -81,8 +81,8 @@ def transverse_shape(x: NDArray[np.float64], length: float, derivative: int = 0)
     -------
     (n, 8) array
     """
-    z = np.asarray(x, dtype=float) / length
-    rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE))
+    z = np.asarray(x) / length
+    rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE), dtype=z.dtype)
     values = np.polynomial.polynomial.polyval(z, _coefficients(derivative)).T
-    rows[:, _TRANSVERSE_COLUMNS] = values * float(length) ** (_LENGTH_POWER - derivative)
+    rows[:, _TRANSVERSE_COLUMNS] = values * np.asarray(length) ** (_LENGTH_POWER - derivative)
     return rows

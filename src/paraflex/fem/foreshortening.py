@@ -73,7 +73,7 @@ def mass_points(
         slopes.append(mesh.scatter(e, transverse_shape(local, length, derivative=1)) @ basis)
         x.append(mesh.nodes[e] + local)
         mass.append(0.5 * length * w * spans[mesh.spans[e]].mass_per_length)
-    weights = np.zeros((n * g + len(lumps), n * g))
+    weights = np.zeros((n * g + len(lumps), n * g), dtype=lengths.dtype)
     for e, length in enumerate(lengths):
         own = slice(e * g, (e + 1) * g)
         weights[own, : e * g] = node_weights(mesh, e)[: e * g]
@@ -122,7 +122,7 @@ def slope_squares(
 def node_weights(mesh: BeamMesh, node: int) -> NDArray[np.float64]:
     """Weights (g,) of the Gauss points in f at a node: all of the elements before it, exactly."""
     _, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    weights = np.zeros((mesh.n_elements, GAUSS_POINTS))
+    weights = np.zeros((mesh.n_elements, GAUSS_POINTS), dtype=mesh.nodes.dtype)
     weights[:node] = 0.5 * np.diff(mesh.nodes)[:node, None] * w
     return weights.ravel()
 

@@ -139,13 +139,13 @@ def rigid_integrals(mass: float, centre: Sequence[float], inertia: float) -> Sha
     inertia : float
         About the centre of mass [kg m^2].
     """
-    c = np.array(centre, dtype=float)
+    c = np.array(centre) * 1.0
     none, nothing = np.zeros(0), np.zeros((0, 0))
     return ShapeIntegrals(
         m=mass,
         S1=mass * c,
         S2=np.zeros((2, 0)),
-        I0=inertia + mass * float(c @ c),
+        I0=inertia + mass * (c @ c).item(),
         I1=none,
         I2=nothing,
         G1=none,
@@ -222,10 +222,12 @@ def bar_integrals(
     basis : (own, n) array
         The body's own coordinates per coordinate: D.
     """
-    n = stiffness.shape[0]
-    m, I0, S1 = 0.0, 0.0, np.zeros(2)
-    S2, I1, I2 = np.zeros((2, n)), np.zeros(n), np.zeros((n, n))
-    G1, G2 = np.zeros(n), np.zeros((n, n))
+    n, points, turning = stiffness.shape[0], list(points), list(turning)
+    masses, inertias = np.array([(x, dm) for x, _, dm in points]), np.array([J for _, J in turning])
+    kind = np.result_type(stiffness, masses, inertias, basis)
+    m, I0, S1 = 0.0, 0.0, np.zeros(2, kind)
+    S2, I1, I2 = np.zeros((2, n), kind), np.zeros(n, kind), np.zeros((n, n), kind)
+    G1, G2 = np.zeros(n, kind), np.zeros((n, n), kind)
     for x, N, dm in points:
         m += dm
         S1[0] += dm * x
@@ -238,7 +240,7 @@ def bar_integrals(
         across = np.outer(N[0], N[1])
         G2 += dm * (across - across.T)
 
-    J, Jf, Jff = 0.0, np.zeros(n), np.zeros((n, n))
+    J, Jf, Jff = 0.0, np.zeros(n, kind), np.zeros((n, n), kind)
     for slope, inertia in turning:
         J += inertia
         Jf += inertia * slope
@@ -252,7 +254,8 @@ def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
     """Mass points (x, N, dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
     z, w = _GAUSS
     points = []
-    stiffness = np.zeros((mesh.n_nodal, mesh.n_nodal))
+    kind = np.result_type(mesh.nodes, *(np.array([span.axial_stiffness, span.bending_stiffness]) for span in spans))
+    stiffness = np.zeros((mesh.n_nodal, mesh.n_nodal), kind)
     for e in range(mesh.n_elements):
         span = spans[mesh.spans[e]]
         length = mesh.nodes[e + 1] - mesh.nodes[e]

@@ -88,7 +88,7 @@ class BeamMesh:
 
     def scatter(self, element: int, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rows per element coordinate (n, 8) as rows per nodal coordinate (n, n_nodal): the Boolean B of Eq. 8."""
-        wide = np.zeros((rows.shape[0], self.n_nodal))
+        wide = np.zeros((rows.shape[0], self.n_nodal), dtype=rows.dtype)
         start = COORDINATES_PER_NODE * element
         columns = np.arange(start, start + 2 * COORDINATES_PER_NODE)
         if element in self._split:
@@ -161,8 +161,8 @@ def mesh_beam(length: float, points: Mapping[str, float], elements: int | Sequen
     knots = [0.0]
     for x in sorted([*points.values(), length]):
         if x - knots[-1] > gap:
-            knots.append(min(float(x), length))
-    knots[-1] = float(length)
+            knots.append(min(x, length))
+    knots[-1] = length
     counts = _per_span(elements, len(knots) - 1)
     pieces = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(knots, knots[1:], counts, strict=False)]
     nodes = np.concatenate([[0.0], *pieces])

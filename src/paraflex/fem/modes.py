@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
+from paraflex.fem.eigen import eigenpairs
 from paraflex.fem.integrals import ShapeIntegrals
 
 
@@ -42,7 +43,7 @@ class ModalBasis:
         Mff : (nodal, nodal) array
             Of this body, in the metric of which modes overlap.
         """
-        overlap = other.vectors.T @ Mff @ self.vectors
+        overlap = (other.vectors.T @ Mff @ self.vectors).real
         rows, columns = scipy.optimize.linear_sum_assignment(-np.abs(overlap))
         return ModalBasis(self.omega[columns], self.vectors[:, columns] * np.sign(overlap[rows, columns]))
 
@@ -51,10 +52,10 @@ def modal_basis(body: ShapeIntegrals) -> ModalBasis:
     """Diagonalise a body's flexible coordinates; all modes kept is the identical model."""
     if body.nf == 0:
         return ModalBasis(omega=np.zeros(0), vectors=np.zeros((0, 0)))
-    squares, vectors = scipy.linalg.eigh(body.K, body.Mff)
+    squares, vectors = eigenpairs(body.K, body.Mff)
     # A mode's sign is arbitrary; the largest entry made positive keeps results the same on every machine.
     largest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(vectors.shape[1])]
-    return ModalBasis(omega=np.sqrt(np.maximum(squares, 0.0)), vectors=vectors * np.sign(largest))
+    return ModalBasis(omega=np.sqrt(np.maximum(squares, 0.0)), vectors=vectors * np.sign(largest.real))
 
 
 def natural_frequencies(body: ShapeIntegrals) -> NDArray[np.float64]:

@@ -10,9 +10,9 @@ from __future__ import annotations
 from enum import Enum
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
+from paraflex.fem.eigen import eigenpairs
 from paraflex.fem.element import AXIAL, CURVATURE, SLOPE, TRANSVERSE
 from paraflex.fem.mesh import BeamMesh
 
@@ -61,6 +61,6 @@ def reference_basis(
         kept[[mesh.column(0, AXIAL), mesh.column(0, TRANSVERSE), mesh.column(-1, TRANSVERSE)]] = False
     basis = np.eye(mesh.n_nodal)[:, kept]
     if condition is ReferenceCondition.FREE:
-        _, modes = scipy.linalg.eigh(basis.T @ stiffness @ basis, basis.T @ mass @ basis)
+        _, modes = eigenpairs(basis.T @ stiffness @ basis, basis.T @ mass @ basis)
         basis = basis @ modes[:, N_RIGID:]
     return basis

@@ -22,8 +22,9 @@ from paraflex.kernel.run_state import SAMPLE, WORK
 from paraflex.kernel.stage import equations, place
 from paraflex.kernel.step import input_power, stage_start
 
-# Corrections end where they are this part of what they correct, or where, below the second bound, they fall no more.
-ROUNDING, NEARLY, FALLING = 2e-16, 1e-9, 0.9
+# Corrections end where the next is to be expected below this part of what they correct, or where, below the second
+# bound, they fall no more.
+ROUNDING, NEARLY, FALLING = 2e-16, 1e-9, 0.5
 MOST_CORRECTIONS = 200
 # What is no more than this part of the largest accelerations of a run, or forces, is solved no more closely than that.
 NOTHING = 1e-6
@@ -68,7 +69,9 @@ def baumgarte_weights(controls, alpha, beta, h):
 @routine
 def ended(change, previous, iteration):
     """Whether corrections are down to rounding; relative ones, this and the last."""
-    return change <= ROUNDING or (iteration > 0 and change < NEARLY and change > FALLING * previous)
+    if iteration == 0:
+        return change <= ROUNDING
+    return change * change <= ROUNDING * previous or (change < NEARLY and change > FALLING * previous)
 
 
 @inlined

@@ -14,6 +14,7 @@ from paraflex.dynamics import (
     constant_signals,
     pack_signals,
     project_position,
+    records,
     reference_pose,
 )
 from paraflex.errors import InputError, Moment, UnreachablePathError
@@ -21,7 +22,7 @@ from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
-from paraflex.mechanism import Assembly, Mechanism
+from paraflex.mechanism import Assembly, Mechanism, PointRef
 from paraflex.mechanism.mechanism import TASK_COORDINATES
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
@@ -131,7 +132,7 @@ def path_follower(
     """
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
-    closure = _Closure(mechanism.rigid(), orientation, end)
+    closure = PathClosure(mechanism.rigid(), orientation, end)
     closure.check_degrees_of_freedom()
     chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
     if _turning(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
@@ -161,8 +162,8 @@ def _no_long_steps(times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDA
     return grid, keep
 
 
-class _Closure:
-    """The rigid system with its task marker, for the functions above."""
+class PathClosure:
+    """The rigid system with its task marker: what closes its loops."""
 
     def __init__(self, mechanism: Mechanism, orientation: float, end: float) -> None:
         effector = mechanism.end_effector
@@ -178,9 +179,10 @@ class _Closure:
             system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), end), end
         )[0]
         self.coordinates = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
-        self.packed, self.marker = _with_marker(system, effector.point)
+        self.packed, self.marker = with_marker(system, effector.point)
 
     def check_degrees_of_freedom(self) -> None:
+        """Nothing, if there are as many task coordinates as degrees of freedom."""
         free, tasks = self.system.n - self.system.n_constraints, self.coordinates.size
         if free != tasks:
             raise InputError(
@@ -191,9 +193,11 @@ class _Closure:
             )
 
     def assemble(self, assembly: Assembly) -> NDArray[np.float64]:
+        """The pose of an assembly, loops closed."""
         return project_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
     def task(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Task coordinates of a pose."""
         zero, out = np.zeros_like(q), apart((3, self.coordinates.size))
         task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero, out)
         return out[0]
@@ -281,10 +285,11 @@ def _turning(path: Path, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
     return None if says is None else says(t)
 
 
-def _with_marker(system: System, ref) -> tuple[PackedSystem, int]:
+def with_marker(system: System, ref: PointRef) -> tuple[PackedSystem, int]:
     """The packed system with one more marker, for a point that is not at a joint; rigid, so no shape rows."""
     marker = system.marker(ref)
-    record = np.zeros(1, dtype=MARKER)
-    record["body"], record["bending"], record["x"], record["y"] = marker.body, -1, *marker.x0
-    markers = np.concatenate([system.packed.markers, record])
+    x, y = marker.x0
+    record = records(MARKER, [{"body": marker.body, "bending": -1, "x": x, "y": y}])
+    kind = max(system.packed.markers.dtype, record.dtype, key=lambda dtype: dtype.itemsize)
+    markers = np.concatenate([system.packed.markers.astype(kind), record.astype(kind)])
     return system.packed._replace(markers=markers), markers.size - 1

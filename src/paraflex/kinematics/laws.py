@@ -31,7 +31,8 @@ class TrapezoidalLaw:
     @property
     def period(self) -> float:
         """T [s]."""
-        return sqrt(pi * self.length / self.max_acceleration)
+        squared = pi * self.length / self.max_acceleration
+        return np.sqrt(squared) if isinstance(squared, complex) else sqrt(squared)
 
     @property
     def duration(self) -> float:

@@ -78,11 +78,11 @@ class Polygon:
 
     @cached_property
     def _lengths(self) -> NDArray[np.float64]:
-        return np.linalg.norm(np.diff(self._vertices, axis=0), axis=1)
+        return np.sqrt(np.sum(np.diff(self._vertices, axis=0) ** 2, axis=1))
 
     @cached_property
     def _laws(self) -> list[TrapezoidalLaw]:
-        return [TrapezoidalLaw(float(length), self.max_acceleration) for length in self._lengths]
+        return [TrapezoidalLaw(length.item(), self.max_acceleration) for length in self._lengths]
 
     @cached_property
     def _starts(self) -> NDArray[np.float64]:
@@ -91,7 +91,8 @@ class Polygon:
     @property
     def duration(self) -> float:
         """Of the motion [s]."""
-        return float(self._starts[-1])
+        end = self._starts[-1]
+        return end if np.iscomplexobj(end) else float(end)
 
     @property
     def knots(self) -> tuple[float, ...]:
@@ -101,9 +102,10 @@ class Polygon:
 
     def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
         """The motion at times t."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        position = np.tile(self._vertices[0], (t.size, 1))
-        velocity, acceleration = np.zeros((t.size, 2)), np.zeros((t.size, 2))
+        t = np.atleast_1d(t) * 1.0
+        kind = np.result_type(t, self._starts, self._vertices)
+        position = np.tile(self._vertices[0].astype(kind), (t.size, 1))
+        velocity, acceleration = np.zeros((t.size, 2), kind), np.zeros((t.size, 2), kind)
         directions = np.diff(self._vertices, axis=0) / self._lengths[:, None]
         for start, law, direction in zip(self._starts, self._laws, directions, strict=False):
             s, speed, rate = law.evaluate(t - start)
@@ -164,7 +166,7 @@ class Circle:
 
     @cached_property
     def _law(self) -> TrapezoidalLaw:
-        return TrapezoidalLaw(self.radius * abs(self.sweep), self.max_acceleration)
+        return TrapezoidalLaw(self.radius * self.sweep * np.sign(np.real(self.sweep)), self.max_acceleration)
 
     @property
     def duration(self) -> float:
@@ -178,8 +180,8 @@ class Circle:
 
     def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
         """The motion at times t."""
-        s, speed, rate = self._law.evaluate(np.atleast_1d(np.asarray(t, dtype=float)))
-        sense = np.sign(self.sweep) / self.radius
+        s, speed, rate = self._law.evaluate(np.atleast_1d(t) * 1.0)
+        sense = np.sign(np.real(self.sweep)) / self.radius
         angle, turn, dturn = self.start_angle + sense * s, sense * speed, sense * rate
         radial = np.column_stack([np.cos(angle), np.sin(angle)])
         tangent = np.column_stack([-radial[:, 1], radial[:, 0]])

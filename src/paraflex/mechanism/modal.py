@@ -197,7 +197,8 @@ def _symmetric(matrix: np.ndarray, field: str, sign: float = 1.0) -> np.ndarray:
 def _array(values: Any, shape: tuple[int, ...], field: str) -> np.ndarray:
     size = " x ".join(map(str, shape))
     try:
-        array = np.array(values, dtype=float)
+        array = np.array(values)
+        array = array if array.dtype.kind == "c" else array.astype(float)
     except (TypeError, ValueError):
         raise InputError("is not a table of numbers", field=field, remedy=f"give {size} of them") from None
     if array.shape != shape:

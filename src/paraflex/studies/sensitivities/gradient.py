@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import blocks_of, numbers_of, with_numbers
+from paraflex.dynamics import numbers_of, with_numbers
 from paraflex.errors import Moment, NumericalError
 from paraflex.integrators.solution import Solution
 from paraflex.integrators.variation import (
@@ -19,12 +19,13 @@ from paraflex.integrators.variation import (
     energies,
     run_derivatives,
 )
-from paraflex.kernel.packed import PackedSystem
 from paraflex.simulate import TrackingRun, simulate
-from paraflex.studies.sensitivities.metrics import columns, smooth_values
-from paraflex.studies.sensitivities.plans import Given, Neighbours, given, given_like, neighbours
-from paraflex.studies.sensitivities.stencil import Difference
-from paraflex.studies.sweeps.metrics import make_traces, measure
+from paraflex.studies.sensitivities.changes import Change, ModeChange
+from paraflex.studies.sensitivities.metrics import columns, smooth_traces, smooth_values
+from paraflex.studies.sensitivities.plans import Given, given, size_of
+from paraflex.studies.sensitivities.stencil import STENCILS
+from paraflex.studies.sensitivities.steps import part, stepped
+from paraflex.studies.sweeps.metrics import Traces, measure
 from paraflex.studies.sweeps.run import Task, plan_task
 from paraflex.studies.sweeps.study import Setting
 
@@ -42,8 +43,7 @@ class ModeGradients:
         By column; also of metrics that have no derivatives.
     gradients : dict of str to (parameters,) array
     errors : dict of str to (parameters,) array
-        Estimates of what differences leave in `gradients`: of those over metrics, and of those over what the run is
-        given as a part of the derivative.
+        Estimates of what differences leave in `gradients`: those over numbers of the file and over signals.
     steps : int
     unsettled : float
         See `RunDerivatives`.
@@ -89,11 +89,12 @@ def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] |
     planned, options = plan_task(setting, task)
     check_differentiable(options)
     sizes = [None] * len(setting.names) if sizes is None else sizes
-    around = [neighbours(setting, task, planned.system, k, size) for k, size in enumerate(sizes)]
-    return [_of_mode(setting, given(planned, options, mode), mode, around) for mode in setting.modes]
+    sizes = [size_of(setting, task, k, size) for k, size in enumerate(sizes)]
+    changes = [Change(setting, task, planned, k, size) for k, size in enumerate(sizes)]
+    return [_of_mode(setting, given(planned, options, mode), mode, changes) for mode in setting.modes]
 
 
-def _of_mode(setting: Setting, nominal: Given, mode: str, around: Sequence[Neighbours]) -> ModeGradients:
+def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Change]) -> ModeGradients:
     run = simulate(nominal.task, mode, options=nominal.options)
     if run.solution.singular_positions:
         time = run.solution.singular_positions[0]
@@ -101,18 +102,14 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, around: Sequence[Neigh
             "the run passes a singular position, where constraint forces have a pole: no derivatives",
             Moment(time, run.solution.steps),
         )
-    near = [[given_like(planned, options, nominal, each.name) for planned, options in each.plans] for each in around]
-    differences = [_direction(nominal, each, plans) for each, plans in zip(around, near, strict=True)]
-    found = run_derivatives(nominal.problem, nominal.options, [direction for direction, _ in differences])
+    of_mode = [change.of_mode(nominal) for change in changes]
+    found = run_derivatives(nominal.problem, nominal.options, [each.direction for each in of_mode])
     names = columns(run, setting.metrics)
-    changes = [
-        _metric_changes(setting, run, nominal, found, k, direction, each, plans)
-        for k, (each, plans, (direction, _)) in enumerate(zip(around, near, differences, strict=True))
-    ]
-    sizes = np.array([each.size for each in around])
-    values = np.array([change.value for change in changes]).reshape(len(around), len(names)).T / sizes
-    errors = np.array([change.error for change in changes]).reshape(len(around), len(names)).T / sizes
-    errors += np.abs(values) * np.array([error for _, error in differences])
+    here = smooth_traces(_with_motion(run, nominal, found.motion))
+    slopes = [_slopes(setting, run, here, nominal, found, k, each) for k, each in enumerate(of_mode)]
+    sizes = np.array([change.size for change in changes])
+    values = np.array(slopes).reshape(len(changes), len(names)).T / sizes
+    errors = np.abs(values) * np.array([each.error for each in of_mode])
     return ModeGradients(
         mode=run.mode.name,
         values=measure(run, setting.metrics),
@@ -123,51 +120,39 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, around: Sequence[Neigh
     )
 
 
-def _direction(nominal: Given, around: Neighbours, plans: list[Given]) -> tuple[Direction, float]:
-    """How what is given changes with a parameter as a part of its size, and the largest relative error of that."""
-    found = [around.stencil.derivative(list(parts)) for parts in zip(*(plan.direction for plan in plans), strict=True)]
-    found[0] = around.wide.derivative([numbers_of(system.packed) for system in around.systems])
-    times = nominal.problem.times
-    torques = around.stencil.derivative([plan.torques.evaluate(plan.problem.times) for plan in plans])
-    packed, here = nominal.problem.system.packed, nominal.direction
-    # Of signals the torques they give: coefficients of high powers are nothing but rounding.
-    errors = [_relative(torques, nominal.torques.evaluate(times)), *map(_relative, found[2:], here[2:])]
-    blocks = (blocks_of(packed, numbers) for numbers in (found[0].value, found[0].error, here.packed))
-    errors += [_relative(Difference(value, error), numbers) for value, error, numbers in zip(*blocks, strict=True)]
-    return Direction(*(difference.value for difference in found)), max(errors)
+def _with_motion(run: TrackingRun, nominal: Given, motion: Motion) -> TrackingRun:
+    """The run, its steps solved to rounding."""
+    energy = energies(nominal.problem.system.packed, motion.q, motion.v, motion.multipliers)
+    solution = replace(
+        run.solution, q=motion.q, v=motion.v, a=motion.a, multipliers=motion.multipliers, kinetic_energy=energy[:, 0],
+        strain_energy=energy[:, 1], work=motion.work + energy[:, 2] - energy[0, 2],
+    )  # fmt: skip
+    return replace(run, torques=nominal.torques, condition=nominal.condition, solution=solution)
 
 
-def _relative(difference: Difference, numbers: Array) -> float:
-    """The largest error of numbers of one kind, as a part of the largest of them or of their derivatives."""
-    size = max(np.max(np.abs(difference.value), initial=0.0), np.max(np.abs(numbers), initial=0.0))
-    return float(np.max(difference.error, initial=0.0) / size) if size > 0.0 else 0.0
-
-
-def _metric_changes(
-    setting: Setting, run: TrackingRun, nominal: Given, found: RunDerivatives, k: int, direction: Direction,
-    around: Neighbours, plans: list[Given],
-) -> Difference:  # fmt: skip
-    """Derivatives of the numbers that metrics give by parameter k as a part of its size."""
-    change = Motion(*(part[k] for part in found.derivatives))
-    packed = nominal.problem.system.packed
-    here = make_traces(_moved_run(run, nominal, packed, found.motion, change, 0.0))
-    values = []
-    for place, plan in zip(around.stencil.places, plans, strict=True):
-        # Energies need stiffnesses more exact than those of the plan.
-        near = with_numbers(packed, numbers_of(packed) + place * direction.packed)
-        moved = make_traces(_moved_run(run, plan, near, found.motion, change, place))
-        values.append(smooth_values(moved, here, setting.metrics))
-    return around.stencil.derivative(values)
-
-
-def _moved_run(
-    run: TrackingRun, plan: Given, packed: PackedSystem, motion: Motion, change: Motion, share: float
-) -> TrackingRun:
-    """The run of a plan near by, but for what is of second order in how far it is."""
-    q, v, a, multipliers, work = (x + share * dx for x, dx in zip(motion, change, strict=True))
-    energy = energies(packed, q, v, multipliers)
+def _slopes(
+    setting: Setting, run: TrackingRun, here: Traces, nominal: Given, found: RunDerivatives, k: int, change: ModeChange
+) -> Array:
+    """Derivatives of the numbers of metrics by parameter k as a part of its size: by a run with a complex step."""
+    direction, along = change.direction, Motion(*(each[k] for each in found.derivatives))
+    q, v, a, multipliers, work = (stepped(x, dx) for x, dx in zip(found.motion, along, strict=True))
+    energy = _stepped_energies(nominal, found.motion, along, direction)
     solution: Solution = replace(
-        run.solution, t=plan.problem.times, q=q, v=v, a=a, multipliers=multipliers,
+        run.solution, t=stepped(nominal.problem.times, direction.times), q=q, v=v, a=a, multipliers=multipliers,
         kinetic_energy=energy[:, 0], strain_energy=energy[:, 1], work=work + energy[:, 2] - energy[0, 2],
     )  # fmt: skip
-    return TrackingRun(plan.task, plan.torques, plan.condition, solution, run.method)
+    moved = TrackingRun(change.task, change.torques, change.condition, solution, run.method)
+    return part(smooth_values(smooth_traces(moved), here, setting.metrics))
+
+
+def _stepped_energies(nominal: Given, motion: Motion, along: Motion, direction: Direction) -> Array:
+    """`energies` with a complex step: products, sines and cosines, of which a difference leaves but rounding."""
+    packed, stencil = nominal.problem.system.packed, STENCILS[0]
+    numbers = numbers_of(packed)
+
+    def at(place: float) -> Array:
+        moved = (x + place * dx for x, dx in zip(motion, along, strict=True))
+        q, v, _, multipliers, _ = moved
+        return energies(with_numbers(packed, numbers + place * direction.packed), q, v, multipliers)
+
+    return stepped(at(0.0), stencil.derivative([at(place) for place in stencil.places]).value)

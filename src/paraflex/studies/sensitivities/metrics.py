@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import InputError
-from paraflex.results.motion import tip_deflection
+from paraflex.results.motion import point_motion, tip_deflection
 from paraflex.simulate import TrackingRun
 from paraflex.studies.sweeps.metrics import METRICS, Traces
 
 Array = NDArray[np.float64]
 
 # Of a run, by what decides at the nominal one: at the sample where that has its maximum, say.
-Smooth = Callable[[Traces, Traces], float | Array]
+# Sums, products and roots alone: a complex step goes through them.
+Smooth = Callable[[Traces, Traces], Any]
 
 
 def _largest(trace: Callable[[Traces], Array]) -> Smooth:
     """The largest of an array, where it is largest in the nominal run."""
 
-    def value(moved: Traces, nominal: Traces) -> float:
-        return float(trace(moved).flat[int(np.nanargmax(trace(nominal)))])
+    def value(moved: Traces, nominal: Traces) -> Any:
+        return trace(moved).flat[int(np.nanargmax(trace(nominal)))]
 
     return value
 
@@ -34,35 +36,40 @@ def _largest_magnitudes(moved: Traces, nominal: Traces) -> Array:
     return np.sign(nominal.torque[at, motors]) * moved.torque[at, motors]
 
 
-def _largest_magnitude(moved: Traces, nominal: Traces) -> float:
-    return float(_largest_magnitudes(moved, nominal)[int(np.argmax(np.max(np.abs(nominal.torque), axis=0)))])
+def _largest_magnitude(moved: Traces, nominal: Traces) -> Any:
+    return _largest_magnitudes(moved, nominal)[int(np.argmax(np.max(np.abs(nominal.torque), axis=0)))]
 
 
 def _deflections(traces: Traces) -> Array:
     """Magnitudes of all tips' displacements, (bodies, k)."""
     system, q = traces.run.task.system, traces.run.solution.q
     tips = [tip_deflection(system, body.name, q) for body in system.bodies if body.nf]
-    return np.array([np.hypot(tip[:, 0], tip[:, 1]) for tip in tips])
+    return np.array([_length(tip) for tip in tips])
 
 
-def _deflection(moved: Traces, nominal: Traces) -> float:
+def _length(away: Array) -> Array:
+    """Of vectors, (k,), by their first two columns."""
+    return np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2)
+
+
+def _deflection(moved: Traces, nominal: Traces) -> Any:
     tips = _deflections(nominal)
-    return float(_deflections(moved).flat[int(np.nanargmax(tips))]) if np.any(np.isfinite(tips)) else 0.0
+    return _deflections(moved).flat[int(np.nanargmax(tips))] if np.any(np.isfinite(tips)) else 0.0
 
 
-def _residual_vibration(moved: Traces, nominal: Traces) -> float:
+def _residual_vibration(moved: Traces, nominal: Traces) -> Any:
     """Over the samples after the motion of the nominal run."""
     after = nominal.run.task.motion.t > nominal.run.task.path.duration
     if not np.any(after):
         return float("nan")
     places = moved.position[after]
-    return float(np.sqrt(np.mean(np.sum((places - places.mean(axis=0)) ** 2, axis=1))))
+    return np.sqrt(np.mean(np.sum((places - places.mean(axis=0)) ** 2, axis=1)))
 
 
-def _motor_energy(moved: Traces, nominal: Traces) -> float:
+def _motor_energy(moved: Traces, nominal: Traces) -> Any:
     """With the signs of the nominal run's powers."""
     power = np.sum(np.sign(_powers(nominal)) * _powers(moved), axis=1)
-    return float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(moved.run.solution.t)))
+    return np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(moved.run.solution.t))
 
 
 def _powers(traces: Traces) -> Array:
@@ -92,9 +99,19 @@ SMOOTH: Mapping[str, Smooth] = {
     "motor_energy": _motor_energy,
     "strain_energy_max": _largest(lambda x: x.run.solution.strain_energy),
     "kinetic_energy_max": _largest(lambda x: x.run.solution.kinetic_energy),
-    "total_mass": _as_it_is("total_mass"),
+    "total_mass": lambda moved, _: sum(body.integrals.m for body in moved.run.task.system.bodies),
     "actuation_condition_max": _largest(lambda x: x.run.condition),
 }
+
+
+def smooth_traces(run: TrackingRun) -> Traces:
+    """`make_traces` of a run that may have a complex step."""
+    task, solution = run.task, run.solution
+    effector = task.mechanism.end_effector
+    assert effector is not None
+    position = point_motion(task.system, effector.point, solution.q, solution.v, solution.a).position
+    distance = _length(position - task.motion.desired.position)
+    return Traces(run, position, distance, run.torques.evaluate(task.motion.t))
 
 
 def check_smooth(names: tuple[str, ...]) -> None:

@@ -1,23 +1,21 @@
-"""What a run is given, near a design: planned motions, torques, systems whose coordinates mean the same."""
+"""What a run is given, and the values of the parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
-from paraflex.dynamics import System, build_system, numbers_of, pack_signals, same_layout
-from paraflex.errors import InputError, ParaflexError
+from paraflex.dynamics import pack_signals
+from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
-from paraflex.integrators.variation import Direction
 from paraflex.simulate import TrackingTask
-from paraflex.studies.sensitivities.stencil import STENCILS, Stencil
 from paraflex.studies.sweeps.overlay import Place, number_at
-from paraflex.studies.sweeps.run import Task, plan_task
+from paraflex.studies.sweeps.run import Task
 from paraflex.studies.sweeps.study import INTEGRATION, Setting
 
 Array = NDArray[np.float64]
@@ -46,46 +44,6 @@ class Given:
     condition: Array
     problem: Problem
 
-    @property
-    def direction(self) -> Direction:
-        """Its numbers, in the order of what is differentiated."""
-        problem = self.problem
-        return Direction(
-            packed=numbers_of(problem.system.packed),
-            signals=numbers_of(problem.signals),
-            q=problem.initial.q,
-            v=problem.initial.v,
-            stops=problem.stops,
-            times=problem.times,
-            gains=np.array([self.options.alpha, self.options.beta]),
-        )
-
-
-@dataclass(frozen=True)
-class Neighbours:
-    """Plans of a design with one parameter moved.
-
-    Attributes
-    ----------
-    name : str
-        Of the parameter.
-    size : float
-        What its steps are parts of.
-    stencil : Stencil
-    plans : tuple
-        At the stencil's places, planned motion and options; coordinates mean the same in all of them.
-    wide : Stencil
-    systems : tuple of System
-        At the places of the wide one.
-    """
-
-    name: str
-    size: float
-    stencil: Stencil
-    plans: tuple[tuple[TrackingTask, IntegrationOptions], ...]
-    wide: Stencil
-    systems: tuple[System, ...]
-
 
 def nominal_values(setting: Setting, chosen: Collection[str] = ()) -> tuple[float, ...]:
     """Values of the parameters in the mechanism's file, or in the study's [integration].
@@ -107,18 +65,8 @@ def nominal_values(setting: Setting, chosen: Collection[str] = ()) -> tuple[floa
     )
 
 
-def neighbours(setting: Setting, task: Task, system: System, k: int, size: float | None = None) -> Neighbours:
-    """Plans around a design, its parameter k moved to both sides, or to one where the other cannot be.
-
-    Parameters
-    ----------
-    setting : Setting
-    task : Task
-    system : System
-        Of the design itself.
-    k : int
-    size : float, optional
-        What steps are parts of; the parameter's value by default.
+def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> float:
+    """What steps of parameter k are parts of: its value by default.
 
     Raises
     ------
@@ -135,66 +83,21 @@ def neighbours(setting: Setting, task: Task, system: System, k: int, size: float
             "is zero: how small are steps?", field=where, value=value,
             remedy="give low and high, whose distance is taken for its size",
         )  # fmt: skip
-    trouble: ParaflexError | None = None
-    for stencil, wide in STENCILS:
-        try:
-            plans = tuple(_plan(setting, _moved(task, k, place * size), system) for place in stencil.places)
-            systems = tuple(_system(setting, _moved(task, k, place * size), system) for place in wide.places)
-            return Neighbours(name, size, stencil, plans, wide, systems)
-        except ParaflexError as error:
-            trouble = trouble or error
-    raise InputError(f"has no derivative, for near it {trouble}", field=where, value=value, remedy="leave it out")
+    return size
 
 
 def given(planned: TrackingTask, options: IntegrationOptions, mode: str) -> Given:
     """What the run of a mode is given."""
-    return _given(planned, options, planned.torques(mode))
+    return given_torques(planned, options, planned.torques(mode))
 
 
-def given_like(planned: TrackingTask, options: IntegrationOptions, nominal: Given, name: str) -> Given:
-    """The same near by: coordinates, splines and stops go with those of the nominal one.
-
-    Raises
-    ------
-    InputError
-        They cannot: something else than numbers has changed.
-    """
-    if np.size(planned.plan.knots) == np.size(nominal.torques.knots):
-        torques = planned.plan.feed_forward_like(nominal.torques)
-        near = _given(planned, options, torques)
-        pairs = (
-            (near.problem.system.packed, nominal.problem.system.packed),
-            (near.problem.signals, nominal.problem.signals),
-            ((near.problem.stops, near.problem.times), (nominal.problem.stops, nominal.problem.times)),
-        )
-        if all(same_layout(*pair) for pair in pairs):
-            return near
-    raise InputError(
-        "more than numbers changes with it: no derivative", field=f"vary.{name}", remedy="move it a little with --at"
-    )
-
-
-def _given(planned: TrackingTask, options: IntegrationOptions, torques: FeedForward) -> Given:
-    """As `simulate` makes them."""
+def given_torques(planned: TrackingTask, options: IntegrationOptions, torques: FeedForward) -> Given:
+    """As `simulate` makes it of a mode's torques."""
     times = planned.motion.t
     signals, knots = pack_signals(planned.mechanism, torques.signals, float(times[-1]))
     stops = np.sort(np.concatenate([torques.knots, knots]))
     problem = make_problem(planned.system, signals, planned.start, times, stops)
     return Given(planned, options, torques, actuation_condition(planned.effort, torques.mode), problem)
-
-
-def _moved(task: Task, k: int, by: float) -> Task:
-    values = task.values
-    return task._replace(values=(*values[:k], values[k] + by, *values[k + 1 :]))
-
-
-def _plan(setting: Setting, task: Task, like: System) -> tuple[TrackingTask, IntegrationOptions]:
-    planned, options = plan_task(setting, task)
-    return replace(planned, system=build_system(planned.mechanism, like)), options
-
-
-def _system(setting: Setting, task: Task, like: System) -> System:
-    return build_system(setting.design(task.values)[0].mechanism, like)
 
 
 def _nominal(setting: Setting, name: str, places: tuple[Place, ...]) -> float:

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Between places, as parts of a parameter's size. Motion and metrics: short, for near a singular pose or a maximum they
-# curve. Systems: long, for stiffnesses of a beam lie many powers of ten apart, which leaves the soft ones a relative
-# rounding of 1e-10.
-_SHORT, _LONG = 5e-4, 4e-3
+# Between places, as parts of a parameter's size. What is differentiated is smooth over many times as far: powers of a
+# number, sines and cosines.
+_SPACING = 4e-3
 
 
 class Difference(NamedTuple):
@@ -65,9 +64,9 @@ def _weights(places: Array) -> Array:
     return np.linalg.solve(taylor, np.eye(places.size)[1])
 
 
-# For motion and metrics, and for systems: about a value, and to either side of it alone.
+# About a value, and to either side of it alone.
 STENCILS = (
-    (make_stencil((-3, -2, -1, 1, 2, 3), _SHORT), make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _LONG)),
-    (make_stencil(range(7), _SHORT), make_stencil(range(9), _LONG)),
-    (make_stencil(range(0, -7, -1), _SHORT), make_stencil(range(0, -9, -1), _LONG)),
+    make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _SPACING),
+    make_stencil(range(9), _SPACING),
+    make_stencil(range(0, -9, -1), _SPACING),
 )

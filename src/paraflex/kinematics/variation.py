@@ -1,0 +1,117 @@
+"""How the motion along a path changes with a mechanism: the equations of closed loops, differentiated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.kernel.arrays import apart
+from paraflex.kernel.closure import make_closure_scratch
+from paraflex.kernel.closure_residuals import closure_residuals
+from paraflex.kernel.packed import PackedSystem, Signals
+from paraflex.kinematics.closure import PathClosure, RigidMotion
+
+Array = NDArray[np.float64]
+
+
+class Nearby(NamedTuple):
+    """What closes loops at one place of a difference.
+
+    Attributes
+    ----------
+    place : float
+        In units of the parameter.
+    weight : float
+        Of what is found there, for the derivative.
+    packed : PackedSystem
+        With the marker of the task.
+    signals : Signals
+    times : (k,) array
+        [s]
+    target : (k, 3, tasks) array
+    """
+
+    place: float
+    weight: float
+    packed: PackedSystem
+    signals: Signals
+    times: Array
+    target: Array
+
+
+class MotionChange(NamedTuple):
+    """Derivatives of a motion along a path: those of coordinates, velocities, accelerations (k, n) and basis."""
+
+    q: Array
+    v: Array
+    a: Array
+    basis: Array
+
+
+def vary_motion(closure: PathClosure, motion: RigidMotion, nearby: Sequence[Nearby]) -> MotionChange:
+    """Derivatives of the motion of closed loops by a parameter, exact but for rounding.
+
+    F(x, s) = 0 gives dx = -F_x^-1 F_s for positions, then for velocities, the basis and the accelerations, in each of
+    which those before stand along their derivatives. F_s is a difference: F is smooth, and nothing is iterated.
+
+    Parameters
+    ----------
+    closure : PathClosure
+        Of the motion.
+    motion : RigidMotion
+    nearby : sequence of Nearby
+    """
+    zero = MotionChange(*(np.zeros_like(x) for x in (motion.q, motion.v, motion.a, motion.basis)))
+    found, jacobians = _residual_change(closure, motion, zero, nearby)
+    if not found.any():
+        return zero
+    dq = -_solved(jacobians, found[:, :, :1])[:, :, 0]
+    found, _ = _residual_change(closure, motion, zero._replace(q=dq), nearby)
+    later = -_solved(jacobians, found[:, :, [1, *range(3, found.shape[2])]])
+    dv, d_basis = later[:, :, 0], later[:, :, 1:]
+    found, _ = _residual_change(closure, motion, zero._replace(q=dq, v=dv), nearby)
+    return MotionChange(dq, dv, -_solved(jacobians, found[:, :, 2:3])[:, :, 0], d_basis)
+
+
+def _solved(jacobians: Array, right: Array) -> Array:
+    """With one correction: rows of metres and of turns lie apart."""
+    x = np.linalg.solve(jacobians, right)
+    return x + np.linalg.solve(jacobians, right - jacobians @ x)
+
+
+def _residual_change(
+    closure: PathClosure, motion: RigidMotion, change: MotionChange, nearby: Sequence[Nearby]
+) -> tuple[Array, Array]:
+    """Derivative of the residuals along a change of the motion, and the Jacobians of the motion itself."""
+    total = np.zeros((*motion.q.shape, 3 + closure.coordinates.size))
+    here, jacobians = _residuals(closure, closure.packed, closure.signals, motion.t, _target(closure, motion), motion)
+    for near in nearby:
+        moved = MotionChange(
+            *(x + near.place * dx for x, dx in zip((motion.q, motion.v, motion.a, motion.basis), change, strict=True))
+        )
+        found, _ = _residuals(closure, near.packed, near.signals, near.times, near.target, moved)
+        # Less what there is here: what does not change leaves no rounding.
+        total += near.weight * (found - here)
+    return total, jacobians
+
+
+def _target(closure: PathClosure, motion: RigidMotion) -> Array:
+    return closure.target(motion.path, motion.t)
+
+
+def _residuals(
+    closure: PathClosure, packed: PackedSystem, signals: Signals, times: Array, target: Array,
+    motion: RigidMotion | MotionChange,
+) -> tuple[Array, Array]:  # fmt: skip
+    k, n = motion.q.shape
+    tasks = closure.coordinates.size
+    out, jacobians = apart((k, n, 3 + tasks)), apart((k, n, n))
+    arrays = (np.ascontiguousarray(x) for x in (times, target, motion.q, motion.v, motion.a, motion.basis))
+    closure_residuals(
+        packed, signals, closure.marker, closure.coordinates, *arrays, out, jacobians,
+        make_closure_scratch(packed, tasks, signals.start.size),
+    )  # fmt: skip
+    return out, jacobians

@@ -1,0 +1,391 @@
+"""How all that a run is given changes with one parameter: system, planned motion, torques, times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.actuation import Effort, FeedForward, required_effort
+from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
+from paraflex.actuation.feed_forward import splines
+from paraflex.dynamics import (
+    InputSignals,
+    System,
+    build_system,
+    constant_signals,
+    numbers_of,
+    pack_signals,
+    same_layout,
+    with_numbers,
+)
+from paraflex.errors import InputError, ParaflexError
+from paraflex.integrators.run import make_problem
+from paraflex.integrators.variation import Direction
+from paraflex.kernel.arrays import apart
+from paraflex.kernel.bodies import motion_forces
+from paraflex.kernel.packed import make_scratch
+from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
+from paraflex.kinematics.closure import PathClosure, with_marker
+from paraflex.kinematics.variation import MotionChange, Nearby, vary_motion
+from paraflex.mechanism import Mechanism, RigidBody
+from paraflex.simulate import TrackingTask, path_knots
+from paraflex.studies.sensitivities.plans import Given
+from paraflex.studies.sensitivities.stencil import STENCILS, Difference, Stencil
+from paraflex.studies.sensitivities.steps import Stepped, complex_step, part, stepped, with_fields
+from paraflex.studies.sweeps.run import Task
+from paraflex.studies.sweeps.study import Setting
+
+Array = NDArray[np.float64]
+
+
+class Described(NamedTuple):
+    """What a design's file says of its runs: all their numbers come of these."""
+
+    mechanism: Mechanism
+    path: Any
+    end: float
+    orientation: float
+    gains: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class KnownPath:
+    """A path known at some times alone, with a complex step."""
+
+    motion: PathMotion
+    angles: NDArray | None
+    duration: float
+
+    def evaluate(self, t: Array) -> PathMotion:
+        """The motion at these times."""
+        return self.motion
+
+    def turning(self, t: Array) -> NDArray | None:
+        """How the end-effector turns, where the path says so."""
+        return self.angles
+
+
+@dataclass(frozen=True)
+class ModeChange:
+    """How what the run of one mode is given changes.
+
+    Attributes
+    ----------
+    direction : Direction
+    task : TrackingTask
+        With a complex step, as far as metrics look at it; the packed system is that of the design.
+    torques : FeedForward
+        With a complex step.
+    condition : (k,) array
+        With a complex step.
+    error : float
+        The largest part of a derivative that differences leave.
+    """
+
+    direction: Direction
+    task: TrackingTask
+    torques: FeedForward
+    condition: NDArray
+    error: float
+
+
+class Change:
+    """How a design changes with one parameter, as a part of its size.
+
+    Parameters
+    ----------
+    setting, task
+        As for `sweeps.run_task`.
+    planned : TrackingTask
+        Of the design itself.
+    k : int
+        Which parameter.
+    size : float
+        See `plans.size_of`.
+
+    Raises
+    ------
+    InputError
+        A parameter that has no derivative.
+    """
+
+    def __init__(self, setting: Setting, task: Task, planned: TrackingTask, k: int, size: float) -> None:
+        self.name, self.size, self.planned = setting.names[k], size, planned
+        here = _described(setting, task, planned.mechanism)
+        self.stencil, self.near = self._near(setting, task, k)
+        try:
+            self.stepped: Stepped[Described] = complex_step(here, self.near, self.stencil)
+            self.there = self.stepped.value
+            self.system = build_system(self.there.mechanism, planned.system)
+            self._check_layout()
+        except InputError as error:
+            raise InputError(error.problem, field=f"vary.{self.name}", value=error.value, remedy=error.remedy) from None
+        self.closure = PathClosure(planned.mechanism.rigid(), here.orientation, here.end)
+        self.end = here.end
+
+    def _near(self, setting: Setting, task: Task, k: int) -> tuple[Stencil, list[Described]]:
+        """Designs to both sides of this one, or to one where the other cannot be."""
+        trouble: ParaflexError | None = None
+        for stencil in STENCILS:
+            try:
+                near = [_described(setting, _moved(task, k, place * self.size)) for place in stencil.places]
+                # What a mesh refuses is refused here.
+                self.beside = [build_system(each.mechanism) for each in (near[0], near[-1])]
+                return stencil, near
+            except ParaflexError as error:
+                trouble = trouble or error
+        raise InputError(
+            f"has no derivative, for near it {trouble}", field=f"vary.{self.name}", value=task.values[k],
+            remedy="leave it out",
+        )  # fmt: skip
+
+    def _check_layout(self) -> None:
+        if not all(same_layout(each.packed, self.planned.system.packed) for each in self.beside):
+            raise InputError(
+                "more than numbers changes with it: no derivative", field="vary", remedy="move it a little with --at"
+            )
+
+    @cached_property
+    def packed(self) -> Array:
+        """Derivative of the numbers of the packed system."""
+        return part(numbers_of(self.system.packed))
+
+    @cached_property
+    def rigid(self) -> System:
+        """That of the planned motion, with a complex step."""
+        bodies = tuple(
+            body if isinstance(body, RigidBody) else with_fields(body, flexible=False)
+            for body in self.there.mechanism.bodies
+        )
+        mechanism = with_fields(self.there.mechanism, bodies=bodies)
+        return build_system(with_fields(mechanism, springs=(), dampers=(), frictions=()), self.closure.system)
+
+    @cached_property
+    def sampled(self) -> _Planned:
+        """The planned motion at the sample times."""
+        t = self.planned.motion.t
+        return self.plan(self.planned.motion, self.planned.effort, t * (part(self.there.end) / self.end))
+
+    @cached_property
+    def knots(self) -> NDArray:
+        """Of the path, with a complex step."""
+        knots = path_knots(self.there.path, self.there.end)
+        if knots.size != self.planned.plan.knots.size:
+            raise InputError(
+                "more than numbers changes with it: no derivative", field=f"vary.{self.name}",
+                remedy="move it a little with --at",
+            )  # fmt: skip
+        return knots
+
+    def plan(self, motion: RigidMotion, effort: Effort, d_times: Array) -> _Planned:
+        """A planned motion whose times move."""
+        path = self.known_path(stepped(motion.t, d_times))
+        change = vary_motion(self.closure, motion, self._nearby(motion, d_times, path))
+        return _Planned(self, motion, effort, path, stepped(motion.t, d_times), change)
+
+    def known_path(self, times: NDArray) -> KnownPath:
+        """The path at times with a complex step."""
+        path, here = self.there.path, self.planned.path
+        duration = self.planned.path.duration
+        turning = getattr(here, "turning", None)
+        if isinstance(here, Polygon | Circle):
+            return KnownPath(path.evaluate(times), None, duration)
+        t, d_times = times.real, part(times)
+        moved = [(near.path, t + place * d_times) for near, place in zip(self.near, self.stencil.places, strict=True)]
+        motions = [np.stack(near.evaluate(at)) for near, at in moved]
+        whole = stepped(np.stack(here.evaluate(t)), self.stencil.derivative(motions).value)
+        angles = None if turning is None else turning(t)
+        if angles is not None:
+            angles = stepped(angles, self.stencil.derivative([near.turning(at) for near, at in moved]).value)
+        return KnownPath(PathMotion(*whole), angles, duration)
+
+    def _nearby(self, motion: RigidMotion, d_times: Array, path: KnownPath) -> list[Nearby]:
+        closure, stencil = self.closure, self.stencil
+        packed, _ = with_marker(self.rigid, closure.system.mechanism.end_effector.point)
+        numbers, change = numbers_of(closure.packed), part(numbers_of(packed))
+        # A closure of its own: an orientation may change too.
+        orientation = self.there.orientation
+        target = closure.target(path, motion.t)
+        if path.angles is None and "angle" in closure.mechanism.end_effector.coordinates:
+            target = target + 1j * np.imag(orientation) * np.eye(3)[0][:, None] * (closure.coordinates == 2)
+        return [
+            Nearby(
+                place, weight, with_numbers(closure.packed, numbers + place * change), self._laws(near),
+                motion.t + place * d_times, target.real + place * part(target),
+            )
+            for place, weight, near in zip(stencil.places, stencil.weights, self.near, strict=True)
+        ]  # fmt: skip
+
+    def _laws(self, near: Described) -> Any:
+        mechanism = near.mechanism
+        if not mechanism.prescribed:
+            return self.closure.signals
+        return pack_signals(mechanism, constant_signals([0.0] * len(mechanism.motors), near.end), near.end)[0]
+
+    def of_mode(self, nominal: Given) -> ModeChange:
+        """How what the run of a mode is given changes."""
+        torques = self._torques(nominal.torques)
+        signals, stops = self._signals(nominal, torques)
+        sampled, problem = self.sampled, nominal.problem
+        start = self._start(sampled.change)
+        gains = part(np.array(self.there.gains))
+        direction = Direction(
+            packed=self.packed, signals=signals.value, q=start[0], v=start[1], stops=stops,
+            times=part(sampled.times), gains=gains,
+        )  # fmt: skip
+        system = replace(self.system, packed=problem.system.packed)
+        motion = replace(sampled.motion, path=sampled.path, t=sampled.times)
+        task = replace(self.planned, mechanism=self.planned.mechanism, system=system, motion=motion)
+        error = max(self.stepped.error, _relative(signals, numbers_of(problem.signals)))
+        condition = _condition(nominal.condition, sampled, nominal.torques)
+        return ModeChange(direction, task, torques, condition, error)
+
+    def _start(self, change: MotionChange) -> tuple[Array, Array]:
+        system = self.planned.system
+        q, v = np.zeros(system.n), np.zeros(system.n)
+        for body in system.bodies:
+            rigid = self.closure.system.body(body.name).all
+            frame = slice(body.offset, body.offset + 3)
+            q[frame], v[frame] = change.q[0, rigid], change.v[0, rigid]
+        return q, v
+
+    def _torques(self, nominal: FeedForward) -> FeedForward:
+        """With a complex step: through as many instants, which between knots move in proportion."""
+        d_times = np.interp(nominal.times, nominal.knots, part(self.knots))
+        motion = self.planned.plan.follow(nominal.times)
+        effort = required_effort(motion)
+        planned = self.plan(motion, effort, d_times)
+        torques, change = planned.torques(nominal.mode)
+        knots, d_knots = nominal.knots, part(self.knots)
+        if np.any(d_times):
+            places = STENCILS[0]
+            found = [
+                splines(nominal.times + place * d_times, torques + place * change, knots + place * d_knots)
+                for place in places.places
+            ]
+            near = [[np.concatenate([s.breaks, s.coefficients.ravel()]) for s in each] for each in found]
+            changes = [places.derivative(list(each)).value for each in zip(*near, strict=True)]
+        else:
+            found = splines(nominal.times, change, knots)
+            changes = [np.concatenate([0.0 * s.breaks, s.coefficients.ravel()]) for s in found]
+        signals = tuple(
+            InputSignals(
+                stepped(signal.breaks, each[: signal.breaks.size]),
+                stepped(signal.coefficients, each[signal.breaks.size :].reshape(signal.coefficients.shape)),
+            )
+            for signal, each in zip(nominal.signals, changes, strict=True)
+        )
+        return replace(nominal, signals=signals, knots=stepped(knots, d_knots), times=stepped(nominal.times, d_times))
+
+    def _signals(self, nominal: Given, torques: FeedForward) -> tuple[Difference, Array]:
+        """Derivatives of the signals, and of the stops."""
+        problem, found, stops = nominal.problem, [], []
+        d_knots, d_times = part(torques.knots), part(self.sampled.times)
+        for place, near in zip(self.stencil.places, self.near, strict=True):
+            moved = [
+                InputSignals(s.breaks.real + place * part(s.breaks), s.coefficients.real + place * part(s.coefficients))
+                for s in torques.signals
+            ]
+            signals, knots = pack_signals(near.mechanism, moved, near.end)
+            times = problem.times + place * d_times
+            inner = np.sort(np.concatenate([torques.knots.real + place * d_knots, knots]))
+            at = make_problem(problem.system, signals, problem.initial, times, inner).stops
+            if at.size != problem.stops.size or not same_layout(signals, problem.signals):
+                raise InputError(
+                    "more than numbers changes with it: no derivative", field=f"vary.{self.name}",
+                    remedy="move it a little with --at",
+                )  # fmt: skip
+            found.append(numbers_of(signals))
+            stops.append(at)
+        return self.stencil.derivative(found), self.stencil.derivative(stops).value
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """A planned motion at instants that move, and how it changes; `times` with a complex step."""
+
+    owner: Change
+    motion: RigidMotion
+    effort: Effort
+    path: KnownPath
+    times: NDArray
+    change: MotionChange
+
+    @cached_property
+    def d_effort(self) -> tuple[Array, Array]:
+        """Derivatives of the required effort (k, tasks) and of the actuation matrix (k, tasks, motors)."""
+        motion, change = self.motion, self.change
+        q, v, basis = (stepped(getattr(motion, name), getattr(change, name)) for name in ("q", "v", "basis"))
+        moved = replace(motion, mechanism=self.owner.there.mechanism, system=self.owner.rigid, q=q, v=v, basis=basis)
+        forces = self._forces()
+        add_springs_and_dampers(moved, forces)
+        transposed = np.swapaxes(basis, 1, 2)
+        required = np.einsum("kij,kj->ki", transposed, forces)
+        return part(required), part(transposed @ motor_rows(moved))
+
+    def _forces(self) -> NDArray:
+        """Of inertia, weight and loads, with a complex step."""
+        motion, change, here = self.motion, self.change, self.motion.system.packed
+        numbers, d_numbers = numbers_of(here), part(numbers_of(self.owner.rigid.packed))
+
+        def at(place: float) -> Array:
+            forces = apart(motion.q.shape)
+            packed = with_numbers(here, numbers + place * d_numbers)
+            moved = (x + place * dx for x, dx in zip((motion.q, motion.v, motion.a), change, strict=False))
+            motion_forces(packed, *moved, forces, make_scratch(packed))
+            return forces
+
+        stencil = STENCILS[0]
+        return stepped(at(0.0), stencil.derivative([at(place) for place in stencil.places]).value)
+
+    def torques(self, mode) -> tuple[Array, Array]:
+        """Torques (k, motors) of minimum norm and their derivative.
+
+        tau = B^T y, B B^T y = Q: d tau = B^+ (dQ - dB tau) + (1 - B^+ B) dB^T y.
+        """
+        d_required, d_matrix = self.d_effort
+        active = self.effort.active(mode)
+        B, dB = self.effort.matrix[:, :, active], d_matrix[:, :, active]
+        inverse = np.linalg.pinv(B)
+        tau = np.einsum("kij,kj->ki", inverse, self.effort.required)
+        y = np.einsum("kji,kj->ki", inverse, tau)
+        across = np.einsum("kji,kj->ki", dB, y)
+        change = np.einsum("kij,kj->ki", inverse, d_required - np.einsum("kij,kj->ki", dB, tau))
+        change += across - np.einsum("kij,kj->ki", inverse, np.einsum("kij,kj->ki", B, across))
+        torques, changes = (np.zeros((len(tau), active.size)) for _ in range(2))
+        torques[:, active], changes[:, active] = tau, change
+        return torques, changes
+
+
+def _condition(values: Array, planned: _Planned, torques: FeedForward) -> NDArray:
+    """Condition numbers of the actuation matrix with a complex step: singular values change by u^T dB v."""
+    active = planned.effort.active(torques.mode)
+    if not active.any():
+        return values
+    B, dB = planned.effort.matrix[:, :, active], planned.d_effort[1][:, :, active]
+    u, singular, vt = np.linalg.svd(B, full_matrices=False)
+    d_singular = np.einsum("kji,kjl,kil->ki", u, dB, vt)
+    return stepped(values, (d_singular[:, 0] - values * d_singular[:, -1]) / singular[:, -1])
+
+
+def _described(setting: Setting, task: Task, mechanism: Mechanism | None = None) -> Described:
+    model, options = setting.design(task.values)
+    path = model.path(task.path)
+    end = model.duration(task.path, path) if setting.duration is None else setting.duration
+    gains = (options.alpha, options.beta)
+    return Described(mechanism or model.mechanism, path, end, model.study.orientation, gains)
+
+
+def _moved(task: Task, k: int, by: float) -> Task:
+    values = task.values
+    return task._replace(values=(*values[:k], values[k] + by, *values[k + 1 :]))
+
+
+def _relative(difference: Difference, numbers: Array) -> float:
+    """The largest error of differences as a part of the largest number or derivative."""
+    size = max(np.max(np.abs(difference.value), initial=0.0), np.max(np.abs(numbers), initial=0.0))
+    return float(np.max(difference.error, initial=0.0) / size) if size > 0.0 else 0.0
