@@ -12,7 +12,10 @@ from typing import Any
 
 from llvmlite import binding
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_machinery import PassManager
+
+from paraflex.kernel.passes import kernel_passes, remembered_signatures
 
 
 class _Library(JITCodeLibrary):
@@ -45,8 +48,12 @@ class _Library(JITCodeLibrary):
             _relink(module, binding.Linkage.external, binding.Linkage.linkonce_odr)
 
 
-class SeparateCode(Compiler):
-    """Numba's compiler, but for the libraries it makes."""
+class SeparateCode(CompilerBase):
+    """Numba's compiler, but for its passes and the libraries it makes."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """The only way that a kernel is compiled."""
+        return [kernel_passes()]
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compile a function."""
@@ -54,7 +61,8 @@ class SeparateCode(Compiler):
         library.called_from_python = not self.state.flags.no_cpython_wrapper
         library.enable_object_caching()
         self.state.library = library
-        return super().compile_extra(func)
+        with remembered_signatures():
+            return super().compile_extra(func)
 
 
 def _relink(module: Any, old: binding.Linkage, new: binding.Linkage) -> None:
