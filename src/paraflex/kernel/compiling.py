@@ -14,7 +14,7 @@ from typing import Any
 from numba import njit, types
 from numba.extending import typeof_impl
 
-from paraflex.kernel.machine_code import SeparateCode
+from paraflex.kernel.machine_code import QuickCode, SeparateCode
 
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
@@ -51,7 +51,7 @@ class Kernel:
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         # The cache goes by this name.
         entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
-        self.from_python = njit(**_OPTIONS, **options)(entry)
+        self.from_python = njit(**{**_OPTIONS, **options})(entry)
         self.inner = routine(function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -90,3 +90,8 @@ def lasting(function: Callable[..., Any]) -> Kernel:
     One that soon returns would have to wait for them.
     """
     return Kernel(function, nogil=True)
+
+
+def seldom(function: Callable[..., Any]) -> Kernel:
+    """Make a kernel of what Python calls a few times a run: compiled in half the time, and not fast."""
+    return Kernel(function, pipeline_class=QuickCode)
