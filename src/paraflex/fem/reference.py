@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import Enum
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from paraflex.fem.element import AXIAL, CURVATURE, SLOPE, TRANSVERSE
