@@ -43,26 +43,46 @@ def compile_kernels(geometry: Geometry = Geometry.LINEAR, announce: Callable[[st
     announce : callable
         Told that it takes a while, where it does.
     """
-    if are_compiled(geometry):
-        return
-    announce(NOTICE)
-    _drop_outdated()
-    command = [sys.executable, "-m", "paraflex.compilation", geometry.value]
-    processes = [subprocess.Popen([*command, part], stdout=subprocess.DEVNULL) for part in _PARTS]
-    try:
-        # What a process fails to leave in the cache is compiled when it is first called.
-        codes = [process.wait() for process in processes]
-        if not any(codes):
-            _stamp(geometry).touch()
-    finally:
-        for process in processes:
-            process.terminate()
+    _compile([geometry], announce)
+
+
+def compile_all_kernels(announce: Callable[[str], None] = print) -> None:
+    """Compile the kernels for beams of every geometry, as far as that has not been done."""
+    _compile(list(Geometry), announce)
 
 
 def compile_kernels_for(mechanism: Mechanism, announce: Callable[[str], None] = print) -> None:
     """Compile the kernels that a mechanism needs: see `compile_kernels`. Rigid bodies have no geometry of beams."""
     bent = any(getattr(body, "flexible", False) for body in mechanism.bodies)
     compile_kernels(mechanism.geometry if bent else Geometry.LINEAR, announce)
+
+
+def _compile(geometries: list[Geometry], announce: Callable[[str], None]) -> None:
+    missing = [geometry for geometry in geometries if not are_compiled(geometry)]
+    if not missing:
+        return
+    announce(NOTICE)
+    _drop_outdated()
+    command = [sys.executable, "-m", "paraflex.compilation"]
+    processes = [subprocess.Popen([*command, *share], stdout=subprocess.DEVNULL) for share in _shares(missing)]
+    try:
+        # What a process fails to leave in the cache is compiled when it is first called.
+        codes = [process.wait() for process in processes]
+        if not any(codes):
+            for geometry in missing:
+                _stamp(geometry).touch()
+    finally:
+        for process in processes:
+            process.terminate()
+
+
+def _shares(geometries: list[Geometry]) -> list[list[str]]:
+    """What each of two processes compiles, as GEOMETRY:PART: each looks itself at what several kernels call."""
+    parts = [[f"{geometry.value}:{part}" for part in _PARTS] for geometry in geometries]
+    if len(parts) == 1:
+        return [parts[0][:1], parts[0][1:]]
+    # Of whatever geometry beams are, plans are of rigid bodies.
+    return [parts[0], parts[1][:-1]]
 
 
 def _drop_outdated() -> None:
@@ -115,23 +135,27 @@ def _call_time_loop(geometry: Geometry) -> None:
     _free_beam(geometry).march(0)
 
 
-def _call_the_rest(geometry: Geometry) -> None:
+def _call_start(geometry: Geometry) -> None:
     beam = _free_beam(geometry)
     beam.start()
     # What a start with prescribed motion is checked with.
     check_accelerations(beam.problem.system, beam.problem.signals, 0.0, beam.state.q, beam.state.v)
+
+
+def _call_plan(_: Geometry) -> None:
     path = Line((0.05, 0.31), (0.05, 0.30), max_acceleration=10.0)
     plan_tracking(raparm_i(), path, samples=2).torques("++++")
 
 
 # The time loop takes as long as everything else together.
-_PARTS = {"time-loop": _call_time_loop, "rest": _call_the_rest}
+_PARTS = {"time-loop": _call_time_loop, "start": _call_start, "plan": _call_plan}
 
 if __name__ == "__main__":
-    if len(sys.argv) == 3:
+    if len(sys.argv) > 1:
         # Nothing that compiling makes is garbage before the end.
         gc.disable()
-        _PARTS[sys.argv[2]](Geometry(sys.argv[1]))
+        for given in sys.argv[1:]:
+            name, part = given.split(":")
+            _PARTS[part](Geometry(name))
     else:
-        for each in Geometry:
-            compile_kernels(each)
+        compile_all_kernels()

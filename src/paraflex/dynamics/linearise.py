@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
-import scipy.sparse.linalg
+import scipy
 from numpy.typing import NDArray
 
 from paraflex.dynamics.joint_coordinates import joint_coordinate
@@ -23,8 +22,10 @@ from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
 from paraflex.dynamics.system import System
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix as Sparse
+
 Array = NDArray[np.float64]
-Sparse = scipy.sparse.csr_matrix
 
 # More coordinates than these make a dense eigenvalue problem a matter of minutes: then the lowest are sought.
 DENSE_COORDINATES, LOWEST = 600, 10
@@ -94,7 +95,7 @@ def natural_frequencies(
     lam, acceleration = _forces_at_rest(system, state, M, _with_joints(system, J, state.q, [*held, *torque_at]))
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
     C, typical = _with_joints(system, J, state.q, held), _typical_square(elastic, other, M)
-    K = Sparse(other + scipy.sparse.diags(elastic))
+    K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
     if system.n <= DENSE_COORDINATES:
         squares, shapes = _all(K, M, C, elastic, typical)
     else:
@@ -108,8 +109,8 @@ def natural_frequencies(
 
 def _with_joints(system: System, jacobian: Sparse, q: Array, joints: Sequence[str]) -> Sparse:
     """Constraint rows, and below them those of the joints' angles or travels."""
-    rows = [Sparse(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
-    return Sparse(scipy.sparse.vstack([jacobian, *rows]))
+    rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
+    return scipy.sparse.csr_matrix(scipy.sparse.vstack([jacobian, *rows]))
 
 
 def _forces_at_rest(system: System, state: State, M: Sparse, C: Sparse) -> tuple[Array, float]:
@@ -160,15 +161,11 @@ def _shift(mass: Array, stiffness: Array, typical: float) -> float:
     return shift
 
 
-class _Inverse(scipy.sparse.linalg.LinearOperator):
+def _inverse(solver: Saddle, n: int) -> scipy.sparse.linalg.LinearOperator:
     """From forces to the displacements that constraints allow."""
-
-    def __init__(self, solver: Saddle, n: int) -> None:
-        super().__init__(dtype=np.dtype(float), shape=(n, n))
-        self._solver = solver
-
-    def _matvec(self, x: Array) -> Array:
-        return self._solver.solve(x.ravel())[0]
+    return scipy.sparse.linalg.LinearOperator(
+        (n, n), matvec=lambda x: solver.solve(x.ravel())[0], dtype=np.dtype(float)
+    )
 
 
 def _lowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> tuple[Array, Array]:
@@ -177,7 +174,7 @@ def _lowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedom
     By Lanczos' method on the inverse; of few freedoms in a basis of them all.
     """
     n, random = int(np.asarray(M.diagonal()).size), np.random.default_rng(0)
-    inverse = _Inverse(Saddle(Sparse(K + typical * M), C), n)
+    inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + typical * M), C), n)
     if not freedoms:
         return np.zeros(0), np.zeros((n, 0))
     if freedoms > _FEW and K.count_nonzero():

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
+import scipy
 from numpy.typing import NDArray
 
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence, involved, joint_of_row

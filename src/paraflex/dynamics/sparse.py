@@ -7,8 +7,7 @@ frequencies) then costs what the entries cost, not the square of the coordinates
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse
-import scipy.sparse.linalg
+import scipy
 from numpy.typing import NDArray
 
 from paraflex.dynamics.signals import no_signals

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from paraflex.dynamics.projection import NAMED, joint_gaps, least_change, refuse_conflict

@@ -12,7 +12,7 @@ from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError

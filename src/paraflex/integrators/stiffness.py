@@ -6,7 +6,7 @@ import math
 import warnings
 
 import numpy as np
-import scipy.sparse.linalg
+import scipy
 
 from paraflex.errors import StiffnessWarning
 from paraflex.integrators.forms import OdeForm

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, copy, fill, largest
 from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.compiling import kernel, lasting, routine
+from paraflex.kernel.compiling import lasting, routine, seldom
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.dense import factor_dense, solve_factored
 from paraflex.kernel.joints import (
@@ -71,7 +71,7 @@ def make_closure_scratch(p: PackedSystem, tasks: int, signals: int) -> ClosureSc
     )  # fmt: skip
 
 
-@kernel
+@seldom
 def task_values(p, marker, coordinates, q, v, a, out):
     """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker, into out (3, tasks)."""
     px, py, vx, vy, ax, ay, _, _ = marker_motion(p, marker, q, v, a)

@@ -7,20 +7,20 @@ with it, by atomic operations that cost more than the arithmetic. Kernels make n
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from types import FunctionType
 from typing import Any
 
 from numba import njit, types
+from numba.core.caching import FunctionCache
 from numba.extending import typeof_impl
 
-from paraflex.kernel.machine_code import SeparateCode
+from paraflex.kernel.machine_code import QuickCode, SeparateCode
 
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
 
 _OPTIONS: dict[str, Any] = {
-    "cache": True,
     "error_model": "numpy",
     "fastmath": FAST_MATH,
     "no_cfunc_wrapper": True,
@@ -31,10 +31,43 @@ _OPTIONS: dict[str, Any] = {
 # Without the entry from Python.
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True}
 
-# Called from kernels only: called from Python it would crash the process.
-routine = njit(**_OPTIONS, **_INNER)
-# For what is called once a body in a hot loop.
-inlined = njit(**_OPTIONS, **_INNER, forceinline=True)
+
+class _Cache:
+    """Where a kernel is kept on disk: Numba's, but looked for when it is first asked for.
+
+    What is found there is loaded without all that Numba declares for compiling, which takes longer than loading.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    @cached_property
+    def _on_disk(self) -> Any:
+        return FunctionCache(self._function)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """What has been compiled for a signature, or None."""
+        with self._on_disk._guard_against_spurious_io_errors():
+            return self._on_disk._load_overload(signature, context)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._on_disk, name)
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    found = njit(**{**_OPTIONS, **options})(function)
+    found._cache = _Cache(function)
+    return found
+
+
+def routine(function: Callable[..., Any]) -> Any:
+    """Make what is called from kernels only: called from Python it would crash the process."""
+    return _compiled(function, **_INNER)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Make what is called once a body in a hot loop, from kernels only."""
+    return _compiled(function, **_INNER, forceinline=True)
 
 
 class Kernel:
@@ -51,7 +84,7 @@ class Kernel:
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         # The cache goes by this name.
         entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
-        self.from_python = njit(**_OPTIONS, **options)(entry)
+        self.from_python = _compiled(entry, **options)
         self.inner = routine(function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -90,3 +123,8 @@ def lasting(function: Callable[..., Any]) -> Kernel:
     One that soon returns would have to wait for them.
     """
     return Kernel(function, nogil=True)
+
+
+def seldom(function: Callable[..., Any]) -> Kernel:
+    """Make a kernel of what Python calls a few times a run: compiled in half the time, and not fast."""
+    return Kernel(function, pipeline_class=QuickCode)

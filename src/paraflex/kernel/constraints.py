@@ -6,7 +6,7 @@ from math import cosh
 
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import axis_motion, axis_values, fill_axis_rows
-from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.compiling import inlined, kernel, routine, seldom
 from paraflex.kernel.joints import (
     angle_by_sums,
     apply_force,
@@ -24,7 +24,7 @@ from paraflex.kernel.sums import body_sums
 FLATTEST = 1e-9
 
 
-@kernel
+@seldom
 def constraint_values(p, signals, t, q, v, scratch, phi, dphi):
     """Phi and Phi' at (t, q, v), into phi and dphi; zero in rows that are no constraints."""
     for r in range(p.rows.size):
@@ -55,7 +55,7 @@ def constraint_values(p, signals, t, q, v, scratch, phi, dphi):
     axis_values(p, q, v, phi, dphi)
 
 
-@kernel
+@seldom
 def fill_jacobian(p, q, jacobian):
     """Phi_q into a dense (rows, n) array, zero in rows that are no constraints; not for the time loop."""
     for r in range(p.rows.size):

@@ -11,7 +11,7 @@ from math import cos, sin, sqrt
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import turn_axes
 from paraflex.kernel.bending import inverse_times
-from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.compiling import inlined, kernel, routine, seldom
 from paraflex.kernel.factor import factor_bodies, solve_rigid
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DINV, POINT, SPRING
 from paraflex.kernel.sums import row_product
@@ -160,7 +160,7 @@ def orient(p, q, ws, dependent_part):
     return factor_schur(p, ws, dependent_part)
 
 
-@kernel
+@seldom
 def factor_system(p, b, q, ws):
     """Factor the iteration matrix [M + b K, Phi_q^T; Phi_q, 0] at q; returns the number of dependent rows."""
     factor_bodies(p, b, q, ws)

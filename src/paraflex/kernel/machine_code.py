@@ -8,11 +8,18 @@ would depend, in the last bits, on what was loaded before it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from llvmlite import binding
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_machinery import PassManager
+
+from paraflex.kernel.passes import kernel_passes, remembered_signatures
+
+# Level of optimisation, of three.
+_LITTLE = 0
 
 
 class _Library(JITCodeLibrary):
@@ -45,16 +52,55 @@ class _Library(JITCodeLibrary):
             _relink(module, binding.Linkage.external, binding.Linkage.linkonce_odr)
 
 
-class SeparateCode(Compiler):
-    """Numba's compiler, but for the libraries it makes."""
+class _QuickLibrary(_Library):
+    """The code of a function that is made in less time than it takes to make it fast."""
+
+    def _optimize_final_module(self) -> None:
+        manager, builder = self._codegen._module_pass_manager(opt=_LITTLE, loop_vectorize=False, slp_vectorize=False)
+        manager.run(self._final_module, builder)
+
+    def _finalize_final_module(self) -> None:
+        if self._shared_module is not None:
+            super()._finalize_final_module()
+            return
+        self._divide()
+        # Numba's engine has one level for all, but takes what has been made already, as from the cache.
+        code = _quick_machine(self._codegen).emit_object(self._final_module)
+        self._compiled_object = code
+        super()._finalize_final_module()
+        self._compiled_object = code
+
+
+@cache
+def _quick_machine(codegen: Any) -> binding.TargetMachine:
+    options = {"opt": _LITTLE}
+    codegen._customize_tm_options(options)
+    return binding.Target.from_triple(binding.get_process_triple()).create_target_machine(**options)
+
+
+class SeparateCode(CompilerBase):
+    """Numba's compiler, but for its passes and the libraries it makes."""
+
+    library = _Library
+
+    def define_pipelines(self) -> list[PassManager]:
+        """The only way that a kernel is compiled."""
+        return [kernel_passes()]
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compile a function."""
-        library = _Library(self.state.targetctx.codegen(), func.__qualname__)
+        library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.called_from_python = not self.state.flags.no_cpython_wrapper
         library.enable_object_caching()
         self.state.library = library
-        return super().compile_extra(func)
+        with remembered_signatures():
+            return super().compile_extra(func)
+
+
+class QuickCode(SeparateCode):
+    """For what is called so seldom that compiling it would take longer than all calls."""
+
+    library = _QuickLibrary
 
 
 def _relink(module: Any, old: binding.Linkage, new: binding.Linkage) -> None:

@@ -6,7 +6,7 @@ from math import ceil
 
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import inlined, kernel, lasting, routine
+from paraflex.kernel.compiling import inlined, lasting, routine, seldom
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
@@ -134,7 +134,7 @@ def first_stage(p, signals, t, controls, m, ws):
         add(ws.mu, lam)
 
 
-@kernel
+@seldom
 def start(p, signals, tableau, controls, m, ws, out):
     """First stage and first sample of a run."""
     t = m.clock[TIME]

@@ -18,7 +18,7 @@ from math import isfinite
 from paraflex.kernel.arrays import add
 from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.bodies import begin_body
-from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.compiling import inlined, routine, seldom
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.joints import (
     add_efforts,
@@ -47,7 +47,7 @@ AGEING, BEST_RATE = 1.05, 0.005
 ROUNDING, FINEST = 1e-8, 1e-15
 
 
-@kernel
+@seldom
 def equations(p, signals, t, weights, q, v, a, lam, torques, ws):
     """Residuals of the equations of motion (ws.f) and of the constraints (ws.rows) at one instant.
 

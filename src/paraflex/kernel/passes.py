@@ -1,0 +1,88 @@
+"""What Numba does to a kernel before it is machine code, less what no kernel needs.
+
+Numba's own list of passes is for any Python function: closures, contexts, parallel loops, rewritten array expressions.
+And it looks for the type of every sum and product anew, among dozens of candidates from strings to dates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from numba import types
+from numba.core.compiler_machinery import PassManager
+from numba.core.typed_passes import (
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import (
+    DeadBranchPrune,
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    RewriteSemanticConstants,
+    TranslateByteCode,
+)
+
+# Signatures that have been found, and what implements them.
+_found: dict[Any, Any] = {}
+
+
+@contextmanager
+def remembered_signatures() -> Iterator[None]:
+    """Meanwhile Numba's look-up of what an operator or a built-in function makes of given types remembers."""
+    look_up = types.Function.get_call_type
+
+    def remember(function: Any, context: Any, arguments: Any, named: Any) -> Any:
+        if named:
+            return look_up(function, context, arguments, named)
+        key = (function, tuple(arguments))
+        if key not in _found:
+            signature = look_up(function, context, arguments, named)
+            _found[key] = signature, function.get_impl_key(signature)
+        signature, implementation = _found[key]
+        # Somebody else's function, compiled with other options, may have left its own.
+        function._impl_keys[signature.args] = implementation
+        return signature
+
+    types.Function.get_call_type = remember
+    try:
+        yield
+    finally:
+        types.Function.get_call_type = look_up
+
+
+class _Manager(PassManager):
+    """Without bookkeeping after each pass; `IRLegalization` does it once before code is made."""
+
+    _ENFORCING = False
+
+
+_PASSES = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    RewriteSemanticConstants,
+    DeadBranchPrune,
+    GenericRewrites,
+    ReconstructSSA,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+)
+
+
+def kernel_passes() -> PassManager:
+    """All that is done to a kernel, in order."""
+    manager = _Manager("kernel")
+    for each in _PASSES:
+        manager.add_pass(each, each.__name__)
+    manager.finalize()
+    return manager
