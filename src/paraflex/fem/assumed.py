@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, pi
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import scipy
@@ -50,7 +50,7 @@ class Polynomial:
     def evaluate(self, z: Array, derivative: int = 0) -> Array:
         """Values at z (k,), or those of a derivative by z."""
         derived = np.polynomial.polynomial.polyder(np.array(self.coefficients) * 1.0, derivative)
-        return np.asarray(np.polynomial.polynomial.polyval(z, derived))
+        return cast(Array, np.polynomial.polynomial.polyval(z, derived))
 
 
 ShapeFunction = Sine | Polynomial
@@ -180,10 +180,10 @@ def _basis(moving: Array, strains: Array, field: str) -> Array:
     return basis
 
 
-def _triangle(matrix: Array) -> Array:
+def _triangle(matrix: NDArray) -> NDArray:
     """R of a matrix Q R, of a complex step with its derivative: R^T R = A^T A."""
-    R = np.linalg.qr(matrix.real, mode="r")
+    R = np.asarray(np.linalg.qr(np.real(matrix), mode="r"))
     if not np.iscomplexobj(matrix):
         return R
-    change = np.linalg.solve(R.T, np.linalg.solve(R.T, (matrix.T @ matrix).imag).T)
+    change = np.linalg.solve(R.T, np.linalg.solve(R.T, np.imag(matrix.T @ matrix)).T)
     return R + 1j * (np.triu(change) - 0.5 * np.diag(np.diag(change))) @ R

@@ -32,7 +32,7 @@ def eigenpairs(K: NDArray, M: NDArray) -> tuple[NDArray, NDArray]:
     InputError
         Derivatives of modes of one frequency that part as a parameter changes.
     """
-    stiffness, mass = np.ascontiguousarray(K.real), np.ascontiguousarray(M.real)
+    stiffness, mass = np.ascontiguousarray(np.real(K)), np.ascontiguousarray(np.real(M))
     values, vectors = scipy.linalg.eigh(stiffness, mass)
     values, vectors = _refined(stiffness, mass, values, vectors)
     if not (np.iscomplexobj(K) or np.iscomplexobj(M)):

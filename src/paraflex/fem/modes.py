@@ -55,7 +55,7 @@ def modal_basis(body: ShapeIntegrals) -> ModalBasis:
     squares, vectors = eigenpairs(body.K, body.Mff)
     # A mode's sign is arbitrary; the largest entry made positive keeps results the same on every machine.
     largest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(vectors.shape[1])]
-    return ModalBasis(omega=np.sqrt(np.maximum(squares, 0.0)), vectors=vectors * np.sign(largest.real))
+    return ModalBasis(omega=np.sqrt(np.maximum(squares, 0.0)), vectors=vectors * np.sign(np.real(largest)))
 
 
 def natural_frequencies(body: ShapeIntegrals) -> NDArray[np.float64]:

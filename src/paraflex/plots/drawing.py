@@ -47,7 +47,7 @@ class Sketch:
 
     def __init__(self, axes: Axes, shown: Scene, limits: Limits, look: Theme, width: float = 1.0) -> None:
         self.scene, self.look = shown, look
-        self._axes, self.limits, self._width = axes, limits, width
+        self.axes, self.limits, self._width = axes, limits, width
         axes.set_xlim(limits.left, limits.right)
         axes.set_ylim(limits.bottom, limits.top)
         axes.set_axis_off()
@@ -115,12 +115,12 @@ class Sketch:
         lines = LineCollection(
             [], colors=colours, linewidths=width * self._width, zorder=zorder, capstyle="round", joinstyle="round"
         )
-        self._axes.add_collection(lines, autolim=False)
+        self.axes.add_collection(lines, autolim=False)
         return lines
 
     def _polygons(self, face: str, edge: str, width: float, zorder: float) -> PolyCollection:
         polygons = PolyCollection([], facecolors=face, edgecolors=edge, linewidths=width * self._width, zorder=zorder)
-        self._axes.add_collection(polygons, autolim=False)
+        self.axes.add_collection(polygons, autolim=False)
         return polygons
 
     def _draw_ground(self) -> None:

@@ -289,7 +289,7 @@ def _frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:
                 over = time > sketch.scene.reached + 1e-12
                 text.set_text(f"ended at {sketch.scene.reached:.4g} s" if over else "")
                 for artist in sketch.artists:
-                    artist.axes.draw_artist(artist)
+                    sketch.axes.draw_artist(artist)
                 figure.draw_artist(text)
             texts[-1].set_text(clock(time, float(film.time[-1])))
             figure.draw_artist(texts[-1])

@@ -60,6 +60,11 @@ class KnownPath:
     angles: NDArray | None
     duration: float
 
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Its start and end: a path known at some times has none between."""
+        return (0.0, self.duration)
+
     def evaluate(self, t: Array) -> PathMotion:
         """The motion at these times."""
         return self.motion
@@ -194,7 +199,7 @@ class Change:
         turning = getattr(here, "turning", None)
         if isinstance(here, Polygon | Circle):
             return KnownPath(path.evaluate(times), None, duration)
-        t, d_times = times.real, part(times)
+        t, d_times = np.real(times), part(times)
         moved = [(near.path, t + place * d_times) for near, place in zip(self.near, self.stencil.places, strict=True)]
         motions = [np.stack(near.evaluate(at)) for near, at in moved]
         whole = stepped(np.stack(here.evaluate(t)), self.stencil.derivative(motions).value)
@@ -205,12 +210,14 @@ class Change:
 
     def _nearby(self, motion: RigidMotion, d_times: Array, path: KnownPath) -> list[Nearby]:
         closure, stencil = self.closure, self.stencil
-        packed, _ = with_marker(self.rigid, closure.system.mechanism.end_effector.point)
+        effector = closure.mechanism.end_effector
+        assert effector is not None
+        packed, _ = with_marker(self.rigid, effector.point)
         numbers, change = numbers_of(closure.packed), part(numbers_of(packed))
         # A closure of its own: an orientation may change too.
         orientation = self.there.orientation
         target = closure.target(path, motion.t)
-        if path.angles is None and "angle" in closure.mechanism.end_effector.coordinates:
+        if path.angles is None and "angle" in effector.coordinates:
             target = target + 1j * np.imag(orientation) * np.eye(3)[0][:, None] * (closure.coordinates == 2)
         return [
             Nearby(
