@@ -31,8 +31,21 @@ DESIRED_TWINS = (
     "angular_acceleration",
 )
 SINGLE = ("tip_deflections", "link_motions", "end_effector_path", "end_effector_motion", "phase_diagrams")
-# Of methods of integration, not of a dataset: test_compare.py.
-METHODS = ("numerical_damping", "work_precision")
+# The figures of this file's datasets, and the units on their axes; those of all results are in test_plot_command.py.
+UNITS = {
+    "desired_path": {"mm"},
+    "motor_torques": {"N m", "s"},
+    "tip_deflections": {"µm", "mm", "mrad", "s"},
+    "link_motions": {"rad", "rad/s", "rad/s²", "s"},
+    "end_effector_path": {"mm"},
+    "end_effector_motion": {"mm", "m/s", "m/s²", "s"},
+    "phase_diagrams": {"mm", "m/s", "m/s²"},
+    "tracking_errors": {"mm", "s"},
+    "compared_links": {"rad", "rad/s", "s"},
+    "compared_paths": {"mm"},
+    "model_distances": {"mm", "s"},
+    "motion_overview": {"rad", "rad/s", "J", "s"},
+}
 # Of studies of many designs, from their results as files hold them.
 _INDEX = {"first": 0.4, "first_confidence": 0.2, "total": 0.7, "total_confidence": 0.3}
 _INDICES = [
@@ -168,23 +181,7 @@ def stops(figure: Figure) -> list[np.ndarray]:
 same = partial(np.testing.assert_allclose, rtol=1e-12, atol=0.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "units"),
-    [
-        ("desired_path", {"mm"}),
-        ("motor_torques", {"N m", "s"}),
-        ("tip_deflections", {"µm", "mm", "mrad", "s"}),
-        ("link_motions", {"rad", "rad/s", "rad/s²", "s"}),
-        ("end_effector_path", {"mm"}),
-        ("end_effector_motion", {"mm", "m/s", "m/s²", "s"}),
-        ("phase_diagrams", {"mm", "m/s", "m/s²"}),
-        ("tracking_errors", {"mm", "s"}),
-        ("compared_links", {"rad", "rad/s", "s"}),
-        ("compared_paths", {"mm"}),
-        ("model_distances", {"mm", "s"}),
-        ("motion_overview", {"rad", "rad/s", "J", "s"}),
-    ],
-)
+@pytest.mark.parametrize(("name", "units"), UNITS.items())
 def test_every_axis_label_names_its_unit(data: xr.Dataset, name: str, units: set[str]) -> None:
     figure = figure_of(name, data)
     labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
@@ -194,9 +191,7 @@ def test_every_axis_label_names_its_unit(data: xr.Dataset, name: str, units: set
 
 
 @pytest.mark.parametrize("mode", [FULL, PARTIAL])
-@pytest.mark.parametrize(
-    "name", [name for name in plots.__all__ if not name.startswith("save") and name not in {*METHODS, *STUDIES}]
-)
+@pytest.mark.parametrize("name", UNITS)
 def test_nothing_overlaps_or_leaves_the_page(data: xr.Dataset, name: str, mode: str) -> None:
     data["angular_acceleration"] *= 50.0  # five digits and a sign
     stays_on_the_page(figure_of(name, data, mode))
@@ -404,8 +399,8 @@ def test_settings_of_the_user_are_neither_used_nor_changed(data: xr.Dataset) -> 
         axes = plots.tracking_errors(data).axes[0]
         assert dict(matplotlib.rcParams) == before
     assert {line.get_linewidth() for line in axes.lines} <= {0.5, 0.9}
-    assert axes.title.get_fontsize() == axes.yaxis.label.get_fontsize() == 7.0
-    assert axes.get_yticklabels()[0].get_fontsize() == 6.5
+    assert axes.title.get_fontsize() == axes.yaxis.label.get_fontsize() == 8.0
+    assert axes.get_yticklabels()[0].get_fontsize() == 7.0
 
 
 def test_unknown_mode(data: xr.Dataset) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.display import shown
 from paraflex.dynamics import State, System, build_system, consistent_state, constant_signals, pack_signals
 from paraflex.errors import InputError, IntegrationError, suggestion
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
@@ -32,6 +33,10 @@ class MotionRun:
     times: NDArray[np.float64]
     torques: Mapping[str, float]
     solution: Solution
+
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        return shown(self)
 
 
 def simulate_motion(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
+from paraflex.display import shown
 from paraflex.dynamics import State, System, build_system, pack_signals, static_equilibrium
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
@@ -155,6 +156,10 @@ class TrackingRun:
     def mode(self) -> ActuationMode:
         """The actuation mode."""
         return self.torques.mode
+
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        return shown(self)
 
 
 def plan_tracking(

@@ -397,6 +397,49 @@ def indices(
 
 
 @app.command()
+def plot(
+    results: Annotated[str, typer.Argument(metavar="RESULTS", help="A folder or file that paraflex wrote.")],
+    figure: Annotated[
+        list[str] | None, typer.Argument(metavar="FIGURE...", help='Figures by name, or "all". None: they are listed.')
+    ] = None,
+    mode: Annotated[
+        list[str] | None,
+        typer.Option(metavar="MODE", help="Actuation mode; repeatable. Default: all, or that with most motors."),
+    ] = None,
+    metric: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Metric of many designs; repeatable. Default: the first that vary."),
+    ] = None,
+    style: Annotated[
+        str | None,
+        typer.Option(metavar="single|double", help="Width of one or two columns. Default: what suits each figure."),
+    ] = None,
+    format: Annotated[str, typer.Option(metavar="pdf,svg,png", help="One or several.")] = "pdf",
+    output: Annotated[
+        str | None, typer.Option("--output", "--out", metavar="DIR", help="Folder. Default: figures/ in RESULTS.")
+    ] = None,
+    dpi: Annotated[float, typer.Option(metavar="N", help="Dots an inch of PNG.")] = 300.0,
+    force: Annotated[bool, typer.Option("--force", help="Write over files that are there.")] = False,
+    list_figures: Annotated[bool, typer.Option("--list", help="List the figures of these results.")] = False,
+) -> None:
+    """Draw figures of any results for print: a run's, a verification's, a comparison's, a study's."""
+    from paraflex.cli.plot import PlotRequest, plot_command
+
+    request = PlotRequest(
+        results=results,
+        figures=[] if list_figures else figure or [],
+        modes=mode or [],
+        metrics=metric or [],
+        style=style,
+        formats=[name.strip().lower() for name in format.split(",") if name.strip()],
+        output=output,
+        dpi=dpi,
+        force=force,
+    )
+    raise typer.Exit(plot_command(request))
+
+
+@app.command()
 def modes(source: Source = "raparm_i", path: PathOption = None, json: Json = False) -> None:
     """List the actuation modes and how well each can drive the path."""
     from paraflex.cli.modes import modes_command

@@ -136,6 +136,20 @@ class Model:
     parameters: Mapping[str, Any] = field(repr=False, compare=False)
     start: Start | None = None
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.display import facts, page
+        from paraflex.mechanism.html import mechanism_html
+
+        study = self.study
+        told = [
+            ("paths", list(self.paths)),
+            ("study: path", study.path),
+            ("study: modes", list(study.modes)),
+            ("study: duration [s]", study.duration),
+        ]
+        return page(f"Model {self.source}", facts(told), mechanism_html(self.mechanism))
+
     def path(self, name: str | None = None) -> Path:
         """A path by name, or the study's.
 

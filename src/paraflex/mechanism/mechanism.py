@@ -134,6 +134,12 @@ class Mechanism:
     def __post_init__(self) -> None:
         check_mechanism(self)
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.mechanism.html import mechanism_html
+
+        return mechanism_html(self)
+
     def body(self, name: str) -> Body:
         """The body of that name."""
         return self._bodies_by_name[name]

@@ -65,7 +65,7 @@ def _from_points(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:
                         known.setdefault(other, known[one])
         for body in mechanism.bodies:
             if body.name not in poses:
-                local = _points(body)
+                local = local_points(body)
                 found = {name: known[ref] for name in local if (ref := PointRef(body.name, name)) in known}
                 pose = _fit(local, found, assembly.angles.get(body.name))
                 if pose is not None:
@@ -75,7 +75,8 @@ def _from_points(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:
     return poses
 
 
-def _points(body: Body) -> Mapping[str, Place]:
+def local_points(body: Body) -> Mapping[str, Place]:
+    """Named points in the frame of the undeformed body [m]."""
     if isinstance(body, RigidBody):
         return body.points
     if isinstance(body, ModalBody):

@@ -1,38 +1,78 @@
-"""Figures of a tracking study, each a function from its dataset to a Matplotlib figure; their files."""
+"""Figures of results, each a function from a dataset, or from figures read of a file, to a Matplotlib figure.
 
-from paraflex.plots.agreement import compared_links, compared_paths, model_distances
-from paraflex.plots.elasticities import elasticities
-from paraflex.plots.modes import motor_torques, tracking_errors
-from paraflex.plots.numerical_damping import numerical_damping
-from paraflex.plots.optimisation import convergence, sobol_bars, targets_reached
-from paraflex.plots.overview import motion_overview
-from paraflex.plots.phase import phase_diagrams
-from paraflex.plots.save import (
-    save_agreement_figures,
-    save_elasticities,
-    save_figures,
-    save_overview,
-    save_search_figures,
-    save_work_precision,
+The names below are imported when they are first used: most commands need one or two of them.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from paraflex.plots.catalogue import homes
+
+if TYPE_CHECKING:
+    from paraflex.plots.agreement import compared_deflections, compared_links, compared_paths, model_distances
+    from paraflex.plots.derivatives import elasticities
+    from paraflex.plots.driving import actuation_condition, mode_comparison, mode_conditions, tracking_distance
+    from paraflex.plots.energy import energies
+    from paraflex.plots.forces import joint_forces
+    from paraflex.plots.free_motion import coordinates, point_paths
+    from paraflex.plots.methods import work_precision
+    from paraflex.plots.modes import motor_torques, tracking_errors
+    from paraflex.plots.optimisation import convergence, sobol_bars, targets_reached
+    from paraflex.plots.overview import motion_overview
+    from paraflex.plots.parallel import parallel_coordinates
+    from paraflex.plots.phase import link_phases, phase_diagrams
+    from paraflex.plots.responses import pareto_front, response_curves
+    from paraflex.plots.save import (
+        save_agreement_figures,
+        save_elasticities,
+        save_figures,
+        save_overview,
+        save_search_figures,
+        save_work_precision,
+    )
+    from paraflex.plots.spectra import numerical_damping
+    from paraflex.plots.time_series import end_effector_motion, link_deflections, link_motions, tip_deflections
+    from paraflex.plots.workspace import desired_path, end_effector_path
+
+_SAVES = (
+    "save_agreement_figures",
+    "save_elasticities",
+    "save_figures",
+    "save_overview",
+    "save_search_figures",
+    "save_work_precision",
 )
-from paraflex.plots.time_series import end_effector_motion, link_motions, tip_deflections
-from paraflex.plots.work_precision import work_precision
-from paraflex.plots.workspace import desired_path, end_effector_path
+_HOME = homes() | dict.fromkeys(_SAVES, "save")
 
 __all__ = [
+    "actuation_condition",
+    "compared_deflections",
     "compared_links",
     "compared_paths",
     "convergence",
+    "coordinates",
     "desired_path",
     "elasticities",
     "end_effector_motion",
     "end_effector_path",
+    "energies",
+    "joint_forces",
+    "link_deflections",
     "link_motions",
+    "link_phases",
+    "mode_comparison",
+    "mode_conditions",
     "model_distances",
     "motion_overview",
     "motor_torques",
     "numerical_damping",
+    "parallel_coordinates",
+    "pareto_front",
     "phase_diagrams",
+    "point_paths",
+    "response_curves",
     "save_agreement_figures",
     "save_elasticities",
     "save_figures",
@@ -42,6 +82,17 @@ __all__ = [
     "sobol_bars",
     "targets_reached",
     "tip_deflections",
+    "tracking_distance",
     "tracking_errors",
     "work_precision",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(import_module(f"paraflex.plots.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'paraflex.plots' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

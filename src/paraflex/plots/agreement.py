@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from paraflex.errors import InputError
-from paraflex.plots.labels import mode_label, peak, symbol
-from paraflex.plots.layout import label_outer_time, lay_out, panels
-from paraflex.plots.runs import draw_actual, select_run, shade_rest
-from paraflex.plots.style import BLUE, COLOURS, DASHES, VERMILLION, journal_style, keep_flat
+from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, mode_label, peak, symbol
+from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
+from paraflex.plots.runs import draw_actual, draw_curves, select_run, shade_rest
+from paraflex.plots.scales import mark_powers
+from paraflex.plots.style import BLUE, VERMILLION, journal_style, keep_flat, look_of
+from paraflex.plots.time_series import most_deflected
 from paraflex.plots.workspace import deviated_paths
 
 _PRINTED = {
@@ -33,6 +33,8 @@ _PAIR: tuple[dict[str, Any], ...] = (
 )
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
 _SHORTEST = 1e-8
+# Links that a page holds in one column.
+_MOST_NARROW = 6
 
 
 def printed(model: str) -> str:
@@ -68,7 +70,8 @@ def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
 def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure:
     """Angle and angular velocity of every link in two models (Fig. 22).
 
-    A link's angle is that of the line from its first end to its last, which every model has.
+    A link's angle is that of the line from its first end to its last, which every model has. In one column there are
+    those of the first six.
 
     Parameters
     ----------
@@ -86,22 +89,55 @@ def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure
     """
     runs = [select_run(select_model(data, model), mode) for model in models]
     columns = (
-        ("chord_angle", "angle", r"$\varphi$ [rad]"),
-        ("chord_velocity", "angular velocity", r"$\dot\varphi$ [rad/s]"),
+        ("chord_angle", "angle"),
+        ("chord_velocity", "angular_velocity"),
     )
-    bodies, time = data["body"].values, data["time"].values
+    bodies, time = data["body"].values[: _MOST_NARROW if is_narrow() else None], data["time"].values
     figure, axes = panels(len(bodies), len(columns))
-    for column, (variable, title, label) in zip(axes.T, columns, strict=True):
+    for column, (variable, quantity) in zip(axes.T, columns, strict=True):
         scale = max(float(np.ptp(run[variable].values, axis=0).max()) for run in runs)
         for panel, body in zip(column, bodies, strict=True):
             for run, model, look in zip(runs, models, _PAIR, strict=True):
                 draw_actual(panel, run, time, run[variable].sel(body=body).values, label=printed(model), **look)
             shade_rest(panel, data)
             keep_flat(panel, scale)
-            panel.set_title(f"{symbol(str(body))}: {title}")
-            panel.set_ylabel(label)
+            panel.set_title(f"{symbol(str(body))}: {QUANTITIES[quantity].name}")
+            panel.set_ylabel(axis_label(quantity, short=True))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=21.5)
+
+
+@journal_style()
+def compared_deflections(data: xr.Dataset, mode: str) -> Figure:
+    """Transverse tip displacement of links in every model that has it, a panel a link.
+
+    Those of the two links whose tips move most in the reference, twins of a symmetric mechanism counted once.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `studies.Verification.dataset`.
+    mode : str
+        Actuation mode.
+
+    Raises
+    ------
+    InputError
+        No such mode.
+    """
+    runs = {str(name): select_run(select_model(data, str(name)), mode) for name in data["model"].values}
+    bodies = most_deflected(runs[str(data.attrs["reference"])])
+    everything = [run["tip_transverse"].sel(body=body).values for run in runs.values() for body in bodies]
+    unit = display_unit("m", np.concatenate(everything))
+    figure, axes = panels(len(bodies), 1)
+    for panel, body in zip(axes[:, 0], bodies, strict=True):
+        for k, (name, run) in enumerate(runs.items()):
+            draw_curves(panel, run, {printed(name): unit.factor * run["tip_transverse"].sel(body=body).values}, first=k)
+        shade_rest(panel, data)
+        panel.set_title(f"{symbol(body)}: transverse displacement")
+        panel.set_ylabel(axis_label("displacement", unit=unit.name))
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=44.0)
 
 
 @journal_style()
@@ -146,7 +182,7 @@ def model_distances(data: xr.Dataset) -> Figure:
         for k, name in enumerate(str(name) for name in data["model"].values):
             run = select_run(select_model(data, name), mode)
             place = run["end_effector"].values
-            look: dict[str, Any] = {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k % len(DASHES)]}
+            look = look_of(k)
             for panel, other in zip(column, (run["end_effector_desired"].values, datum), strict=True):
                 distance = np.linalg.norm(place - other, axis=1)
                 shown = np.where(distance > _SHORTEST, distance, np.nan)
@@ -154,17 +190,9 @@ def model_distances(data: xr.Dataset) -> Figure:
         for panel, title in zip(column, ("from the desired path", f"from {printed(reference)}"), strict=True):
             shade_rest(panel, data)
             panel.set_title(f"{mode_label(mode)}: distance {title}")
-            _logarithmic(panel)
+            if any(peak(np.asarray(line.get_ydata(), dtype=float)) > 0.0 for line in panel.lines):
+                mark_powers(panel)
     for panel in axes[:, 0]:
-        panel.set_ylabel("distance [mm]")
+        panel.set_ylabel(axis_label("distance"))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=48.0)
-
-
-def _logarithmic(panel: Axes) -> None:
-    values = [line.get_ydata() for line in panel.lines]
-    if not any(peak(np.asarray(y, dtype=float)) > 0.0 for y in values):
-        return
-    panel.set_yscale("log")
-    # Plain text: the layout knows how wide digits are.
-    panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -13,6 +13,86 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _GREEK = ("alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "tau", "omega")
 
 
+class Quantity(NamedTuple):
+    """What an axis shows: its name, its symbol (empty where there is none) and its unit."""
+
+    name: str
+    symbol: str
+    unit: str
+
+
+# The one list of what axes are called; {} is a direction.
+QUANTITIES = {
+    "time": Quantity("time", "$t$", "s"),
+    "angle": Quantity("angle", r"$\varphi$", "rad"),
+    "angular_velocity": Quantity("angular velocity", r"$\dot\varphi$", "rad/s"),
+    "angular_acceleration": Quantity("angular acceleration", r"$\ddot\varphi$", "rad/s²"),
+    "position": Quantity("displacement", "${}$", "mm"),
+    "velocity": Quantity("velocity", r"$\dot {}$", "m/s"),
+    "acceleration": Quantity("acceleration", r"$\ddot {}$", "m/s²"),
+    "displacement": Quantity("displacement", "", "mm"),
+    "slope": Quantity("slope", "", "rad"),
+    "error": Quantity("error", "", "mm"),
+    "distance": Quantity("distance", "", "mm"),
+    "torque": Quantity("torque", r"$\tau$", "N m"),
+    "force": Quantity("force", "", "N"),
+    "energy": Quantity("energy", "", "J"),
+    "condition": Quantity("condition number", "", "1"),
+    "flexible": Quantity("modal coordinate", r"$\eta$", "m kg$^{1/2}$"),
+    "wall_time": Quantity("wall time", "", "s"),
+}
+
+
+def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", short: bool = False) -> str:
+    """Name, symbol and unit of an axis: "torque τ [N m]"; numbers without a unit have no brackets.
+
+    Parameters
+    ----------
+    quantity : str
+        One of `QUANTITIES`.
+    unit : str, optional
+        That values are shown in, where it is not the quantity's own.
+    direction : str
+        "x" or "y", of a symbol that has one.
+    short : bool
+        Whether the symbol is enough, if there is one: below a title that names the quantity.
+    """
+    told = QUANTITIES[quantity]
+    mark = told.symbol.replace("{}", direction)
+    text = " ".join(part for part in ("" if short and mark else told.name, mark) if part)
+    unit = told.unit if unit is None else unit
+    return text if unit == "1" else f"{text} [{unit}]"
+
+
+# What a metric is called in print; others go by their own names.
+METRIC_NAMES = {
+    "tracking_rms": "RMS tracking error",
+    "tracking_max": "largest tracking error",
+    "residual_vibration": "residual vibration",
+    "deflection_max": "largest deflection",
+    "peak_torque_max": "peak torque",
+    "rms_torque_norm": "RMS torque",
+    "motor_energy": "energy of the motors",
+    "strain_energy_max": "largest strain energy",
+    "kinetic_energy_max": "largest kinetic energy",
+    "total_mass": "mass",
+    "actuation_condition_max": "condition number",
+}
+
+
+def metric_name(metric: str) -> str:
+    """What a metric is called in print: "RMS tracking error"; "peak torque of tau1" of one motor's."""
+    name, dot, motor = metric.partition(".")
+    return plain(METRIC_NAMES.get(name, name.replace("_", " ")) + (f" of {motor}" if dot else ""))
+
+
+def effort_label(units: str) -> str:
+    """Motors that turn give torques, motors that slide forces."""
+    if units in ("N m", "N"):
+        return axis_label("torque" if units == "N m" else "force")
+    return f"torque, force [{units}]"
+
+
 class DisplayUnit(NamedTuple):
     """A unit to show values in: its name, and what values in SI are multiplied by."""
 
@@ -53,6 +133,15 @@ def power_of_ten(value: float) -> str:
     return "10" + str(exponent).translate(_RAISED)
 
 
+def logarithmic_number(value: float) -> str:
+    """A number of a logarithmic axis: 0.001 to 5000 plainly, others as "10⁻⁵" or "2·10⁻⁵"."""
+    if value <= 0.0 or 0.999e-3 <= value < 0.999e4:
+        return f"{value:g}"
+    exponent = math.floor(math.log10(value) + 1e-9)
+    digits = f"{value / 10.0**exponent:.3g}"
+    return ("" if digits == "1" else f"{digits}·") + "10" + str(exponent).translate(_RAISED)
+
+
 def symbol(name: str) -> str:
     """A name as print shows it: "A1" and "tau1" as symbols with a subscript, "link1" as "link 1", others unchanged."""
     parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
@@ -63,6 +152,11 @@ def symbol(name: str) -> str:
         letter = letters if len(letters) == 1 else rf"\{letters}"
         return rf"${letter}_{{{number}}}$" if number else f"${letter}$"
     return f"{letters} {number}".rstrip()
+
+
+def plain(name: str) -> str:
+    """A name that is not read as mathematics."""
+    return name.replace("$", r"\$")
 
 
 def mode_label(name: str) -> str:

@@ -7,6 +7,10 @@ put the axis labels of a column on one line.
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -15,37 +19,109 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-ONE_COLUMN, TWO_COLUMNS = 90.0, 180.0  # Widths of a journal's columns [mm].
+from paraflex.errors import InputError, suggestion
+from paraflex.plots.labels import axis_label
+from paraflex.plots.style import STYLE
+
+ONE_COLUMN, TWO_COLUMNS = 84.0, 174.0  # Widths of a journal's columns [mm].
+COLUMNS = {"single": ONE_COLUMN, "double": TWO_COLUMNS}
 MM = 1.0 / 25.4  # [inch]
+# No figure is taller than the text of a page, if its panels can be as low as the least that can be read [mm].
+_PAGE, _LOWEST = 225.0, 9.0
 
 # Room for the parts round a panel [mm].
 _EDGE = 1.0
-_LEGEND_LINE = 3.7
-_TITLE = 3.8
-_BELOW_ROW = 2.2
+_LEGEND_LINE = 4.2
+_TITLE = 4.4
+_BELOW_ROW = 2.4
 _NUMBER_PAD = 1.8
-_TIME_NUMBERS = 4.0
-_AXIS_LABEL = 3.3
-_RIGHT = 3.4  # half of a number such as 0.030
+_TIME_NUMBERS = 4.3
+_AXIS_LABEL = 3.8
+_RIGHT = 3.6  # half of a number such as 0.030
 
 # Widths of the letters of numbers [em] in DejaVu Sans, and its size on the axes [mm].
-_DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838}
-_EM = 6.5 / 72.0 * 25.4
+_DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838, "⊕": 0.838, "⊖": 0.838}
+_EM = STYLE["ytick.labelsize"] / 72.0 * 25.4
+# Width of a letter of a title, and by how much titles may be wider than their panels, where they are centred [mm].
+_LETTER = 0.6 * STYLE["axes.titlesize"] / 72.0 * 25.4
+_OVERHANG = 4.0
+
+_width: ContextVar[float | None] = ContextVar("_width", default=None)
+
+
+@contextmanager
+def column_width(style: str | None) -> Iterator[None]:
+    """Draw figures as wide as one column of a journal, "single", or two, "double"; None: each as suits it.
+
+    Raises
+    ------
+    InputError
+        None of these.
+    """
+    if style is not None and style not in COLUMNS:
+        raise InputError("unknown style", field="style", value=style, remedy=suggestion(style, COLUMNS))
+    before = _width.set(None if style is None else COLUMNS[style])
+    try:
+        yield
+    finally:
+        _width.reset(before)
+
+
+def figure_width(panel: Axes) -> float:
+    """Width of the figure that a panel is in [mm]."""
+    figure = panel.figure
+    assert isinstance(figure, Figure)
+    return figure.get_figwidth() / MM
+
+
+def is_narrow(width: float = TWO_COLUMNS) -> bool:
+    """Whether a figure that would take this width [mm] is to stand in one column."""
+    return (_width.get() or width) < 0.75 * TWO_COLUMNS
 
 
 def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
-    """A figure of a width [mm] and its axes (rows, columns); `lay_out` gives them their places."""
+    """A figure of a width [mm] and its axes (rows, columns); `lay_out` gives them their places.
+
+    In `column_width` the width is that asked for.
+    """
+    width = _width.get() or width
     figure = Figure(figsize=(width * MM, width * MM))
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
 def label_outer_time(axes: NDArray[Any]) -> None:
     """Name the time axis below the lowest panel of each column and take its numbers off the others."""
-    for column in axes.T:
+    for column in arranged(axes).T:
         shown = [panel for panel in column if panel.get_visible()]
         for panel in shown[:-1]:
             panel.tick_params(labelbottom=False)
-        shown[-1].set_xlabel("time $t$ [s]")
+        shown[-1].set_xlabel(axis_label("time"))
+
+
+def arranged(axes: NDArray[Any]) -> NDArray[Any]:
+    """Panels as they stand: side by side, or in one column of print one below the other where they need the width."""
+    figure = axes[0, 0].figure
+    width = figure.get_figwidth() / MM
+    if axes.shape[1] == 1 or width > 0.75 * TWO_COLUMNS:
+        return axes
+    _, _, panel_width = _columns(axes, width)
+    if axes.shape[1] == 2 and all(_title_fits(panel, panel_width) for panel in axes.flat):
+        return axes
+    for row in axes:
+        for panel in row[1:]:
+            # One label for a row of panels becomes one for each.
+            panel.set_ylabel(panel.get_ylabel() or row[0].get_ylabel())
+    return np.array([[panel] for panel in axes.flat if panel.get_visible()], dtype=object)
+
+
+def _title_fits(panel: Axes, width: float) -> bool:
+    lengths = [_LETTER * _letters(panel.get_title(loc=loc)) for loc in ("left", "center", "right")]
+    return lengths[1] <= width + _OVERHANG and lengths[0] + lengths[2] <= width - _LETTER
+
+
+def _letters(text: str) -> int:
+    """Letters of a text as printed, mathematics roughly."""
+    return len(re.sub(r"\\[a-z]+", "x", text.replace(r"\$", "S")).translate(str.maketrans("", "", "${}_^")))
 
 
 def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figure:
@@ -58,9 +134,14 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
     axes : array of matplotlib.axes.Axes (rows, columns)
         Its panels.
     panel_height : float
-        [mm]
+        [mm]; less where the figure would be taller than a page.
     """
-    tops, height = _rows(axes, panel_height, _shared_legend(figure))
+    axes = arranged(axes)
+    lines = _shared_legend(figure)
+    _, height = _rows(axes, panel_height, lines)
+    if height > _PAGE:
+        panel_height = max(_LOWEST, panel_height - (height - _PAGE) / axes.shape[0])
+    tops, height = _rows(axes, panel_height, lines)
     width = figure.get_figwidth() / MM
     figure.set_size_inches(width * MM, height * MM)
     for panel in axes.flat:  # The numbers on an axis depend on its length.

@@ -10,21 +10,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paraflex.plots.labels import display_unit, mode_label, peak, symbol, three_digits
-from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, label_outer_time, lay_out, panels
+from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label, peak, symbol, three_digits
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, samples, select_run, shade_rest
-from paraflex.plots.style import (
-    BLUE,
-    COLOURS,
-    DASHES,
-    VERMILLION,
-    ZERO,
-    journal_style,
-    keep_flat,
-)
+from paraflex.plots.style import BLUE, VERMILLION, ZERO, journal_style, keep_flat, look_of
 
 # Of a mode and the names of its passive motors, as many as fit above a panel.
-_TITLE_LETTERS = 26
+_TITLE_LETTERS = 22
 
 
 @journal_style()
@@ -49,11 +41,10 @@ def motor_torques(data: xr.Dataset) -> Figure:
             passive = []
             for k, motor in enumerate(motors):
                 torque = run["torque"].sel(motor=motor).values
-                look = {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k % len(DASHES)]}
                 if peak(torque) <= 1e-9 * scale:
                     passive.append(str(motor))
                     torque = np.full_like(torque, np.nan)  # Keeps its place in the legend.
-                panel.plot(time, torque, label=symbol(str(motor)), **look)
+                panel.plot(time, torque, label=symbol(str(motor)), **look_of(k))
             panel.axhline(0.0, **ZERO)
             shade_rest(panel, data)
             panel.set_ylim(-1.08 * scale or -1.0, 1.08 * scale or 1.0)
@@ -62,14 +53,9 @@ def motor_torques(data: xr.Dataset) -> Figure:
                 short = len(name) + len(", ".join(passive)) <= _TITLE_LETTERS
                 listed = ", ".join(map(symbol, passive)) if short else f"{len(passive)} motors"
                 panel.set_title(f"passive: {listed}", loc="right")
-        axes[row, 0].set_ylabel(_effort_label(data["torque"].attrs.get("units", "N m")))
+        axes[row, 0].set_ylabel(effort_label(data["torque"].attrs.get("units", "N m")))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=38.0)
-
-
-def _effort_label(units: str) -> str:
-    """Motors that turn give torques, motors that slide forces."""
-    return {"N m": r"torque $\tau$ [N m]", "N": "force [N]"}.get(units, f"torque, force [{units}]")
 
 
 @journal_style()
@@ -95,7 +81,7 @@ def tracking_errors(data: xr.Dataset) -> Figure:
         shade_rest(panel, data)
         keep_flat(panel, unit.factor * peak(errors))
         panel.set_title(f"{mode_label(name)}: {_outcome(run)}")
-        panel.set_ylabel(f"error [{unit.name}]")
+        panel.set_ylabel(axis_label("error", unit=unit.name))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=38.0)
 
@@ -112,7 +98,7 @@ def _outcome(run: xr.Dataset) -> str:
 
 def _mode_panels(count: int) -> tuple[Figure, NDArray[Any]]:
     """A panel for each mode, at most three beside one another; those left over are hidden."""
-    columns = 2 if count == 4 else min(count, 3)
+    columns = 2 if count == 4 or (is_narrow() and count > 1) else min(count, 3)
     rows = math.ceil(count / columns)
     figure, axes = panels(rows, columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)
     for panel in axes.flat[count:]:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
-from paraflex.plots.labels import mode_label
+from paraflex.plots.labels import metric_name, mode_label
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panels
 from paraflex.plots.style import BLUE, VERMILLION, ZERO, journal_style
 
@@ -162,10 +162,15 @@ def _list_lines(panel: Axes, names: list[str]) -> None:
 def _target_name(target: Mapping[str, Any], targets: list) -> str:
     """What tells a target from the others: its mode, and path and metric where they differ."""
     differing = [key for key in ("metric", "path") if len({each[key] for each in targets}) > 1]
-    return " ".join([mode_label(target["mode"]), *(target[key] for key in differing)])
+    return " ".join(
+        [
+            mode_label(target["mode"]),
+            *(metric_name(target[key]) if key == "metric" else target[key] for key in differing),
+        ]
+    )
 
 
 def _panel_name(name: tuple[str, ...], names: list[tuple[str, ...]]) -> str:
     metric, path, mode = name
     paths = {each[1] for each in names}
-    return ", ".join([metric, *([path] if len(paths) > 1 else []), mode_label(mode)]).replace("$", r"\$")
+    return ", ".join([metric_name(metric), *([path] if len(paths) > 1 else []), mode_label(mode)])

@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paraflex.plots.labels import symbol
+from paraflex.plots.labels import axis_label, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
-from paraflex.plots.style import COLOURS, DASHES, journal_style, keep_flat
+from paraflex.plots.style import COLOURS, DASHES, journal_style, keep_flat, look_of
 
 # Lines that can still be told apart in one panel.
 _MOST = 7
@@ -25,22 +25,21 @@ def motion_overview(data: xr.Dataset) -> Figure:
     """
     figure, axes = panels(3, 1)
     time = data["time"].values
-    for panel, variable, label in (
-        (axes[0, 0], "angle", r"$\varphi$ [rad]"),
-        (axes[1, 0], "angular_velocity", r"$\dot\varphi$ [rad/s]"),
+    for panel, variable in (
+        (axes[0, 0], "angle"),
+        (axes[1, 0], "angular_velocity"),
     ):
         values = data[variable].values
         for k, body in enumerate(data["body"].values[:_MOST]):
-            look = {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k % len(DASHES)]}
-            panel.plot(time, values[:, k], label=symbol(str(body)), **look)
+            panel.plot(time, values[:, k], label=symbol(str(body)), **look_of(k))
         keep_flat(panel, float(np.nanmax(np.abs(values), initial=0.0)) or 1.0)
-        panel.set_ylabel(label)
+        panel.set_ylabel(axis_label(variable))
     for k, (variable, name) in enumerate(
         (("kinetic_energy", "kinetic energy"), ("strain_energy", "strain energy"), ("work", "work done on it"))
     ):
         look = {"color": COLOURS[-1 - k], "linestyle": DASHES[k]}
         axes[2, 0].plot(time, data[variable].values, label=name, **look)
-    axes[2, 0].set_ylabel("energy [J]")
+    axes[2, 0].set_ylabel(axis_label("energy"))
     for panel in axes.flat:
         panel.set_xlim(time[0], time[-1])
     label_outer_time(axes)

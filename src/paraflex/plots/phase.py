@@ -1,14 +1,17 @@
-"""Phase diagrams of the end-effector's motion (Fig. 17)."""
+"""Phase diagrams: of the end-effector's motion (Fig. 17), and of bodies'."""
 
 from __future__ import annotations
 
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paraflex.plots.labels import peak
-from paraflex.plots.layout import lay_out, panels
-from paraflex.plots.runs import START, draw_actual, draw_desired, select_run
-from paraflex.plots.style import journal_style, keep_flat
+from paraflex.plots.labels import axis_label, peak, symbol
+from paraflex.plots.layout import is_narrow, lay_out, panels
+from paraflex.plots.runs import START, draw_actual, draw_desired, one_run, select_run
+from paraflex.plots.style import BLUE, journal_style, keep_flat
+
+# Bodies that have a panel.
+_MOST = 8
 
 
 @journal_style()
@@ -28,9 +31,9 @@ def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
         No such mode.
     """
     quantities = (
-        ("end_effector", "${}$ [mm]", 1e3),
-        ("end_effector_velocity", r"$\dot {}$ [m/s]", 1.0),
-        ("end_effector_acceleration", r"$\ddot {}$ [m/s²]", 1.0),
+        ("end_effector", "position", 1e3),
+        ("end_effector_velocity", "velocity", 1.0),
+        ("end_effector_acceleration", "acceleration", 1.0),
     )
     run = select_run(data, mode)
     directions = [str(axis) for axis in data["axis"].values]
@@ -46,9 +49,48 @@ def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
             panel.margins(0.06)
             keep_flat(panel, peak(across[2] * run[f"{across[0]}_desired"]), "x")
             keep_flat(panel, peak(up[2] * run[f"{up[0]}_desired"]))
-            panel.set_xlabel(across[1].replace("{}", axis))
-            panel.set_ylabel(up[1].replace("{}", axis))
+            panel.set_xlabel(axis_label(across[1], direction=axis, short=True))
+            panel.set_ylabel(axis_label(up[1], direction=axis, short=True))
     for row, title in zip(axes, ("displacement and velocity", "velocity and acceleration"), strict=True):
         for panel, axis in zip(row, directions, strict=True):
             panel.set_title(f"{title} in ${axis}$")
     return lay_out(figure, axes, panel_height=50.0)
+
+
+@journal_style()
+def link_phases(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Angular velocity over angle of every body, of at most eight of them.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.tracking_dataset` or `motion_dataset`.
+    mode : str, optional
+        Actuation mode; by default that with most active motors.
+
+    Raises
+    ------
+    InputError
+        No such mode.
+    """
+    run = one_run(data, mode)
+    bodies = [str(name) for name in run["body"].values][:_MOST]
+    columns = 2 if is_narrow() or len(bodies) in (2, 3, 4) else min(len(bodies), 4)
+    columns = min(columns, len(bodies))
+    figure, axes = panels(-(-len(bodies) // columns), columns)
+    angles, rates = (run[name].transpose("time", "body").values for name in ("angle", "angular_velocity"))
+    for panel in axes.flat[len(bodies) :]:
+        panel.set_visible(False)
+    for k, (panel, body) in enumerate(zip(axes.flat, bodies, strict=False)):
+        panel.plot(angles[:, k], rates[:, k], color=BLUE, label="actual")
+        if "angle_desired" in run:
+            draw_desired(panel, run["angle_desired"].values[:, k], run["angular_velocity_desired"].values[:, k])
+        panel.plot(angles[0, k], rates[0, k], **START)[0].set_markersize(2.5)
+        panel.margins(0.06)
+        keep_flat(panel, peak(angles), "x")
+        keep_flat(panel, peak(rates))
+        panel.set_title(symbol(body))
+        panel.set_xlabel(axis_label("angle"))
+    for row in axes:
+        row[0].set_ylabel(axis_label("angular_velocity"))
+    return lay_out(figure, axes, panel_height=34.0)

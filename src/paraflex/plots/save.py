@@ -1,30 +1,23 @@
-"""All figures of a study as files."""
+"""Figures as files: those that a command writes with its results, and any of them again for print."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paraflex.errors import OutputError
-from paraflex.plots.agreement import compared_links, compared_paths, model_distances, prototype_pair
-from paraflex.plots.elasticities import elasticities
-from paraflex.plots.modes import motor_torques, tracking_errors
-from paraflex.plots.optimisation import convergence, sobol_bars, targets_reached
-from paraflex.plots.overview import motion_overview
-from paraflex.plots.phase import phase_diagrams
-from paraflex.plots.runs import default_mode
+from paraflex.errors import InputError, OutputError, suggestion
+from paraflex.plots.catalogue import Drawing, drawings, figures_of
+from paraflex.plots.layout import column_width
+from paraflex.plots.sources import Source
 from paraflex.plots.style import journal_style
-from paraflex.plots.time_series import end_effector_motion, link_motions, tip_deflections
-from paraflex.plots.work_precision import work_precision
-from paraflex.plots.workspace import desired_path, end_effector_path
 
 # Files that do not depend on when they were written.
-_METADATA = {"png": {}, "svg": {"Date": None}}
+_METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+FORMATS = tuple(_METADATA)
 
 
 def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) -> list[Path]:
@@ -52,18 +45,7 @@ def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) 
     OutputError
         The folder cannot be written.
     """
-    mode = default_mode(data) if mode is None else mode
-    figures = {
-        "fig11_desired_path": lambda: desired_path(data),
-        "fig12_motor_torques": lambda: motor_torques(data),
-        "fig13_tip_deflections": lambda: tip_deflections(data, mode),
-        "fig14_link_motions": lambda: link_motions(data, mode),
-        "fig15_end_effector_path": lambda: end_effector_path(data, mode),
-        "fig16_end_effector_motion": lambda: end_effector_motion(data, mode),
-        "fig17_phase_diagrams": lambda: phase_diagrams(data, mode),
-        "fig18_tracking_errors": lambda: tracking_errors(data),
-    }
-    return _save(figures, Path(folder))
+    return _save_written("tracking", data, Path(folder), mode)
 
 
 def save_agreement_figures(data: xr.Dataset, folder: str | Path) -> list[Path]:
@@ -86,14 +68,7 @@ def save_agreement_figures(data: xr.Dataset, folder: str | Path) -> list[Path]:
     OutputError
         The folder cannot be written.
     """
-    pair = prototype_pair(data)
-    figures: dict[str, Callable[[], Figure]] = {}
-    if pair is not None:
-        for mode in (str(name) for name in data["mode"].values):
-            figures[f"fig22_links_{mode}"] = partial(compared_links, data, mode, pair)
-            figures[f"fig23_paths_{mode}"] = partial(compared_paths, data, mode, pair)
-    figures["model_distances"] = partial(model_distances, data)
-    return _save(figures, Path(folder))
+    return _save_written("verification", data, Path(folder))
 
 
 def save_overview(data: xr.Dataset, folder: str | Path) -> list[Path]:
@@ -104,7 +79,7 @@ def save_overview(data: xr.Dataset, folder: str | Path) -> list[Path]:
     OutputError
         The folder cannot be written.
     """
-    return _save({"motion_overview": partial(motion_overview, data)}, Path(folder))
+    return _save_written("motion", data, Path(folder))
 
 
 def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
@@ -115,9 +90,7 @@ def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[
     OutputError
         The folder cannot be written.
     """
-    if not any(run["status"] == "complete" for method in figures["methods"].values() for run in method["runs"]):
-        return []
-    return _save({"work_precision": partial(work_precision, figures)}, Path(folder))
+    return _save_written("methods", figures, Path(folder))
 
 
 def save_search_figures(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
@@ -136,14 +109,8 @@ def save_search_figures(figures: Mapping[str, Any], folder: str | Path) -> list[
     OutputError
         The folder cannot be written.
     """
-    drawn: dict[str, Callable[[], Figure]] = {}
-    if any(value is not None for _, value, _ in figures.get("history", ())):
-        drawn["convergence"] = partial(convergence, figures)
-    if any(target["value"] != 0.0 for target in figures.get("targets", ())):
-        drawn["targets"] = partial(targets_reached, figures)
-    if any(row["first"] is not None for row in figures.get("indices", ())):
-        drawn["indices"] = partial(sobol_bars, figures)
-    return _save(drawn, Path(folder)) if drawn else []
+    kind = "indices" if "indices" in figures else "identification" if "targets" in figures else "optimisation"
+    return _save_written(kind, figures, Path(folder))
 
 
 def save_elasticities(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
@@ -154,26 +121,110 @@ def save_elasticities(figures: Mapping[str, Any], folder: str | Path) -> list[Pa
     OutputError
         The folder cannot be written.
     """
-    drawn = {
-        f"elasticities_{run['path']}_{run['mode']}": partial(elasticities, figures, k)
-        for k, run in enumerate(figures["runs"])
-    }
-    return _save(drawn, Path(folder))
+    return _save_written("sensitivity", figures, Path(folder))
 
 
-def _save(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:
+def check_formats(formats: Sequence[str]) -> None:
+    """Nothing, if figures can be written in these.
+
+    Raises
+    ------
+    InputError
+        An unknown one, or none.
+    """
+    for name in formats or ("",):
+        if name not in FORMATS:
+            raise InputError("unknown format", field="--format", value=name, remedy=suggestion(name, FORMATS))
+
+
+def write_figures(
+    drawn: Sequence[Drawing],
+    folder: Path,
+    formats: Sequence[str] = ("pdf",),
+    *,
+    style: str | None = None,
+    dpi: float = 300.0,
+    force: bool = False,
+) -> list[Path]:
+    """Draw figures for print and write them, each whole or not at all.
+
+    Parameters
+    ----------
+    drawn : sequence of Drawing
+    folder : Path
+        Made if it is not there.
+    formats : sequence of str
+        From FORMATS.
+    style : str, optional
+        "single" or "double": the width of one or two columns; by default what suits each figure.
+    dpi : float
+        Dots an inch, of PNG.
+    force : bool
+        Whether files of the same names are written over.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        An unknown format or style, or a file that is there already; before anything is drawn.
+    OutputError
+        The folder cannot be written.
+    """
+    check_formats(formats)
+    files = {drawing.stem: [folder / f"{_file_name(drawing.stem)}.{name}" for name in formats] for drawing in drawn}
+    there = [file for each in files.values() for file in each if file.exists()]
+    if there and not force:
+        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+        raise InputError(
+            f"is there already{more}",
+            field=str(there[0]),
+            remedy="add --force to write over it, or name another --output",
+        )
     written: list[Path] = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, draw in figures.items():
-            figure = draw()
-            for suffix, metadata in _METADATA.items():
-                path = folder / f"{name}.{suffix}"
-                with journal_style():
-                    figure.savefig(path, metadata=metadata)
-                written.append(path)
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written ({error.strerror or error})", field=str(folder), remedy="choose another folder"
-        ) from error
+    for drawing in drawn:
+        with column_width(style):
+            figure = drawing.draw()
+        written += _write(figure, files[drawing.stem], dpi)
     return written
+
+
+def _save_written(kind: str, data: Any, folder: Path, mode: str | None = None) -> list[Path]:
+    """The figures that the command which makes results of a kind writes beside them."""
+    source = Source(kind, data, folder)
+    written: list[Path] = []
+    for figure in figures_of(source):
+        if not figure.written_as:
+            continue
+        for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
+            one_of_many = figure.takes in ("models", "run")
+            stem = f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as
+            written += _write(drawing.draw(), [folder / f"{_file_name(stem)}.{suffix}" for suffix in ("png", "svg")])
+    return written
+
+
+def _write(figure: Figure, files: Iterable[Path], dpi: float | None = None) -> list[Path]:
+    written = []
+    for path in files:
+        suffix = path.suffix[1:]
+        unfinished = path.with_name(path.name + ".part")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with journal_style():
+                figure.savefig(
+                    unfinished, format=suffix, metadata=_METADATA[suffix], dpi="figure" if dpi is None else dpi
+                )
+            unfinished.replace(path)
+        except OSError as error:
+            raise OutputError(
+                f"cannot be written ({error.strerror or error})", field=str(path.parent), remedy="choose another folder"
+            ) from error
+        written.append(path)
+    return written
+
+
+def _file_name(stem: str) -> str:
+    """A stem that is a file's name whatever modes and paths are called."""
+    return stem.replace("/", "_").replace("\\", "_")

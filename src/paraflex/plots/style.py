@@ -15,17 +15,24 @@ BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
 COLOURS = (BLUE, VERMILLION, GREEN, BLACK, "#CC79A7", "#E69F00", "#56B4E9")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1, 1)), (0, (9, 2)))
 SHADE = "0.92"
+
+
+def look_of(number: int) -> dict[str, Any]:
+    """Colour and dashes of the so-manieth of several lines: they differ in grey as well, up to 35 of them."""
+    return {"color": COLOURS[number % len(COLOURS)], "linestyle": DASHES[number % len(DASHES)]}
+
+
 ZERO: dict[str, Any] = {"color": "0.7", "linewidth": 0.5, "zorder": 0.5}
 
 # Fonts that come with Matplotlib, so that a figure is the same on every machine.
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
-    "font.size": 7.0,
+    "font.size": 8.0,
     "mathtext.fontset": "dejavusans",
-    "axes.titlesize": 7.0,
+    "axes.titlesize": 8.0,
     "axes.titlepad": 3.0,
     "axes.titley": 1.0,  # Nothing stands above a panel; looking for it takes time.
-    "axes.labelsize": 7.0,
+    "axes.labelsize": 8.0,
     "axes.labelpad": 2.0,
     "axes.linewidth": 0.6,
     "axes.axisbelow": True,
@@ -34,8 +41,8 @@ STYLE: dict[str, Any] = {
     "axes.formatter.useoffset": False,
     "axes.formatter.use_mathtext": False,  # Parsing each number as mathematics would take most of the time.
     "axes.formatter.limits": (-4, 6),
-    "xtick.labelsize": 6.5,
-    "ytick.labelsize": 6.5,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
     "xtick.direction": "in",
     "ytick.direction": "in",
     "xtick.major.size": 2.5,
@@ -46,7 +53,7 @@ STYLE: dict[str, Any] = {
     "lines.dash_capstyle": "butt",
     "lines.scale_dashes": True,
     "legend.frameon": False,
-    "legend.fontsize": 7.0,
+    "legend.fontsize": 8.0,
     "legend.handlelength": 2.8,
     "legend.columnspacing": 1.6,
     "legend.borderaxespad": 0.2,
@@ -55,6 +62,9 @@ STYLE: dict[str, Any] = {
     "savefig.dpi": "figure",
     "svg.hashsalt": "paraflex",
     "svg.fonttype": "path",
+    # TrueType in PDF and PostScript, as publishers ask: Matplotlib's Type 3 fonts are refused by many.
+    "pdf.fonttype": 42,
+    "ps.fonttype": 42,
 }
 
 # What varies by less, in the unit of its axis, is zero but for rounding.

@@ -9,13 +9,17 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
-from paraflex.plots.labels import display_unit, peak, symbol
-from paraflex.plots.layout import label_outer_time, lay_out, panels
-from paraflex.plots.runs import draw_actual, draw_desired, run_label, select_run, shade_rest
+from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, symbol
+from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
+from paraflex.plots.runs import draw_actual, draw_curves, draw_desired, one_run, run_label, select_run, shade_rest
 from paraflex.plots.style import journal_style, keep_flat
 
 # Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
 _ALIKE = 0.9
+# Lines that can still be told apart in one panel.
+_MOST = 7
+# Links whose motions a page holds in one column.
+_MOST_NARROW = 4
 
 
 @journal_style()
@@ -37,7 +41,7 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
         No such mode or body.
     """
     run = select_run(data, mode)
-    chosen = _most_deflected(run) if bodies is None else list(bodies)
+    chosen = most_deflected(run) if bodies is None else list(bodies)
     for name in chosen:
         if name not in run["body"].values:
             known = ", ".join(map(str, run["body"].values))
@@ -56,12 +60,12 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
             shade_rest(panel, data)
             keep_flat(panel, unit.factor * peak(curves))
             panel.set_title(f"{symbol(name)}: {title}")
-            panel.set_ylabel(f"{quantity} [{unit.name}]")
+            panel.set_ylabel(axis_label(quantity, unit=unit.name))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=34.0)
 
 
-def _most_deflected(run: xr.Dataset) -> list[str]:
+def most_deflected(run: xr.Dataset) -> list[str]:
     """Two bodies, in the order of the mechanism: those with largest transverse tip displacement that are not alike."""
     peaks = {str(name): peak(run["tip_transverse"].sel(body=name)) for name in run["body"].values}
     chosen: list[str] = []
@@ -76,8 +80,42 @@ def _most_deflected(run: xr.Dataset) -> list[str]:
 
 
 @journal_style()
+def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Transverse displacement of the end points of links in their body frames; of more than seven, of the largest.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.tracking_dataset` or `motion_dataset`.
+    mode : str, optional
+        Actuation mode; by default that with most active motors.
+
+    Raises
+    ------
+    InputError
+        No such mode, or no body that bends.
+    """
+    run = one_run(data, mode)
+    across = run["tip_transverse"].transpose("time", "body").values
+    sizes = np.array([peak(values) for values in across.T])
+    if not sizes.any():
+        raise InputError("no body of these results bends", field="figure", value="link_deflections")
+    largest = [k for k in np.argsort(-sizes, kind="stable")[:_MOST] if sizes[k] > 0.0]
+    unit = display_unit("m", across)
+    names = [str(name) for name in run["body"].values]
+    figure, axes = panels(1, 1)
+    draw_curves(axes[0, 0], run, {symbol(names[k]): unit.factor * across[:, k] for k in sorted(largest)})
+    axes[0, 0].set_ylabel(axis_label("displacement", unit=unit.name))
+    shade_rest(axes[0, 0], data)
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=56.0)
+
+
+@journal_style()
 def link_motions(data: xr.Dataset, mode: str) -> Figure:
     """Angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14).
+
+    In one column those of the first four.
 
     Parameters
     ----------
@@ -91,23 +129,19 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
     InputError
         No such mode.
     """
-    columns = (
-        ("angle", "angle", r"$\varphi$ [rad]"),
-        ("angular_velocity", "angular velocity", r"$\dot\varphi$ [rad/s]"),
-        ("angular_acceleration", "angular acceleration", r"$\ddot\varphi$ [rad/s²]"),
-    )
+    columns = ("angle", "angular_velocity", "angular_acceleration")
     run, time = select_run(data, mode), data["time"].values
-    bodies = data["body"].values
+    bodies = data["body"].values[: _MOST_NARROW if is_narrow() else None]
     figure, axes = panels(len(bodies), len(columns))
-    for column, (variable, title, label) in zip(axes.T, columns, strict=True):
+    for column, variable in zip(axes.T, columns, strict=True):
         scale = float(np.ptp(run[f"{variable}_desired"].values, axis=0).max())
         for panel, body in zip(column, bodies, strict=True):
             draw_actual(panel, run, time, run[variable].sel(body=body).values, linewidth=0.6)
             draw_desired(panel, time, run[f"{variable}_desired"].sel(body=body).values)
             shade_rest(panel, data)
             keep_flat(panel, scale)
-            panel.set_title(f"{symbol(str(body))}: {title}")
-            panel.set_ylabel(label)
+            panel.set_title(f"{symbol(str(body))}: {QUANTITIES[variable].name}")
+            panel.set_ylabel(axis_label(variable, short=True))
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=21.5)
 
@@ -129,14 +163,14 @@ def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
         No such mode.
     """
     rows = (
-        ("end_effector", r"${0}$ [mm]", 1e3),
-        ("end_effector_velocity", r"$\dot {0}$ [m/s]", 1.0),
-        ("end_effector_acceleration", r"$\ddot {0}$ [m/s²]", 1.0),
+        ("end_effector", "position", 1e3),
+        ("end_effector_velocity", "velocity", 1.0),
+        ("end_effector_acceleration", "acceleration", 1.0),
     )
     run, time = select_run(data, mode), data["time"].values
     directions = [str(axis) for axis in data["axis"].values]
     figure, axes = panels(len(rows), len(directions))
-    for row, (variable, label, factor) in zip(axes, rows, strict=True):
+    for row, (variable, quantity, factor) in zip(axes, rows, strict=True):
         desired = factor * run[f"{variable}_desired"]
         scale = float(np.ptp(desired.values, axis=0).max())
         for panel, axis in zip(row, directions, strict=True):
@@ -144,7 +178,7 @@ def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
             draw_desired(panel, time, desired.sel(axis=axis).values)
             shade_rest(panel, data)
             keep_flat(panel, scale)
-            panel.set_ylabel(label.replace("{0}", axis))
+            panel.set_ylabel(axis_label(quantity, direction=axis, short=True))
     for panel, axis in zip(axes[0], directions, strict=True):
         panel.set_title(f"${axis}$ direction")
     label_outer_time(axes)

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.labels import peak
-from paraflex.plots.layout import ONE_COLUMN, equal_scales_height, lay_out, panels
+from paraflex.plots.layout import ONE_COLUMN, equal_scales_height, is_narrow, lay_out, panels
 from paraflex.plots.mechanism import draw_mechanism
 from paraflex.plots.runs import START, draw_actual, draw_desired, run_label, select_run
 from paraflex.plots.style import BLUE, journal_style
 
 # Room round what is drawn, and the height of a panel beside its width, at least and at most.
 _MARGIN, _FLATTEST, _TALLEST = 0.06, 0.3, 1.3
+_TALLEST_WIDE = 0.75  # Over two columns.
 # The largest deviation is shown as at most this share of the path's extent.
 _SHOWN_DEVIATION = 0.15
 
@@ -35,12 +36,12 @@ def desired_path(data: xr.Dataset) -> Figure:
         From `paraflex.results`.
     """
     path = 1e3 * data["end_effector_desired"].isel(mode=0).transpose("time", "axis").values
-    figure, axes = _workspace_panel()
+    figure, axes = workspace_panel()
     axes.plot(*path.T, color=BLUE, linewidth=1.3, zorder=2.6, label="desired path")
     _draw_direction(axes, path)
     axes.plot(*path[0], **START)
     draw_mechanism(axes, data, path)
-    return _finish(figure, axes)
+    return finish_workspace(figure, axes)
 
 
 @journal_style()
@@ -84,14 +85,14 @@ def deviated_paths(
         raise InputError(
             "not a magnification", field="magnification", value=magnification, remedy="give a positive number"
         )
-    figure, axes = _workspace_panel()
+    figure, axes = workspace_panel()
     for (label, run), deviation, look in zip(runs.items(), deviations, looks, strict=True):
         shown = desired + magnification * deviation
         suffix = "" if magnification == 1.0 else f", deviation × {magnification:g}"
         draw_actual(axes, run, *shown.T, label=label + suffix, **look)
     draw_desired(axes, *desired.T)
     axes.plot(*desired[0], **START)
-    return _finish(figure, axes)
+    return finish_workspace(figure, axes)
 
 
 def round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
@@ -107,7 +108,8 @@ def round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
     return power * max(digit for digit in (1.0, 2.0, 5.0) if digit * power <= room)
 
 
-def _workspace_panel() -> tuple[Figure, Axes]:
+def workspace_panel() -> tuple[Figure, Axes]:
+    """A figure of the plane, and its panel, with equal scales in mm."""
     figure, axes = panels(1, 1, width=ONE_COLUMN)
     panel: Axes = axes[0, 0]
     panel.set_aspect("equal")
@@ -132,11 +134,11 @@ def _draw_direction(axes: Axes, path: NDArray[np.float64]) -> None:
         )
 
 
-def _finish(figure: Figure, axes: Axes) -> Figure:
+def finish_workspace(figure: Figure, axes: Axes) -> Figure:
     """Frame what is drawn, with room round a path that is a line or a point, and lay the figure out."""
     box = axes.dataLim
     width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
-    width = max(width, height / _TALLEST) or 1.0
+    width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0
     height = max(height, _FLATTEST * width)
     middle_x, middle_y = box.x0 + 0.5 * box.width, box.y0 + 0.5 * box.height
     axes.set_xlim(middle_x - 0.5 * width, middle_x + 0.5 * width)

@@ -173,6 +173,12 @@ class MethodComparison:
             "versions": _versions(),
         }
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.studies.html import comparison_html
+
+        return comparison_html(self)
+
     def _of_method(self, name: str) -> dict[str, Any]:
         method = METHODS[name]
         return {

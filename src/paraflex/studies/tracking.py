@@ -53,6 +53,12 @@ class StudyResult:
             not self.failed and self.data is not None and bool(self.data["status"].isin(["complete", "stopped"]).all())
         )
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.studies.html import study_html
+
+        return study_html(self)
+
 
 def run_study(
     task: TrackingTask,

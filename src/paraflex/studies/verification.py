@@ -114,6 +114,12 @@ class Verification:
             runs.failure for by_model in self.runs.values() for runs in by_model.values()
         )
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.studies.html import verification_html
+
+        return verification_html(self)
+
     def dataset(self, *, parameters: dict | None = None) -> xr.Dataset:
         """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
 

@@ -111,6 +111,12 @@ class IdentificationResult:
             "reasons": list(self.reasons),
         }
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.studies.html import identification_html
+
+        return identification_html(self)
+
 
 def identify(
     study: DesignStudy | str | Path,

@@ -120,6 +120,12 @@ class IndicesResult:
         """In plain values."""
         return {"kind": "indices", "indices": [row for each in self.indices for row in each.rows()]}
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.studies.html import indices_html
+
+        return indices_html(self)
+
 
 def load_indices(
     file: str | Path, metrics: list[str] | None = None, samples: int | None = None, seed: int | None = None

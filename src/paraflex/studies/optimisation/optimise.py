@@ -82,6 +82,12 @@ class OptimisationResult:
         out = {name: value for name, value in vars(self).items() if name not in ("fresh", "seconds", "folder", "table")}
         return out | {"history": [list(each) for each in self.history], "reasons": list(self.reasons)}
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.studies.html import optimisation_html
+
+        return optimisation_html(self)
+
 
 def optimise(
     study: DesignStudy | str | Path,

@@ -117,6 +117,12 @@ class Sensitivities:
             ],
         }
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.studies.html import sensitivities_html
+
+        return sensitivities_html(self)
+
     def _metric(self, i: int, j: int) -> dict[str, Any]:
         arrays = {"derivatives": self.derivatives, "relative": self.relative, "errors": self.errors}
         told = {

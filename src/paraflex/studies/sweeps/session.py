@@ -99,6 +99,12 @@ class SweepResult:
         """The one table, or the folder of its parts while the sweep is unfinished; pandas reads either."""
         return self.folder / (RESULTS if self.finished else "parts")
 
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        from paraflex.studies.html import sweep_html
+
+        return sweep_html(self)
+
 
 def sweep(
     study: SweepStudy | str | Path,

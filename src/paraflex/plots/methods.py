@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from paraflex.errors import InputError
-from paraflex.plots.labels import power_of_ten
+from paraflex.plots.labels import axis_label, power_of_ten
 from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.style import BLACK, COLOURS, SHADE, journal_style
 
@@ -55,7 +55,9 @@ def work_precision(figures: Mapping[str, Any]) -> Figure:
     if not lines:
         raise InputError("no run got to its end", field="figures", remedy="see the reasons in `methods`")
     figure, axes = panels(1, 2)
-    for panel, key, label in zip(axes[0], ("wall_time", "steps"), ("wall time [s]", "accepted steps"), strict=True):
+    for panel, key, label in zip(
+        axes[0], ("wall_time", "steps"), (axis_label("wall_time"), "accepted steps"), strict=True
+    ):
         for title, look, runs in lines:
             panel.plot([run["error"] for run in runs], [run[key] for run in runs], label=title, **look)
         _logarithmic(panel)

@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
-from paraflex.plots.labels import mode_label
-from paraflex.plots.layout import TWO_COLUMNS, lay_out, panels
-from paraflex.plots.style import COLOURS, ZERO, journal_style
+from paraflex.plots.labels import metric_name, mode_label
+from paraflex.plots.layout import MM, is_narrow, lay_out, panels
+from paraflex.plots.style import COLOURS, STYLE, ZERO, journal_style
 
 # Height of a metric's group of bars, and of one bar in it, [mm]; width of a letter of a metric's name, [em].
 _GROUP, _BAR, _LETTER = 2.4, 1.9, 0.2
-_EM = 7.0 / 72.0 * 25.4
+_EM = STYLE["font.size"] / 72.0 * 25.4
 
 
 @journal_style()
@@ -55,17 +55,18 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
     panel.margins(x=0.06)
     panel.autoscale(axis="x")
     panel.set_yticks([])
-    panel.set_xlabel("change of the metric by change of the parameter [% / %]")
+    # Half of the width is the names of the metrics.
+    panel.set_xlabel("elasticity [% / %]" if is_narrow() else "change of the metric by change of the parameter [% / %]")
     panel.set_title(f"{figures['mechanism']}, {told['path']}, {mode_label(told['mode'])}", loc="left")
     lay_out(figure, axes, panel_height=pitch * len(metrics))
-    _name_groups(panel, dict(zip(metrics, places, strict=True)))
+    _name_groups(panel, dict(zip(map(metric_name, metrics), places, strict=True)))
     return figure
 
 
 def _name_groups(panel: Any, places: Mapping[str, float]) -> None:
     """Names of the metrics left of the panel, which gives them the room."""
     left, bottom, width, height = panel.get_position().bounds
-    room = _EM * (1.0 + max(len(name) for name in places) * (0.36 + _LETTER)) / TWO_COLUMNS
+    room = _EM * (1.0 + max(len(name) for name in places) * (0.36 + _LETTER)) / (panel.figure.get_figwidth() / MM)
     panel.set_position((left + room, bottom, width - room, height))
     for name, place in places.items():
         panel.text(-0.008, place, name, transform=panel.get_yaxis_transform(), ha="right", va="center", clip_on=False)

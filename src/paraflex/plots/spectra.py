@@ -15,8 +15,8 @@ from paraflex.integrators import METHODS
 from paraflex.integrators.spectra import MULTISTEP, Spectrum, spectrum
 from paraflex.plots.labels import power_of_ten
 from paraflex.plots.layout import lay_out, panels
+from paraflex.plots.methods import method_look
 from paraflex.plots.style import ZERO, journal_style
-from paraflex.plots.work_precision import method_look
 
 # Of multistep methods the orders at which they start to differ; IDA's roots are those of BDF.
 _ORDERS = {"adams": (4,), "bdf": (2, 5), "ndf": (2,)}

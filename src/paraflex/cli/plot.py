@@ -1,0 +1,74 @@
+"""`paraflex plot`: figures of results, drawn again for print."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+from paraflex.errors import InputError, suggestion
+from paraflex.plots.catalogue import drawings, figures_of, find_figure
+from paraflex.plots.sources import Source, open_source
+
+ALL = "all"
+COMPLETE = 0
+STYLES = ("single", "double")
+# Denser pictures are larger than any printer's, and than memory.
+_DENSEST = 2400.0
+
+
+@dataclass(frozen=True)
+class PlotRequest:
+    """What `paraflex plot` was asked for."""
+
+    results: str
+    figures: list[str]
+    modes: list[str]
+    metrics: list[str]
+    style: str | None
+    formats: list[str]
+    output: str | None
+    dpi: float
+    force: bool
+
+
+def plot_command(request: PlotRequest) -> int:
+    """Draw the figures asked for and say where they are, or list those there are; the exit code."""
+    _check(request)
+    source = open_source(request.results)
+    if not request.figures:
+        _list(source, request.results)
+        return COMPLETE
+    chosen = figures_of(source) if request.figures == [ALL] else [find_figure(source, n) for n in request.figures]
+    chosen = list(dict.fromkeys(chosen))
+    drawn = [drawing for figure in chosen for drawing in drawings(source, figure, request.modes, request.metrics)]
+    # Only now: Matplotlib takes longer to import than all until here.
+    from paraflex.plots.save import write_figures
+
+    folder = source.folder / "figures" if request.output is None else Path(request.output)
+    written = write_figures(
+        drawn, folder, request.formats, style=request.style, dpi=request.dpi, force=request.force
+    )  # fmt: skip
+    for file in written:
+        typer.echo(file)
+    return COMPLETE
+
+
+def _check(request: PlotRequest) -> None:
+    """Nothing, if the options make sense."""
+    if request.style is not None and request.style not in STYLES:
+        remedy = suggestion(request.style, STYLES)
+        raise InputError("unknown style", field="--style", value=request.style, remedy=remedy)
+    if not (math.isfinite(request.dpi) and 0.0 < request.dpi <= _DENSEST):
+        remedy = f"say a number up to {_DENSEST:g}, such as 300"
+        raise InputError("not a density of dots", field="--dpi", value=request.dpi, remedy=remedy)
+
+
+def _list(source: Source, results: str) -> None:
+    figures = figures_of(source)
+    typer.echo(f"{results}: results of kind {source.kind}; its figures:")
+    width = max((len(figure.name) for figure in figures), default=0)
+    for figure in figures:
+        typer.echo(f"  {figure.name:<{width}}  {figure.shows}")

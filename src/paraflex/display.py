@@ -1,0 +1,75 @@
+"""How objects show themselves in notebooks: tables of plain HTML that take their colours from the page, light or dark.
+
+What a run shows takes metrics, which are made from runs. Runs therefore name no function: `shown` finds it by the name
+of their class when a notebook asks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib import import_module
+from typing import Any
+
+_SHOWN_BY = {
+    "TrackingRun": ("paraflex.results.html", "tracking_run_html"),
+    "MotionRun": ("paraflex.results.html", "motion_run_html"),
+}
+_RULE = "1px solid rgba(128, 128, 128, 0.45)"
+
+
+def shown(thing: object) -> str:
+    """The HTML of an object of a class whose function lies above it."""
+    module, function = _SHOWN_BY[type(thing).__name__]
+    return getattr(import_module(module), function)(thing)
+
+
+def page(title: str, *parts: str) -> str:
+    """A title and what stands below it, whose parts are HTML; empty ones are left out."""
+    return f"<div><div><strong>{escape(title)}</strong></div>{''.join(part for part in parts if part)}</div>"
+
+
+def sentence(text: str) -> str:
+    """A line of text."""
+    return f"<div>{escape(text)}</div>" if text else ""
+
+
+def facts(pairs: Iterable[tuple[str, Any]]) -> str:
+    """Names and values below one another; what is None or empty is left out."""
+    rows = [(name, value) for name, value in pairs if not (value is None or value in ("", [], ()))]
+    cells = "".join(
+        f'<tr><th style="text-align: left; font-weight: normal; opacity: 0.75">{escape(name)}</th>'
+        f'<td style="text-align: left">{escape(written(value))}</td></tr>'
+        for name, value in rows
+    )
+    return f"<table>{cells}</table>" if cells else ""
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> str:
+    """A table: numbers on the right, text on the left; nothing where there are no rows."""
+    body = "".join("<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows)
+    if not body:
+        return ""
+    style = f'style="text-align: left; border-bottom: {_RULE}"'
+    head = "".join(f"<th {style}>{escape(heading)}</th>" for heading in headings)
+    told = f'<caption style="text-align: left">{escape(caption)}</caption>' if caption else ""
+    return f"<table>{told}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def written(value: Any) -> str:
+    """A value as text: numbers to four digits, lists with commas, nothing for what is no number."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(written, value))
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _cell(value: Any) -> str:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return f'<td style="text-align: {"right" if number else "left"}">{escape(written(value))}</td>'

@@ -1,0 +1,83 @@
+"""A mechanism as notebooks show it: what it is made of, and a sketch."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from paraflex.display import facts, page, sentence, table
+from paraflex.mechanism.joints import PrismaticJoint, RevoluteJoint, SlidingJoint, SlotJoint, WeldJoint
+from paraflex.mechanism.loops import loops
+from paraflex.mechanism.sketch import sketch
+
+if TYPE_CHECKING:
+    from paraflex.mechanism.mechanism import Mechanism
+
+# Constraint rows of a joint.
+_ROWS = {RevoluteJoint: 2, WeldJoint: 3, PrismaticJoint: 2, SlotJoint: 1, SlidingJoint: 1}
+# Bodies, joints or modes told one by one.
+_MOST = 40
+
+
+def mechanism_html(mechanism: Mechanism) -> str:
+    """Bodies, joints, motors, freedoms and a sketch of the first assembly."""
+    rows = [(body.name, _words(type(body).__name__, body), getattr(body, "length", None), ", ".join(body.points))
+            for body in mechanism.bodies]  # fmt: skip
+    joints = [(joint.name, _words(type(joint).__name__.removesuffix("Joint")), f"{joint.a} – {joint.b}")
+              for joint in mechanism.joints]  # fmt: skip
+    return page(
+        mechanism.name,
+        sentence(mechanism.description),
+        sketch(mechanism),
+        facts(_counts(mechanism)),
+        _few("bodies", ("body", "kind", "length [m]", "points"), rows),
+        _few("joints", ("joint", "kind", "of"), joints),
+    )
+
+
+def freedoms(mechanism: Mechanism) -> int:
+    """Degrees of freedom of the rigid mechanism as Grübler counts them: redundant constraints are not seen."""
+    rows = sum(_ROWS[type(joint)] for joint in mechanism.joints) + len(mechanism.prescribed)
+    return 3 * len(mechanism.bodies) - rows
+
+
+def _counts(mechanism: Mechanism) -> list[tuple[str, Any]]:
+    units = mechanism.motor_units()
+    effector = mechanism.end_effector
+    others = {
+        "springs": len(mechanism.springs) + len(mechanism.linear_springs),
+        "dampers": len(mechanism.dampers),
+        "friction laws": len(mechanism.frictions),
+        "loads": len(mechanism.loads),
+        "prescribed angles": len(mechanism.prescribed),
+    }
+    motors = [f"{motor.name} at {motor.joint} [{unit}]" for motor, unit in zip(mechanism.motors, units, strict=True)]
+    return [
+        ("bodies", _counted(mechanism)),
+        ("joints", len(mechanism.joints)),
+        ("closed loops", len(loops(mechanism))),
+        ("degrees of freedom (Grübler)", freedoms(mechanism)),
+        ("motors", motors),
+        ("end-effector", None if effector is None else f"{effector.point}: {', '.join(effector.coordinates)}"),
+        ("actuation modes", [mode.name for mode in mechanism.modes[:_MOST]]),
+        ("assemblies", [assembly.name for assembly in mechanism.assemblies]),
+        ("geometry of flexible bodies", mechanism.geometry.value),
+        *((name, number) for name, number in others.items() if number),
+    ]
+
+
+def _counted(mechanism: Mechanism) -> str:
+    flexible = sum(bool(getattr(body, "flexible", False)) for body in mechanism.bodies)
+    return f"{len(mechanism.bodies)}, {flexible} of them flexible"
+
+
+def _few(what: str, headings: tuple[str, ...], rows: list[tuple]) -> str:
+    """A table of the first rows, and how many more there are."""
+    more = len(rows) - _MOST
+    return table(headings, rows[:_MOST]) + (sentence(f"and {more} more {what}") if more > 0 else "")
+
+
+def _words(name: str, body: object = None) -> str:
+    """The name of a class in words: "flexible beam"; of a body held rigid with that."""
+    text = re.sub(r"(?<!^)(?=[A-Z])", " ", name).lower()
+    return f"{text}, held rigid" if body is not None and getattr(body, "flexible", True) is False else text

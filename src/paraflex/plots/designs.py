@@ -1,0 +1,153 @@
+"""Many designs as a table: parameters, metrics, and how the runs ended, read from what a study wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError, suggestion
+from paraflex.plots.labels import display_unit, metric_name
+
+Array = NDArray[np.float64]
+
+# Not what a design is chosen for: figures of the solver.
+_OF_THE_SOLVER = ("steps", "rejected", "newton_iterations", "constraint_position_max", "energy_balance_max")
+_FIRST, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
+# A metric that changes by less, as a share of its size, is the same for all designs.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class DesignTable:
+    """Runs of many designs.
+
+    Attributes
+    ----------
+    parameters, metrics : mapping of str to (runs,) array
+        By name; NaN where a run has none.
+    units : mapping of str to str
+        Of metrics.
+    path, mode : (runs,) array of str
+    complete : (runs,) array of bool
+    """
+
+    parameters: Mapping[str, Array]
+    metrics: Mapping[str, Array]
+    units: Mapping[str, str]
+    path: NDArray[np.str_]
+    mode: NDArray[np.str_]
+    complete: NDArray[np.bool_]
+
+    def only(self, rows: NDArray[np.bool_]) -> DesignTable:
+        """Some of the runs."""
+        columns = (self.parameters, self.metrics)
+        parameters, metrics = ({name: values[rows] for name, values in column.items()} for column in columns)
+        return replace(
+            self, parameters=parameters, metrics=metrics, path=self.path[rows], mode=self.mode[rows],
+            complete=self.complete[rows],
+        )  # fmt: skip
+
+    def in_modes(self, modes: Sequence[str]) -> DesignTable:
+        """Runs in some actuation modes.
+
+        Raises
+        ------
+        InputError
+            A mode in which there are no runs.
+        """
+        known = list(dict.fromkeys(self.mode.tolist()))
+        for mode in modes:
+            if mode not in known:
+                remedy = "one of " + ", ".join(known)
+                raise InputError("no such mode in these results", field="mode", value=mode, remedy=remedy)
+        return self.only(np.isin(self.mode, list(modes)))
+
+    @property
+    def series(self) -> dict[tuple[str, str], DesignTable]:
+        """Complete runs of each path and mode."""
+        done = self.only(self.complete)
+        pairs = dict.fromkeys(zip(done.path.tolist(), done.mode.tolist(), strict=True))
+        return {pair: done.only((done.path == pair[0]) & (done.mode == pair[1])) for pair in pairs}
+
+    def judged_by(self, names: Sequence[str] | None, most: int) -> list[str]:
+        """The metrics asked for; else the first that vary and are no figures of the solver.
+
+        Raises
+        ------
+        InputError
+            An unknown metric, or none that varies.
+        """
+        for name in names or ():
+            if name not in self.metrics:
+                raise InputError(
+                    "not a metric of these results", field="metric", value=name,
+                    remedy=suggestion(name, list(self.metrics)),
+                )  # fmt: skip
+        if names:
+            return list(names)
+        # Of motors one by one only where there is nothing else.
+        varying = [name for name in self.metrics if self._varies(name) and name not in _OF_THE_SOLVER]
+        chosen = ([name for name in varying if "." not in name] or varying)[:most]
+        if not chosen:
+            raise InputError("no metric varies", field="metric", remedy="run more designs, or wider ranges")
+        return chosen
+
+    @property
+    def varied(self) -> list[str]:
+        """Parameters that differ among the runs; all of them where none does."""
+        spread = [name for name, values in self.parameters.items() if np.unique(values).size > 1]
+        return spread or list(self.parameters)
+
+    def labelled(self, metric: str) -> tuple[str, float]:
+        """What an axis of a metric is called, and what its values are multiplied by."""
+        unit, factor = self.units.get(metric, ""), 1.0
+        if unit == "m":
+            unit, factor = display_unit("m", self.metrics[metric])
+        printed = metric_name(metric)
+        return (f"{printed} [{unit}]" if unit not in ("", "1") else printed), factor
+
+    def _varies(self, name: str) -> bool:
+        values = self.metrics[name][self.complete]
+        values = values[np.isfinite(values)]
+        return values.size > 1 and float(np.ptp(values)) > _SAME * float(np.max(np.abs(values)))
+
+
+def read_designs(files: Sequence[Path]) -> DesignTable:
+    """The table of a study, from `results.parquet` or from its parts.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, or is none of ours.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pa.concat_tables([pq.read_table(file) for file in files])
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(
+            f"cannot be read ({str(error).splitlines()[0]})", field=str(files[0]),
+            remedy="name a results.parquet that paraflex wrote",
+        ) from error  # fmt: skip
+    names = table.column_names
+    if not {*_FIRST, *_LAST} <= set(names):
+        raise InputError(
+            "not a table of designs", field=str(files[0]), remedy="name a results.parquet that paraflex wrote"
+        )
+    first, last = names.index("mode") + 1, names.index("status")
+    judged = [name for name in names[last:] if name not in _LAST and not name.startswith("slope.")]
+    columns = {name: table[name].to_numpy().astype(float) for name in (*names[first:last], *judged)}
+    told = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
+    return DesignTable(
+        parameters={name: columns[name] for name in names[first:last]},
+        metrics={name: columns[name] for name in judged},
+        units={name: told[name] for name in judged},
+        path=np.array(table["path"].to_pylist(), dtype=str),
+        mode=np.array(table["mode"].to_pylist(), dtype=str),
+        complete=np.array(table["status"].to_pylist(), dtype=str) == "complete",
+    )

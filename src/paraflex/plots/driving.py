@@ -1,0 +1,143 @@
+"""What the modes of a study ask of the motors, and how near they come to a singularity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label, plain
+from paraflex.plots.layout import ONE_COLUMN, label_outer_time, lay_out, panels
+from paraflex.plots.runs import draw_curves, select_run, shade_rest
+from paraflex.plots.scales import mark_powers
+from paraflex.plots.style import BLUE, GREEN, VERMILLION, journal_style
+
+# Height of a line of a list [mm].
+_LINE = 5.5
+
+
+@journal_style()
+def actuation_condition(data: xr.Dataset) -> Figure:
+    """Condition number of the actuation matrix along the path in every mode: large near a Type II singularity.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.tracking_dataset`.
+    """
+    figure, axes = panels(1, 1)
+    for k, name in enumerate(str(name) for name in data["mode"].values):
+        run = select_run(data, name)
+        # Of the planned motion: it goes on where a run stopped.
+        whole = run.assign(end_effector=run["end_effector_desired"])
+        draw_curves(axes[0, 0], whole, {f"mode {mode_label(name)}": run["actuation_condition"].values}, first=k)
+    axes[0, 0].set_ylabel(axis_label("condition"))
+    mark_powers(axes[0, 0])
+    shade_rest(axes[0, 0], data)
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=56.0)
+
+
+@journal_style()
+def tracking_distance(data: xr.Dataset) -> Figure:
+    """Distance of the end-effector from its desired place in time, all modes in one panel.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.tracking_dataset`.
+    """
+    figure, axes = panels(1, 1)
+    away = (data["end_effector"] - data["end_effector_desired"]).transpose("mode", "time", "axis").values
+    distance = 1e3 * np.linalg.norm(away, axis=2)
+    # What rounding leaves would stretch the axis.
+    shown = np.where(distance > 1e-5, distance, np.nan)
+    for k, name in enumerate(str(name) for name in data["mode"].values):
+        draw_curves(axes[0, 0], select_run(data, name), {f"mode {mode_label(name)}": shown[k]}, first=k)
+    axes[0, 0].set_ylabel(axis_label("distance"))
+    if np.isfinite(shown).any():
+        mark_powers(axes[0, 0])
+    shade_rest(axes[0, 0], data)
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=56.0)
+
+
+@journal_style()
+def mode_comparison(data: xr.Dataset) -> Figure:
+    """RMS tracking error, residual vibration and largest torque of every mode.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.tracking_dataset`.
+    """
+    efforts = data["peak_torque"].max("motor").values
+    label = effort_label(data["torque"].attrs.get("units", "N m"))
+    figure, axes = panels(1, 3)
+    modes = [str(name) for name in data["mode"].values]
+    names = [mode_label(name) for name in modes]
+    for panel, values, title, colour in (
+        (axes[0, 0], data["tracking_rms"].values, "RMS tracking error", BLUE),
+        (axes[0, 1], data["residual_vibration"].values, "residual vibration", GREEN),
+    ):
+        unit = display_unit("m", values)
+        # Modes differ by orders of magnitude, of which bars show only the largest.
+        panel.plot(unit.factor * values, np.arange(len(modes)), "o", color=colour, markersize=4.0)
+        _list_modes(panel, names)
+        panel.set_title(title)
+        panel.set_xlabel(axis_label("distance", unit=unit.name))
+        panel.margins(x=0.08)
+        if (values > 0.0).any():
+            mark_powers(panel, "x")
+    _bars(axes[0, 2], names, efforts, VERMILLION)
+    axes[0, 2].set_title(f"largest {label.partition(' [')[0]}")
+    axes[0, 2].set_xlabel(label)
+    return lay_out(figure, axes, panel_height=_LINE * len(modes) + 2.0)
+
+
+@journal_style()
+def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Worst condition number of the actuation matrix along a path, a bar a mode; modes that cannot drive it are pale.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        What `paraflex modes --json` prints.
+
+    Raises
+    ------
+    InputError
+        No mode has a condition number: there was no path.
+    """
+    known = [row for row in rows if np.isfinite(row.get("condition_max", np.nan))]
+    if not known:
+        raise InputError("no condition numbers: the mechanism has no path", field="modes", remedy="name one: --path")
+    figure, axes = panels(1, 1, width=ONE_COLUMN)
+    panel = axes[0, 0]
+    names = [mode_label(str(row["mode"])) for row in known]
+    for drives, colour, label in ((True, BLUE, "drives the path"), (False, "0.75", "does not")):
+        values = [row["condition_max"] if row.get("drives_path", True) == drives else np.nan for row in known]
+        if np.isfinite(values).any():
+            _bars(panel, names, np.array(values), colour, label=label)
+    mark_powers(panel, "x")
+    panel.set_xlim(1.0, None)
+    panel.set_xlabel(axis_label("condition") + ", worst along the path")
+    return lay_out(figure, axes, panel_height=_LINE * len(names) + 2.0)
+
+
+def _bars(panel: Axes, names: list[str], values: Any, colour: str, **look: Any) -> None:
+    lines = np.arange(len(names))
+    panel.barh(lines, values, height=0.6, color=colour, linewidth=0.0, **look)
+    _list_modes(panel, names)
+    panel.margins(x=0.05)
+
+
+def _list_modes(panel: Axes, names: list[str]) -> None:
+    panel.set_yticks(range(len(names)), [plain(name) for name in names])
+    panel.set_ylim(len(names) - 0.4, -0.6)
+    panel.grid(axis="x", color="0.9", linewidth=0.4)

@@ -1,0 +1,54 @@
+"""Energies of a run, and whether they balance."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from paraflex.plots.labels import axis_label, peak
+from paraflex.plots.layout import label_outer_time, lay_out, panels
+from paraflex.plots.runs import draw_curves, one_run, shade_rest
+from paraflex.plots.scales import mark_powers
+from paraflex.plots.style import ZERO, journal_style
+
+# Names of the curves, in every figure of energies.
+ENERGIES = {"kinetic_energy": "kinetic energy", "strain_energy": "strain energy", "work": "work done on it"}
+
+
+@journal_style()
+def energies(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Kinetic and strain energy and the work done on the mechanism; strain energy alone; how far they do not balance.
+
+    The imbalance is |kinetic + strain energy - those at the start - work|, at the samples.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.tracking_dataset` or `motion_dataset`.
+    mode : str, optional
+        Actuation mode; by default that with most active motors.
+
+    Raises
+    ------
+    InputError
+        No such mode.
+    """
+    run = one_run(data, mode)
+    curves = {label: run[name].values for name, label in ENERGIES.items()}
+    kinetic, strain, work = curves.values()
+    imbalance = np.abs(kinetic + strain - kinetic[0] - strain[0] - work)
+    figure, axes = panels(3, 1)
+    every, elastic, balance = axes[:, 0]
+    draw_curves(every, run, curves)
+    every.axhline(0.0, **ZERO)
+    # The same colour as above.
+    draw_curves(elastic, run, {"kinetic energy": np.full_like(strain, np.nan), "strain energy": strain})
+    draw_curves(balance, run, {"imbalance": np.where(imbalance > 0.0, imbalance, np.nan)}, first=3)
+    if peak(imbalance) > 0.0:
+        mark_powers(balance)
+    for panel in axes.flat:
+        panel.set_ylabel(axis_label("energy"))
+        shade_rest(panel, data)
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=34.0)

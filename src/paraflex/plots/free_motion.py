@@ -1,0 +1,91 @@
+"""Of a run without a path: its coordinates, and where its points go."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from paraflex.plots.labels import axis_label, peak, plain, symbol
+from paraflex.plots.layout import label_outer_time, lay_out, panels
+from paraflex.plots.runs import draw_curves
+from paraflex.plots.style import journal_style, keep_flat, look_of
+from paraflex.plots.workspace import finish_workspace, workspace_panel
+
+# Lines that can still be told apart in one panel; a point that moves less than this share of all stands still.
+_MOST, _STILL = 7, 1e-3
+# Coordinates that change by less rest, but for rounding.
+_NOTHING = 1e-12
+# Of modal coordinates, what they are by the last part of their names.
+_KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1.0)}
+
+
+@journal_style()
+def coordinates(data: xr.Dataset) -> Figure:
+    """Generalised coordinates in time: places and angles of the bodies' frames, and flexible coordinates.
+
+    A panel for each kind that moves, in it the seven that move most.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.motion_dataset`.
+    """
+    names = [str(name) for name in data["coordinate"].values]
+    values = data["coordinate_value"].transpose("time", "coordinate").values
+    travel = np.nan_to_num(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))
+    groups = {
+        kind: [k for k, name in enumerate(names) if _kind(name) == kind and travel[k] > _NOTHING] for kind in _KINDS
+    }
+    groups = {kind: members for kind, members in groups.items() if members} or {"phi": list(range(len(names)))[:1]}
+    bodies = [str(name) for name in data["body"].values]
+    figure, axes = panels(len(groups), 1)
+    for panel, (kind, members) in zip(axes[:, 0], groups.items(), strict=True):
+        quantity, factor = _KINDS[kind]
+        most = sorted(members, key=lambda k: -travel[k])[:_MOST]
+        for place, k in enumerate(sorted(most)):
+            body = names[k].rpartition(".")[0]
+            # A body has one look in all panels of its frame's coordinates.
+            label, look = (_mode_name(names[k]), place) if kind == "eta" else (symbol(body), bodies.index(body))
+            draw_curves(panel, data, {label: factor * values[:, k]}, first=look)
+        keep_flat(panel, peak(factor * values[:, members]) or 1.0)
+        panel.set_xlim(data["time"].values[[0, -1]])
+        panel.set_ylabel(axis_label(quantity, direction=kind, short=kind == "eta"))
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=34.0)
+
+
+@journal_style()
+def point_paths(data: xr.Dataset) -> Figure:
+    """Where named points go in the plane; of more than seven those that go furthest.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `results.motion_dataset`.
+    """
+    places = 1e3 * data["point_position"].transpose("time", "point", "axis").values
+    names = [str(name) for name in data["point"].values]
+    travel = np.nan_to_num(np.nanmax(places, axis=0) - np.nanmin(places, axis=0)).max(axis=1)
+    # Points at one place share a line; those that a program made have names of their own.
+    shown: list[int] = []
+    for k in np.argsort(-travel, kind="stable"):
+        apart = all(peak(places[:, k] - places[:, other]) > _STILL * travel.max() for other in shown)
+        if travel[k] > _STILL * travel.max() and apart and "._" not in names[k]:
+            shown.append(int(k))
+    figure, panel = workspace_panel()
+    for look, k in enumerate(sorted(shown[:_MOST])):
+        panel.plot(*places[:, k].T, label=plain(names[k]), **look_of(look))
+        panel.plot(*places[0, k], marker="s", markersize=3.0, linestyle="none", color=look_of(look)["color"])
+    if not shown:
+        panel.plot(*places[0].T, "o", markersize=3.0, label="points, which do not move")
+    return finish_workspace(figure, panel)
+
+
+def _kind(name: str) -> str:
+    return name.rpartition(".")[2].rstrip("0123456789")
+
+
+def _mode_name(name: str) -> str:
+    body, _, mode = name.rpartition(".")
+    return rf"{symbol(body)}: $\eta_{{{mode.removeprefix('eta')}}}$"

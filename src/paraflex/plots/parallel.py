@@ -1,0 +1,98 @@
+"""All numbers of every design at once, as lines over parallel axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from paraflex.plots.designs import DesignTable
+from paraflex.plots.labels import mode_label, plain, three_digits
+from paraflex.plots.layout import is_narrow, lay_out, panels
+from paraflex.plots.style import VERMILLION, journal_style
+
+Array = NDArray[np.float64]
+
+# Metrics shown unless asked for, axes and lines at most, and the height of an axis [mm].
+_METRICS, _AXES, _LINES, _ROW = 3, 10, 2000, 10.0
+_LIGHTEST = 0.85  # Of the colour map, whose light end is too light on paper.
+
+
+@journal_style()
+def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
+    """Every design as a line over axes of its numbers, in the colour of the first metric; the least is thick.
+
+    The axes lie below one another, each from the least to the largest of its numbers. Shown are designs of the first
+    path and mode that ran, at most 2,000 of them, evenly chosen.
+
+    Parameters
+    ----------
+    table : DesignTable
+    metrics : sequence of str, optional
+        By default the first three that vary.
+
+    Raises
+    ------
+    InputError
+        No such metric, or none that varies.
+    """
+    chosen = table.judged_by(metrics, _METRICS)
+    pair, runs = next(iter(table.series.items()))
+    parameters = runs.varied[: max(1, _AXES - len(chosen))]
+    labelled = [table.labelled(metric) for metric in chosen]
+    columns = [runs.parameters[name] for name in parameters]
+    columns += [factor * runs.metrics[name] for name, (_, factor) in zip(chosen, labelled, strict=True)]
+    values = np.column_stack(columns)
+    values = values[np.isfinite(values).all(axis=1)]
+    low, high = values.min(axis=0), values.max(axis=0)
+    places = (values - low) / np.where(high > low, high - low, 1.0)
+    labels = [*map(plain, parameters), *(label for label, _ in labelled)]
+    figure, axes = panels(1, 1)
+    _draw_designs(axes[0, 0], places, places[:, len(parameters)], labels[len(parameters)].partition(" [")[0])
+    _draw_axes(axes[0, 0], labels, low, high)
+    # In the middle: beside the names there is no room for it in one column.
+    axes[0, 0].set_title(
+        " ".join([f"{len(values)} designs,", *([] if is_narrow() else [f"{plain(pair[0])},"]), mode_label(pair[1])])
+    )
+    return lay_out(figure, axes, panel_height=_ROW * len(labels))
+
+
+def _draw_designs(panel: Axes, places: Array, judged: Array, judge: str) -> None:
+    """A line a design, the least by the judging metric drawn last, and that one thick."""
+    order = np.argsort(-judged, kind="stable")
+    shown = order[np.unique(np.linspace(0, order.size - 1, min(order.size, _LINES)).astype(int))]
+    rows = np.arange(places.shape[1])
+    colours = _colours()
+    lines = [np.column_stack([places[k], rows]) for k in shown]
+    width = 0.7 if len(lines) < 200 else 0.35
+    panel.add_collection(LineCollection(lines, colors=colours(judged[shown]), linewidths=width, alpha=0.8))
+    for share, word in ((0.0, "small"), (1.0, "large")):
+        panel.plot([], [], color=colours(share), label=f"{word} {judge}")
+    panel.plot(places[order[-1]], rows, color=VERMILLION, linewidth=1.6, marker="o", markersize=3.0, label="the least")
+
+
+def _draw_axes(panel: Axes, labels: list[str], low: Array, high: Array) -> None:
+    for row, (least, most) in enumerate(zip(low, high, strict=True)):
+        panel.axhline(row, color="0.3", linewidth=0.6, zorder=0.5)
+        for place, value, side in ((0.0, least, "left"), (1.0, most, "right")):
+            panel.text(
+                place, row - 0.08, three_digits(value), ha=side, va="bottom", fontsize=7.0,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5},
+            )  # fmt: skip
+    panel.set_yticks(range(len(labels)), labels)
+    panel.tick_params(length=0.0)
+    panel.set_xticks([])
+    panel.set_ylim(len(labels) - 0.75, -0.5)
+    panel.set_xlim(-0.02, 1.02)
+    panel.set_frame_on(False)
+
+
+def _colours() -> Colormap:
+    """From dark to light, in grey as well."""
+    return ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, _LIGHTEST, 256)))

@@ -1,0 +1,147 @@
+"""What designs do: metrics over parameters, and the best compromises between two metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.plots.designs import DesignTable
+from paraflex.plots.labels import mode_label, plain
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
+from paraflex.plots.style import journal_style, look_of
+
+Array = NDArray[np.float64]
+
+_MARKS = ("o", "s", "^", "D", "v", "P", "X")
+# Panels beside and below one another.
+_MOST_PARAMETERS, _MOST_METRICS = 3, 3
+# So many values of a parameter are joined by lines of medians; of more, medians of as many groups.
+_GROUPS = 12
+
+
+@journal_style()
+def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
+    """Metrics over parameters: a row a metric, a column a parameter, each run a mark, its path and mode by colour.
+
+    The runs of a study of one parameter are joined; of more the median over the others is, at each value, or in twelve
+    groups of as many runs.
+
+    Parameters
+    ----------
+    table : DesignTable
+    metrics : sequence of str, optional
+        By default the first three that vary; in one column of print the first, where there are several parameters.
+
+    Raises
+    ------
+    InputError
+        No such metric, or none that varies.
+    """
+    columns = table.varied[:_MOST_PARAMETERS]
+    rows = table.judged_by(metrics, 1 if is_narrow() and len(columns) > 1 else _MOST_METRICS)
+    figure, axes = panels(len(rows), len(columns), width=ONE_COLUMN if len(columns) == 1 else TWO_COLUMNS)
+    series = table.series
+    for row, metric in zip(axes, rows, strict=True):
+        label, factor = table.labelled(metric)
+        for panel, parameter in zip(row, columns, strict=True):
+            for k, (pair, runs) in enumerate(series.items()):
+                x, y = runs.parameters[parameter], factor * runs.metrics[metric]
+                _draw_response(panel, x, y, k, _series_name(pair, table), alone=len(table.varied) == 1)
+            panel.margins(x=0.05)
+            panel.set_xlabel(plain(parameter))
+            panel.locator_params(axis="x", nbins=5)
+        row[0].set_ylabel(label)
+    return lay_out(figure, axes, panel_height=42.0 if len(rows) > 1 else 52.0)
+
+
+def _draw_response(panel: Axes, x: Array, y: Array, number: int, name: str, *, alone: bool) -> None:
+    look = look_of(number)
+    mark: dict[str, Any] = {"marker": _MARKS[number % len(_MARKS)], "color": look["color"]}
+    order = np.argsort(x, kind="stable")
+    if alone:
+        panel.plot(x[order], y[order], **look | mark, markersize=2.8, label=name)
+        return
+    shade = max(0.15, min(0.7, 40.0 / max(x.size, 1)))
+    panel.plot(x, y, linestyle="none", **mark, markersize=2.2, markeredgewidth=0.0, alpha=shade)
+    middles = _medians(x[order], y[order])
+    panel.plot(*middles, **look, linewidth=1.3, label=f"{name}, median")
+
+
+def _medians(x: Array, y: Array) -> tuple[Array, Array]:
+    """Medians of values in order of x: at each x, or in groups of as many."""
+    values = np.unique(x)
+    groups = [x == value for value in values] if values.size <= _GROUPS else None
+    if groups is None:
+        split = np.array_split(np.arange(x.size), _GROUPS)
+        return tuple(np.array([np.nanmedian(each[part]) for part in split]) for each in (x, y))  # pyright: ignore[reportReturnType]
+    return values, np.array([np.nanmedian(y[part]) for part in groups])
+
+
+def _series_name(pair: tuple[str, str], table: DesignTable) -> str:
+    """What tells the runs of a path and mode from the others."""
+    path, mode = pair
+    several = len(set(table.path.tolist())) > 1
+    return (f"{plain(path)}, " if several else "") + f"mode {mode_label(mode)}"
+
+
+@journal_style()
+def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
+    """Two metrics of every design, less of both being better, and the designs that no other is better than in both.
+
+    Parameters
+    ----------
+    table : DesignTable
+    metrics : sequence of str, optional
+        Two; by default the first that varies, and that with which most designs are on the front.
+
+    Raises
+    ------
+    InputError
+        No such metric, or not two of them.
+    """
+    chosen = table.judged_by(metrics, 2) if metrics else _in_conflict(table)
+    if len(chosen) != 2:
+        raise InputError(
+            "a front is of two metrics", field="metric", value=", ".join(chosen), remedy="name two that vary"
+        )
+    figure, axes = panels(1, 1, width=ONE_COLUMN)
+    panel = axes[0, 0]
+    (across, x_factor), (up, y_factor) = (table.labelled(name) for name in chosen)
+    for k, (pair, runs) in enumerate(table.series.items()):
+        x, y = x_factor * runs.metrics[chosen[0]], y_factor * runs.metrics[chosen[1]]
+        known = np.isfinite(x) & np.isfinite(y)
+        x, y, name, look = x[known], y[known], _series_name(pair, table), look_of(k)
+        mark: dict[str, Any] = {"marker": _MARKS[k % len(_MARKS)], "color": look["color"], "markersize": 2.4}
+        panel.plot(x, y, linestyle="none", alpha=0.35, markeredgewidth=0.0, **mark, label=name)
+        front = undominated(x, y)
+        panel.plot(
+            x[front], y[front], **look | mark | {"markersize": 3.4}, drawstyle="steps-post", label=f"{name}, front"
+        )
+    panel.margins(0.06)
+    panel.set_xlabel(across)
+    panel.set_ylabel(up)
+    return lay_out(figure, axes, panel_height=58.0)
+
+
+def _in_conflict(table: DesignTable) -> list[str]:
+    """The first metric that varies, and the one with which it makes the longest fronts."""
+    first, *others = table.judged_by(None, len(table.metrics))
+
+    def length(other: str) -> int:
+        return sum(undominated(runs.metrics[first], runs.metrics[other]).size for runs in table.series.values())
+
+    return [first, max(others, key=length)] if others else [first]
+
+
+def undominated(x: Array, y: Array) -> NDArray[np.intp]:
+    """Indices, in order of x, of the points that no other is below in one of two numbers without being above in one."""
+    order = np.lexsort((y, x))
+    least = np.minimum.accumulate(y[order])
+    better = np.concatenate([[True], y[order][1:] < least[:-1]]) if order.size else np.zeros(0, dtype=bool)
+    return order[better]

@@ -1,0 +1,21 @@
+"""Logarithmic axes whose numbers are plain text: the layout knows how wide digits are."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from paraflex.plots.labels import logarithmic_number
+
+
+def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y") -> None:
+    """Make an axis logarithmic, with numbers at powers of ten, or also at 2 and 5 where it spans few of them."""
+    axis = panel.yaxis if direction == "y" else panel.xaxis
+    (panel.set_yscale if direction == "y" else panel.set_xscale)("log")
+    low, high = axis.get_minpos(), axis.get_data_interval()[1]
+    several = high > 200.0 * low
+    axis.set_major_locator(LogLocator(numticks=12) if several else LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
+    axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,141 @@
+"""Results on disk, recognised by what is in them: which command wrote them, and what figures are drawn from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from paraflex.errors import InputError
+from paraflex.plots.designs import DesignTable, read_designs
+
+_OURS = "name a folder or file that paraflex wrote"
+# Files of results, those that tell what a folder is first.
+_TABLES = ("results.parquet",)
+_FILES = ("results.nc", "verify.nc", "compare-methods.json", "sensitivity.json", "indices.json", "result.json")
+_BEGINNINGS = {b"\x89HDF": "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", b"PAR1": "parquet"}
+
+
+@dataclass(frozen=True)
+class Source:
+    """Results that figures can be drawn from.
+
+    Attributes
+    ----------
+    kind : str
+        "tracking", "motion", "verification", "methods", "sweep", "optimisation", "identification", "indices",
+        "sensitivity" or "modes".
+    data : xarray.Dataset, mapping, list or DesignTable
+        As the functions of `paraflex.plots` take it.
+    folder : Path
+        That holds it.
+    designs : DesignTable or None
+        All runs of a study of many.
+    """
+
+    kind: str
+    data: Any
+    folder: Path
+    designs: DesignTable | None = None
+
+
+def open_source(path: str | Path) -> Source:
+    """Results of any command, from their folder or one of their files.
+
+    Raises
+    ------
+    InputError
+        Nothing there, several results at once, a damaged file, or one that is not ours.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError("no such file or folder", field="RESULTS", value=str(path), remedy=_OURS)
+    if path.is_dir():
+        return _folder(path)
+    read = {"netcdf": _netcdf, "parquet": _table, "json": _json}
+    return read[_format(path)](path)
+
+
+def _folder(folder: Path) -> Source:
+    found = [folder / name for name in _FILES if (folder / name).is_file()]
+    if len(found) > 1:
+        names = ", ".join(each.name for each in found)
+        raise InputError(f"holds several results ({names})", field=str(folder), remedy="name one of the files")
+    if found:
+        return open_source(found[0])
+    table = _designs(folder)
+    if table is None:
+        raise InputError("no results in this folder", field=str(folder), remedy=_OURS)
+    return Source("sweep", table, folder, table)
+
+
+def _format(file: Path) -> str:
+    try:
+        with file.open("rb") as opened:
+            beginning = opened.read(4)
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror or error})", field=str(file), remedy=_OURS) from error
+    kind = _BEGINNINGS.get(beginning, "json" if beginning.lstrip()[:1] in (b"{", b"[") else "")
+    if not kind:
+        raise InputError("not a file of results", field=str(file), remedy=_OURS)
+    return kind
+
+
+def _netcdf(file: Path) -> Source:
+    import xarray as xr
+
+    try:
+        data = xr.load_dataset(file, engine="netcdf4")
+    except (OSError, ValueError) as error:
+        raise InputError("damaged, or not netCDF", field=str(file), remedy="make these results again") from error
+    if "schema" not in data.attrs or "time" not in data.dims:
+        raise InputError("a netCDF file, but none that paraflex wrote", field=str(file), remedy=_OURS)
+    if data.attrs.get("kind") == "motion":
+        return Source("motion", data, file.parent)
+    return Source("verification" if "model" in data.dims else "tracking", data, file.parent)
+
+
+def _table(file: Path) -> Source:
+    table = read_designs([file])
+    return Source("sweep", table, file.parent, table)
+
+
+def _json(file: Path) -> Source:
+    try:
+        told = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError("damaged: not JSON to its end", field=str(file), remedy="make these results again") from error
+    for kind, is_it in _JSON.items():
+        if is_it(told):
+            searched = kind in ("optimisation", "identification", "indices")
+            return Source(kind, told, file.parent, _designs(file.parent) if searched else None)
+    beside = [name for name in _FILES if (file.parent / name).is_file() and name != file.name]
+    remedy = f"name {beside[0]} beside it" if beside else _OURS
+    raise InputError("no figures are drawn from this file", field=str(file), remedy=remedy)
+
+
+def _designs(folder: Path) -> DesignTable | None:
+    """The table of a folder's runs, or its parts while it is not finished."""
+    files = [folder / name for name in _TABLES if (folder / name).is_file()]
+    files += sorted((folder / "parts").glob("part-*.parquet"))
+    return read_designs(files) if files else None
+
+
+def _has(*keys: str) -> Callable[[Any], bool]:
+    return lambda told: isinstance(told, Mapping) and all(key in told for key in keys)
+
+
+def _named(kind: str) -> Callable[[Any], bool]:
+    return lambda told: isinstance(told, Mapping) and told.get("kind") == kind
+
+
+_JSON: Mapping[str, Callable[[Any], bool]] = {
+    "optimisation": _named("optimisation"),
+    "identification": _named("identification"),
+    "indices": _named("indices"),
+    "methods": _has("methods", "reference", "fastest"),
+    "sensitivity": _has("parameters", "units", "runs"),
+    "modes": lambda told: isinstance(told, list) and bool(told) and all(_has("mode", "motors")(row) for row in told),
+}

@@ -1,0 +1,116 @@
+"""Runs as notebooks show them: how they ended, what they reached, and what the solver did."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from paraflex.display import facts, page, sentence, table
+from paraflex.integrators import METHODS, Solution
+from paraflex.motion import MotionRun
+from paraflex.results.motion import point_motion, tip_deflection
+from paraflex.simulate import TrackingRun
+
+# Points told one by one.
+_MOST = 20
+
+
+def tracking_run_html(run: TrackingRun) -> str:
+    """Status, tracking error, torques and deflection of one mode, and the solver's figures."""
+    task, solution = run.task, run.solution
+    whole = task if task.whole is None else task.whole
+    torque = run.torques.evaluate(task.motion.t) if run.holding is None else run.holding
+    peaks, rms = np.max(np.abs(torque), axis=0, initial=0.0), np.sqrt(np.mean(torque**2, axis=0))
+    motors = [
+        (motor.name, "active" if motor.name in run.mode.motors else "passive", float(peak), float(each), unit)
+        for motor, peak, each, unit in zip(
+            whole.mechanism.motors, peaks, rms, whole.mechanism.motor_units(), strict=True
+        )
+    ]
+    return page(
+        f"{whole.mechanism.name}, mode {run.mode.name}: {_ended(solution)}",
+        sentence(solution.message),
+        facts([*_tracking(run), *_solver(solution, run.method)]),
+        table(("motor", "", "peak", "RMS", "unit"), motors),
+    )
+
+
+def motion_run_html(run: MotionRun) -> str:
+    """Status of a run without a path, where its points are at the end, and the solver's figures."""
+    solution, system = run.solution, run.system
+    k = solution.t.size
+    title = f"{system.mechanism.name}: {_ended(solution)}"
+    method = METHODS[solution.method].title if solution.method in METHODS else solution.method
+    energies: list[tuple[str, Any]] = []
+    points: list[tuple] = []
+    if k:
+        energies = [
+            ("largest deflection", _deflection(run)),
+            ("kinetic energy, largest", f"{np.max(solution.kinetic_energy):.4g} J"),
+            ("strain energy, largest", f"{np.max(solution.strain_energy):.4g} J"),
+        ]
+        points = _last_places(run)
+    torques = [f"{name} {value:g}" for name, value in run.torques.items() if value]
+    return page(
+        title,
+        sentence(solution.message),
+        facts([*energies, ("constant torques", torques), *_solver(solution, method)]),
+        table(("point", "x at the end [m]", "y [m]"), points),
+    )
+
+
+def _ended(solution: Solution) -> str:
+    until = f" at t = {solution.t[-1]:.4g} s" if solution.t.size else ""
+    return f"{solution.status}{until}"
+
+
+def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
+    task, solution = run.task, run.solution
+    # The state at an event is a sample more than the task's times.
+    k = solution.t.size - bool(solution.event)
+    effector = task.mechanism.end_effector
+    if effector is None or not k:
+        return []
+    place = point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]).position
+    away = np.linalg.norm(place - task.motion.desired.position[:k], axis=1)
+    return [
+        ("tracking error, RMS", f"{1e3 * np.sqrt(np.mean(away**2)):.4g} mm"),
+        ("tracking error, largest", f"{1e3 * np.max(away):.4g} mm"),
+        ("largest deflection", _deflection(run)),
+        ("condition number, worst", float(np.max(run.condition))),
+    ]
+
+
+def _deflection(run: TrackingRun | MotionRun) -> str | None:
+    """Largest tip displacement of any flexible body in its frame."""
+    system = run.task.system if isinstance(run, TrackingRun) else run.system
+    tips = [tip_deflection(system, body.name, run.solution.q)[:, :2] for body in system.bodies if body.nf]
+    sizes = [float(np.nanmax(np.linalg.norm(tip, axis=1), initial=0.0)) for tip in tips]
+    return f"{1e3 * max(sizes):.4g} mm" if sizes else None
+
+
+def _last_places(run: MotionRun) -> list[tuple]:
+    from paraflex.mechanism import PointRef
+
+    solution = run.solution
+    q, v, a = (values[-1:] for values in (solution.q, solution.v, solution.a))
+    names = [PointRef(body.name, point) for body in run.system.mechanism.bodies for point in body.points]
+    shown = [ref for ref in names if "._" not in str(ref)][:_MOST]
+    return [(str(ref), *map(float, point_motion(run.system, ref, q, v, a).position[0])) for ref in shown]
+
+
+def _solver(solution: Solution, method: str) -> list[tuple[str, Any]]:
+    return [
+        ("method", method),
+        ("steps", f"{solution.steps}, {solution.rejected} more rejected"),
+        ("Newton iterations", solution.newton_iterations),
+        ("factorisations", solution.factorisations),
+        ("wall time", f"{solution.wall_time:.3g} s"),
+        ("largest violation of constraints", f"{solution.constraint_position_max:.2g} m"),
+        ("largest imbalance of energy", _joules(solution.energy_balance_max)),
+    ]
+
+
+def _joules(value: float) -> str | None:
+    return f"{value:.2g} J" if np.isfinite(value) else None

@@ -1,0 +1,187 @@
+"""Results of studies as notebooks show them: what was found, and how far they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from paraflex.display import facts, page, sentence, table
+from paraflex.results import summary
+
+if TYPE_CHECKING:
+    from paraflex.studies.comparison import MethodComparison
+    from paraflex.studies.optimisation import IdentificationResult, IndicesResult, OptimisationResult
+    from paraflex.studies.sensitivities import Sensitivities
+    from paraflex.studies.sweeps import SweepResult
+    from paraflex.studies.tracking import StudyResult
+    from paraflex.studies.verification import Verification
+
+# Rows of tables that could be long.
+_MOST = 60
+
+
+def study_html(result: StudyResult) -> str:
+    """Every mode's status, errors, torques and the solver's figures; why modes failed."""
+    if result.data is None:
+        reasons = [sentence(f"{mode}: {reason}") for mode, reason in result.failed.items()]
+        return page("study: no mode ran", *reasons)
+    figures = summary(result.data, result.failed)
+    motors = [str(name) for name in result.data["motor"].values]
+    unit = result.data["torque"].attrs.get("units", "N m")
+    rows, why = [], []
+    for name, mode in figures["modes"].items():
+        if "message" in mode:
+            why.append(sentence(f"{name}: {mode['message']}"))
+        if "steps" not in mode:
+            rows.append((name, mode["status"], *[""] * (len(motors) + 5)))
+            continue
+        rows.append((
+            name, mode["status"], _millimetres(mode["tracking_rms"]), _millimetres(mode["residual_vibration"]),
+            *(mode["peak_torque"][motor] for motor in motors),
+            mode["steps"], mode["newton_iterations"], mode["wall_time"],
+        ))  # fmt: skip
+    peaks = [f"peak {motor} [{unit}]" for motor in motors]
+    heads = ("mode", "status", "RMS tracking error [mm]", "residual vibration [mm]", *peaks, "steps",
+             "Newton iterations", "wall time [s]")  # fmt: skip
+    title = f"{figures['mechanism']}, {_modes_of(len(rows))}" + (", interrupted" if result.interrupted else "")
+    return page(title, table(heads, rows), *why)
+
+
+def sweep_html(result: SweepResult) -> str:
+    """How many runs are done and how they ended, and where the table is."""
+    rate = f"{result.fresh} runs in {result.seconds:.3g} s" if result.fresh else None
+    told = [
+        ("runs", f"{result.done} of {result.total}"),
+        *sorted(result.counts.items()),
+        ("in this session", rate),
+        ("table", str(result.table)),
+    ]
+    return page(f"sweep: {_state(result.finished, result.interrupted)}", facts(told))
+
+
+def optimisation_html(result: OptimisationResult) -> str:
+    """The best design beside the start: parameters, objective, metrics."""
+    numbers = [(name, result.start[name], value, result.bounds.get(name, "")) for name, value in result.values.items()]
+    metrics = [("objective", result.start_objective, result.objective, "")]
+    metrics += [(name, result.start_metrics.get(name), value, "") for name, value in result.metrics.items()]
+    limits = "" if result.holds_limits or not result.values else "no design holds all limits"
+    return page(
+        f"optimisation: {result.stopped}",
+        sentence(limits),
+        table(("parameter", "start", "best", "at its bound"), numbers),
+        table(("", "start", "best", ""), metrics if result.values else ()),
+        facts(_search_facts(result)),
+    )
+
+
+def identification_html(result: IdentificationResult) -> str:
+    """The parameters found, with deviations, and what becomes of every target."""
+    deviations: Mapping[str, float | None] = {} if result.confidence is None else result.confidence.deviations
+    numbers = [
+        (name, result.start[name], value, deviations.get(name), result.bounds.get(name, ""))
+        for name, value in result.values.items()
+    ]
+    targets = [
+        (each.target.column, each.target.path, each.target.mode, each.target.value, each.start, each.reached)
+        for each in result.targets
+    ]
+    residuals = [("RMS residual", result.residual), ("at the start", result.start_residual)]
+    return page(
+        f"identification: {result.stopped}",
+        table(("parameter", "start", "found", "deviation", "at its bound"), numbers),
+        table(("target", "path", "mode", "value", "start", "reached"), targets),
+        facts([*residuals, *_search_facts(result)]),
+    )
+
+
+def indices_html(result: IndicesResult) -> str:
+    """First-order and total indices of every parameter, a row each."""
+    rows = [
+        (each.metric, each.path, each.mode, row["parameter"], row["first"], row["first_confidence"], row["total"],
+         row["total_confidence"])
+        for each in result.indices for row in each.rows()
+    ]  # fmt: skip
+    heads = ("metric", "path", "mode", "parameter", "first order", "±", "total", "±")
+    shown = table(heads, rows[:_MOST], "with half the widths of the intervals of 95 %")
+    return page(f"Sobol indices: {_state(result.sweep.finished, result.sweep.interrupted)}", shown, _more(len(rows)))
+
+
+def sensitivities_html(found: Sensitivities) -> str:
+    """Elasticities of every metric by every parameter, a row a metric, path and mode."""
+    relative = found.relative
+    rows = [
+        (metric, path, mode, float(found.values[i, j]), unit, *(float(x) for x in relative[i, j]))
+        for i, (path, mode) in enumerate(found.rows)
+        for j, (metric, unit) in enumerate(zip(found.metrics, found.units, strict=True))
+    ]
+    heads = ("metric", "path", "mode", "value", "unit", *(f"by {name}" for name in found.parameters))
+    caption = "change of metrics by that of parameters [% / %]"
+    return page(f"{found.name}: sensitivities of {found.mechanism}", table(heads, rows[:_MOST], caption),
+                _more(len(rows)))  # fmt: skip
+
+
+def verification_html(verification: Verification) -> str:
+    """Every model in every mode: tracking error, distance from the reference, time."""
+    from paraflex.studies.agreement import agreement
+
+    figures = agreement(verification)
+    rows = [
+        (mode, name, told["status"], _millimetres(told.get("tracking_error")), _millimetres(told.get("distance_max")),
+         told.get("steps"), told.get("wall_time"))
+        for mode, each in figures["modes"].items() for name, told in each["models"].items()
+    ]  # fmt: skip
+    heads = ("mode", "model", "status", "RMS tracking error [mm]", f"largest distance from {figures['reference']} [mm]",
+             "steps", "wall time [s]")  # fmt: skip
+    why = [
+        sentence(f"{mode}, {name}: {told['message']}")
+        for mode, each in figures["modes"].items()
+        for name, told in each["models"].items()
+        if told["message"]
+    ]
+    state = _state(verification.complete, verification.interrupted)
+    return page(f"{figures['mechanism']}, models compared: {state}", table(heads, rows), *why)
+
+
+def comparison_html(comparison: MethodComparison) -> str:
+    """Every run of every method: error, time, steps."""
+    figures = comparison.figures()
+    rows = [
+        (method["title"], run["tolerance"], run["step"], run["status"], run["error"], run["wall_time"], run["steps"])
+        for method in figures["methods"].values()
+        for run in method["runs"]
+    ]
+    heads = ("method", "tolerance [m]", "step [s]", "status", "error [m]", "wall time [s]", "steps")
+    reference = comparison.reference
+    told = None if reference is None else f"{reference.method}, {reference.tolerance:g} m"
+    return page(
+        f"{comparison.mechanism}, {comparison.case}: methods compared",
+        facts([("reference", told), ("its uncertainty [m]", None if reference is None else reference.uncertainty)]),
+        table(heads, rows[:_MOST]),
+        _more(len(rows)),
+    )
+
+
+def _search_facts(result: OptimisationResult | IdentificationResult) -> list[tuple[str, Any]]:
+    return [
+        ("designs", f"{result.evaluations}, {result.failed} of them not running"),
+        ("one that does not run", result.reasons[0] if result.reasons else None),
+        ("in this session", f"{result.fresh} designs in {result.seconds:.3g} s" if result.fresh else None),
+        ("table", str(result.table)),
+        ("folder", str(result.folder)),
+    ]
+
+
+def _state(finished: bool, interrupted: bool) -> str:
+    return "interrupted" if interrupted else "finished" if finished else "not finished"
+
+
+def _modes_of(number: int) -> str:
+    return f"{number} mode{'' if number == 1 else 's'}"
+
+
+def _millimetres(metres: float | None) -> float | None:
+    return None if metres is None else 1e3 * metres
+
+
+def _more(rows: int) -> str:
+    return sentence(f"and {rows - _MOST} more rows") if rows > _MOST else ""
