@@ -27,8 +27,8 @@ MOST_ROWS, MOST_RUNS, _BEST, _FRONT = 5000, 8, 3, 2
 _FRONTS, _REASONS = 8, 12
 _COMPLETE = "complete"
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-# A range that spans so much is drawn on a logarithmic axis.
-_WIDE = 50.0
+# A metric that spans so much is drawn on a logarithmic axis, and a range that is logarithmic itself.
+_WIDE, _WIDE_RANGE = 50.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,8 @@ def read_studied(files: Sequence[Path]) -> Studied:
 def best_runs(studied: Studied) -> list[Picked]:
     """Runs to look at closely: best designs by the first metric, the best by each other, some of the front of two.
 
-    Three by the first metric and up to two from the middle of the front, eight in all at most; less is better.
+    Three by the first metric, the best by it of each mode, up to two from the middle of the front, eight in all at
+    most; less is better.
     """
     judged = studied.judged
     if not judged:
@@ -117,6 +118,9 @@ def best_runs(studied: Studied) -> list[Picked]:
     why: dict[int, list[str]] = {}
     for place, row in enumerate(_least(studied, first)[:_BEST]):
         why.setdefault(row, []).append(f"{metric_name(first)}{'' if place == 0 else f', {_nth(place + 1)}'}")
+    for name, row in _least_of_series(studied, first).items():
+        if row in why or len(why) < MOST_RUNS - _FRONT:
+            why.setdefault(row, []).append(f"{metric_name(first)} in {name}")
     pair = in_conflict(studied)
     if len(pair) == 2:
         for row in _knees(studied, *pair):
@@ -196,7 +200,7 @@ def columns(
     for name in table.varied:
         values = table.parameters[name]
         unit, factor = shown_unit(units.get(name, ""), values)
-        log = name in logarithmic and bool((values > 0.0).all())
+        log = name in logarithmic and _is_wide(values, _WIDE_RANGE)
         out.append(Column(name, symbol(name.replace("_", " ")), unit, factor * values[rows], parameter=True, log=log))
     rest = [name for name in table.metrics if name not in judged]
     for name in [*judged, *rest]:
@@ -204,7 +208,7 @@ def columns(
         if not np.isfinite(values).any():
             continue
         unit, factor = shown_unit(table.units.get(name, ""), values)
-        out.append(Column(name, metric_name(name), unit, factor * values[rows], log=_is_wide(values)))
+        out.append(Column(name, metric_name(name), unit, factor * values[rows], log=_is_wide(values, _WIDE)))
     return out
 
 
@@ -219,7 +223,9 @@ def shown_unit(unit: str, values: NDArray[np.float64]) -> tuple[str, float]:
 def metric_name(metric: str) -> str:
     """What a metric is called: "RMS tracking error"; "peak torque of τ₁" of one motor's."""
     name, dot, motor = metric.partition(".")
-    return METRIC_NAMES.get(name, name.replace("_", " ")) + (f" of {symbol(motor)}" if dot else "")
+    return METRIC_NAMES.get(name, name.replace("_", " ").replace("rms ", "RMS ")) + (
+        f" of {symbol(motor)}" if dot else ""
+    )
 
 
 def reasons(studied: Studied) -> list[tuple[str, str, int]]:
@@ -243,6 +249,19 @@ def _least(studied: Studied, metric: str) -> list[int]:
     return [int(row) for row in order[np.sort(first)]]
 
 
+def _least_of_series(studied: Studied, metric: str) -> dict[str, int]:
+    """The row with the least of a metric of each path and mode, where there are several."""
+    table, out = studied.table, {}
+    pairs = list(table.series)
+    for path, mode in pairs if len(pairs) > 1 else []:
+        own = (table.path == path) & (table.mode == mode) & table.complete
+        values = np.where(own, table.metrics[metric], np.inf)
+        if np.isfinite(values).any():
+            name = mode if len({one[0] for one in pairs}) == 1 else f"{mode} {path}"
+            out[name] = int(np.nanargmin(values))
+    return out
+
+
 def _knees(studied: Studied, across: str, up: str) -> list[int]:
     """Of the front of all runs the ones nearest the corner of both least values, scaled by the front's extent."""
     x, y = (np.where(studied.table.complete, studied.table.metrics[name], np.nan) for name in (across, up))
@@ -255,9 +274,9 @@ def _knees(studied: Studied, across: str, up: str) -> list[int]:
     return [int(row) for row in inner[np.argsort(away, kind="stable")[:_FRONT]]]
 
 
-def _is_wide(values: NDArray[np.float64]) -> bool:
+def _is_wide(values: NDArray[np.float64], share: float) -> bool:
     known = values[np.isfinite(values)]
-    return bool(known.size and known.min() > 0.0 and known.max() > _WIDE * known.min())
+    return bool(known.size and known.min() > 0.0 and known.max() > share * known.min())
 
 
 def _nth(number: int) -> str:

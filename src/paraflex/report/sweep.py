@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.report.curves import compared, followed, look, thinned
+from paraflex.report.curves import compared, followed, look, plane_path, thinned
 from paraflex.report.designs import (
     Picked,
     Studied,
@@ -109,7 +109,7 @@ def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount
     logarithmic = [name for name, one in account.parameters.items() if one.spread == "log"]
     drawn = columns(studied, rows, units, logarithmic)
     few = None if data is None else data.isel(time=thinned(data.sizes["time"]))
-    missing = account.failed | dict.fromkeys(others, "its links are cut into other pieces than those of the first")
+    missing = dict(account.failed) | dict.fromkeys(others, "it has other bodies, joints or elements than the first")
     return Page(
         title=account.name,
         kind=account.kind,
@@ -118,9 +118,7 @@ def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount
         figures=_tiles(studied, account),
         survey=_survey(studied, rows, drawn, account) if rows.size else [],
         designs=_designs(studied, rows, drawn, {row: k for k, row in enumerate(shown)}) if rows.size else None,
-        tables=[
-            *([("Best designs", _best_table(studied, picked, list(shown), units))] if picked else []),
-        ],
+        tables=[("Best designs", _best_table(studied, picked, list(shown), units))] if picked else [],
         more=[("What was varied", _parameter_table(account)), *_trouble(studied)],
         panels=[] if few is None else _panels(few, labels),
         time=[] if few is None else few["time"].values,
@@ -177,8 +175,8 @@ def _tiles(studied: Studied, account: StudyAccount) -> list[tuple[str, str, str]
         if known.size:
             row = int(known[np.argmin(values[known])])
             unit, factor = shown_unit(studied.table.units.get(name, ""), values[known])
-            tiles.append((f"least {metric_name(name).removeprefix('largest ')}" if not name.startswith("largest")
-                          else metric_name(name), f"{number(values[row], factor)} {unit}".rstrip(), studied.label(row)))  # fmt: skip
+            value = f"{number(values[row], factor)} {unit}".rstrip()
+            tiles.append((metric_name(name), value, f"least, of {studied.label(row)}"))
     return tiles
 
 
@@ -191,12 +189,7 @@ def _survey(studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], a
     if account.history:
         charts.append(_history(account.history))
     if parameters and metrics:
-        charts.append(Chart(
-            "responses", "Response", "metric", x="parameter", over_time=False, drawer="responses",
-            pickers=[Picker("of", metrics), Picker("to", parameters)],
-            note="A mark a run; thick, the median over the other parameters."
-            if len(parameters) > 1 else "A mark a run.",
-        ))  # fmt: skip
+        charts += _responses(parameters, metrics)
     if len(metrics) > 1:
         pair = [place[name] for name in in_conflict(studied)]
         first, second = pair if len(pair) == 2 else metrics[:2]
@@ -207,15 +200,28 @@ def _survey(studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], a
         ))  # fmt: skip
     if metrics:
         charts.append(Chart(
+            "distribution", "Distribution", "runs", x="metric", over_time=False, drawer="distribution",
+            pickers=[Picker("of", metrics)],
+        ))  # fmt: skip
+        charts.append(Chart(
             "parallel", "All numbers of each run", "metrics", x="parameters", over_time=False, drawer="parallel",
             pickers=[Picker("coloured by", metrics)],
             note="A line a run. Drag along an axis to keep the runs that pass there; drag names to reorder.",
         ))  # fmt: skip
-        charts.append(Chart(
-            "distribution", "Distribution", "runs", x="metric", over_time=False, drawer="distribution",
-            pickers=[Picker("of", metrics)],
-        ))  # fmt: skip
     return [Panel(_drawn(studied, rows), charts)] if charts else []
+
+
+def _responses(parameters: Sequence[int], metrics: Sequence[int]) -> list[Chart]:
+    """Two charts of the same kind to look at side by side: of the first two parameters, or metrics."""
+    note = "A mark a run; thick, the median over the other parameters." if len(parameters) > 1 else "A mark a run."
+    starts = [(0, 0), (0, 1)] if len(parameters) > 1 else [(k, 0) for k in range(min(2, len(metrics)))]
+    return [
+        Chart(
+            f"responses{k + 1}", "Response", "metric", x="parameter", over_time=False, drawer="responses",
+            pickers=[Picker("of", metrics, metric), Picker("to", parameters, parameter)], note=note,
+        )
+        for k, (metric, parameter) in enumerate(starts)
+    ]  # fmt: skip
 
 
 def _drawn(studied: Studied, rows: NDArray[np.intp]) -> str:
@@ -310,7 +316,7 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     charts = [
         compared("errors", "Tracking error", "distance", "m", gaps, runs, log=True,
                  note="Distance of the end-effector from its desired place."),
-        _paths(place, desired, runs),
+        plane_path(place, desired, runs),
         followed("torques", "Motor forces" if unit == "N" else "Motor torques", "force" if unit == "N" else "torque",
                  unit, torque, motors, runs, selecting="design", choosing="motor"),
     ]  # fmt: skip
@@ -325,15 +331,6 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     energy = data["strain_energy"].transpose("mode", "time").values
     charts.append(compared("strain", "Strain energy", "strain energy", "J", energy, runs))
     return [Panel("The best designs in motion", charts)]
-
-
-def _paths(place: NDArray[np.float64], desired: NDArray[np.float64], runs: Sequence[str]) -> Chart:
-    curves = []
-    for r in range(len(runs)):
-        way, gone = 1e3 * desired[r], 1e3 * place[r]
-        curves.append(Curve("desired", way[:, 1], way[:, 0], Look(dash=1), shown=(r,)))
-        curves.append(Curve("actual", gone[:, 1], gone[:, 0], Look(0), run=r, shown=(r,)))
-    return Chart("path", "End-effector path", "y [mm]", curves, x="x [mm]", equal=True, over_time=False)
 
 
 def _history(steps: Sequence[Step]) -> Chart:

@@ -85,7 +85,8 @@ def table(
         for (name, unit), words in zip(heads, wordy, strict=True)
     )
     body = "".join(
-        f"<tr{_data_run(runs.get(name))}{_data_keys(keys, name)}>{_row_head(name, runs.get(name))}{''.join(map(_cell, cells))}</tr>"
+        f"<tr{_data_run(runs.get(name))}{_data_keys(keys, name)}>"
+        f"{_row_head(name, runs.get(name))}{''.join(map(_cell, cells))}</tr>"
         for name, cells in rows
     )
     sortable = _SORTABLE if keys else ""

@@ -153,7 +153,7 @@ const designs = (() => {
     const known = members.map((rows) => rows.map(at).filter(Number.isFinite));
     const all = known.flat();
     const low = all.reduce((a, b) => Math.min(a, b), Infinity), high = all.reduce((a, b) => Math.max(a, b), -Infinity);
-    const bins = Math.min(40, Math.max(8, Math.round(2 * Math.cbrt(Math.max(...known.map((values) => values.length))))));
+    const bins = Math.min(40, Math.max(8, Math.round(3 * Math.cbrt(Math.max(...known.map((values) => values.length))))));
     const size = (high - low) / bins || 1;
     const back = (value) => (log ? 10 ** value : value);
     const data = known.map((values, k) => {
@@ -229,6 +229,8 @@ const designs = (() => {
 
   function figure(chart) {
     const picked = chart.told.pickers.map((picker, k) => picker.columns[chart.picked[k]]);
+    // As wide as its axes' names need: it scrolls in its holder where that is narrower.
+    if (chart.told.drawer === "parallel") chart.plot.style.minWidth = `${100 * (parallelAxes(picked[0]).length + 1)}px`;
     return drawers[chart.told.drawer](...picked);
   }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from paraflex.simulate import simulate
 from paraflex.studies.sweeps.folder import STUDY, read_told
 from paraflex.studies.sweeps.metrics import measure
 from paraflex.studies.sweeps.overlay import Place
-from paraflex.studies.sweeps.run import Task, plan_task
+from paraflex.studies.sweeps.run import Abandoned, Task, plan_task
 from paraflex.studies.sweeps.study import Setting, versions
 
 _AGAIN = "run the study again, in a new folder"
@@ -79,7 +79,11 @@ def open_study(folder: str | Path) -> StudyFolder:
 
 
 def run_again(
-    setting: Setting, values: Sequence[float], path: str, mode: str
+    setting: Setting,
+    values: Sequence[float],
+    path: str,
+    mode: str,
+    watch: Callable[[float], None] | None = None,
 ) -> tuple[xr.Dataset, dict[str, float | int]]:
     """A run of a design as `paraflex run` keeps it, and its metrics.
 
@@ -89,14 +93,20 @@ def run_again(
     values : sequence of float
         Of the parameters.
     path, mode : str
+    watch : callable, optional
+        Told the time reached in the run [s]; a KeyboardInterrupt from it abandons the run.
 
     Raises
     ------
     InputError, NumericalError
         It cannot be run.
+    Abandoned
+        See `watch`.
     """
     planned, options = plan_task(setting, Task(0, 0, tuple(values), path))
-    run = simulate(planned, mode, options=options)
+    run = simulate(planned, mode, options=options, on_progress=watch)
+    if run.solution.status == "interrupted":
+        raise Abandoned
     return tracking_dataset([run], options=options), measure(run, setting.metrics)
 
 

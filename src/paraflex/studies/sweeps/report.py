@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -18,19 +19,14 @@ from paraflex.files import model_from
 from paraflex.report import Page
 from paraflex.report.designs import Picked, Studied, best_runs, read_studied
 from paraflex.report.sweep import Parameter, Step, StudyAccount, sweep_page
-from paraflex.studies.sweeps.folder import STUDY
 from paraflex.studies.sweeps.reopen import StudyFolder, open_study, reason_of, run_again
+from paraflex.studies.sweeps.run import Abandoned
 from paraflex.studies.sweeps.table import RESULTS, parts
 from paraflex.studies.sweeps.units import unit_of
 
 _FOUND = "result.json"
 # So much a metric may differ from its row's before the reader is told: other machines round otherwise.
 _SAME = 1e-6
-
-
-def is_study(folder: Path) -> bool:
-    """Whether a folder holds the rows of a study."""
-    return (folder / STUDY).is_file() and ((folder / RESULTS).is_file() or bool(parts(folder)))
 
 
 def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = None) -> Page:
@@ -86,9 +82,18 @@ def _again(
     compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism, lambda _: None)
     table = studied.table
 
+    stop = threading.Event()
+
+    def watch(_: float) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+
     def again(row: int) -> tuple[xr.Dataset, bool] | str:
+        if stop.is_set():
+            raise Abandoned
+        values, path, mode = studied.values(row), str(table.path[row]), str(table.mode[row])
         try:
-            data, metrics = run_again(study.setting, studied.values(row), str(table.path[row]), str(table.mode[row]))
+            data, metrics = run_again(study.setting, values, path, mode, watch)
         except ParaflexError as error:
             return reason_of(error)
         told = {name: table.metrics[name][row] for name in metrics if name in table.metrics}
@@ -96,7 +101,12 @@ def _again(
 
     rows = [one.row for one in picked]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        outcomes = dict(zip(rows, pool.map(again, rows), strict=True))
+        try:
+            outcomes = dict(zip(rows, pool.map(again, rows), strict=True))
+        except KeyboardInterrupt:
+            # Ctrl-C reaches the main thread only; the others hear of it at their next report.
+            stop.set()
+            raise
     runs = {row: outcome[0] for row, outcome in outcomes.items() if not isinstance(outcome, str)}
     failed = {row: outcome for row, outcome in outcomes.items() if isinstance(outcome, str)}
     differ = [row for row, outcome in outcomes.items() if not isinstance(outcome, str) and not outcome[1]]

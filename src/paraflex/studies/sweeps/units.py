@@ -33,7 +33,7 @@ def _descriptions(kinds: tuple[Any, ...], place: Place) -> Iterator[str]:
     """What is said of the field at a place, by each of the tables that may stand there."""
     key, *rest = place
     for kind in kinds:
-        told = kind.model_fields.get(key) if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+        told = kind.model_fields.get(str(key)) if isinstance(kind, type) and issubclass(kind, BaseModel) else None
         if told is None:
             continue
         models, depth = _inside(told.annotation)
