@@ -145,7 +145,12 @@ def test_the_library_pendulum_runs_from_the_command_line(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "flexible pendulum: complete at t = 0.5 s" in done.stdout
     assert "beam.tip: (" in done.stdout
-    assert sorted(entry.name for entry in (tmp_path / "out").iterdir()) == ["figures", "report.html", "results.nc", "summary.json"]
+    assert sorted(entry.name for entry in (tmp_path / "out").iterdir()) == [
+        "figures",
+        "report.html",
+        "results.nc",
+        "summary.json",
+    ]
     data = load_results(tmp_path / "out" / "results.nc")
     assert data.sizes["time"] == 51
     assert data.sizes["coordinate"] == 15

@@ -442,6 +442,55 @@ def plot(
 
 
 @app.command()
+def animate(
+    results: Annotated[str, typer.Argument(metavar="RESULTS", help="The folder of a run or verification, or a file.")],
+    output: Annotated[
+        str, typer.Argument(metavar="OUT", help="FILE.mp4, .gif, .svg, .png (one picture), or a folder of PNG.")
+    ],
+    mode: Annotated[
+        list[str] | None,
+        typer.Option(metavar="MODE", help="Actuation mode; repeated they stand side by side. Default: the first."),
+    ] = None,
+    magnify: Annotated[float, typer.Option(metavar="TIMES", help="How many times deflections are drawn.")] = 1.0,
+    fps: Annotated[float, typer.Option(metavar="N", help="Pictures a second.")] = 30.0,
+    speed: Annotated[
+        float | None,
+        typer.Option(metavar="RATIO", help="0.1 is ten times slower. Default: a round one at which it takes 5 s."),
+    ] = None,
+    size: Annotated[str | None, typer.Option(metavar="WIDTHxHEIGHT", help="In pixels. Default: what fits.")] = None,
+    theme: Annotated[str, typer.Option(metavar="light|dark", help="Colours.")] = "light",
+    at: Annotated[float | None, typer.Option(metavar="S", help="Time of one picture. Default: half way.")] = None,
+    model: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of a verification. Default: its reference.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over what is there.")] = False,
+) -> None:
+    """Make a film of a run: mp4, gif, animated svg, or pictures."""
+    from paraflex.cli.animate import AnimateRequest, animate_command
+
+    request = AnimateRequest(results, output, mode or [], magnify, fps, speed, size, theme, at, model, force)
+    raise typer.Exit(animate_command(request))
+
+
+@app.command()
+def export(
+    results: Annotated[str, typer.Argument(metavar="RESULTS", help="A folder or file that paraflex wrote.")],
+    to: Annotated[str, typer.Option("--to", metavar="csv|parquet|mat|netcdf", help="For which programs.")],
+    output: Annotated[
+        str | None, typer.Option("--output", "--out", metavar="FILE|DIR", help="Default: export/ beside the results.")
+    ] = None,
+    shapes: Annotated[
+        bool, typer.Option("--shapes", help="A table of deformed shapes too; mat and netcdf always have them.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Write over what is there.")] = False,
+) -> None:
+    """Write results for other programs: tables as CSV or Parquet, a struct for MATLAB, netCDF."""
+    from paraflex.cli.export import ExportRequest, export_command
+
+    raise typer.Exit(export_command(ExportRequest(results, to, output, shapes, force)))
+
+
+@app.command()
 def modes(source: Source = "raparm_i", path: PathOption = None, json: Json = False) -> None:
     """List the actuation modes and how well each can drive the path."""
     from paraflex.cli.modes import modes_command

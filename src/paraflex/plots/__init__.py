@@ -13,6 +13,7 @@ from paraflex.plots.catalogue import homes
 if TYPE_CHECKING:
     from paraflex.plots.agreement import compared_deflections, compared_links, compared_paths, model_distances
     from paraflex.plots.derivatives import elasticities
+    from paraflex.plots.drawing import mechanism_drawing
     from paraflex.plots.driving import actuation_condition, mode_comparison, mode_conditions, tracking_distance
     from paraflex.plots.energy import energies
     from paraflex.plots.forces import joint_forces
@@ -44,7 +45,7 @@ _SAVES = (
     "save_search_figures",
     "save_work_precision",
 )
-_HOME = homes() | dict.fromkeys(_SAVES, "save")
+_HOME = homes() | dict.fromkeys(_SAVES, "save") | {"mechanism_drawing": "drawing"}
 
 __all__ = [
     "actuation_condition",
@@ -62,6 +63,7 @@ __all__ = [
     "link_deflections",
     "link_motions",
     "link_phases",
+    "mechanism_drawing",
     "mode_comparison",
     "mode_conditions",
     "model_distances",

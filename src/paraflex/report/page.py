@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from html import escape
@@ -280,7 +281,8 @@ def save_page(page: Page, path: str | Path) -> None:
         unfinished.write_text(render(page), encoding="utf-8")
         unfinished.replace(path)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
+        with suppress(OSError):
+            unfinished.unlink()
         raise OutputError(
             f"cannot be written ({error.strerror or error})", field=str(path), remedy="choose another file"
         ) from error

@@ -47,8 +47,8 @@ def motion_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end; units in the attributes of
-        every variable.
+        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end; units in the attributes
+        of every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v, a = solution.q, solution.v, solution.a

@@ -57,7 +57,8 @@ def outline(body: Body) -> Outline:
     """Stations of a body; they depend on its length and points, not on how it is meshed or cut.
 
     Of a beam or bar so many along its centre line, named points among them. A rigid body's points in their order on a
-    line, or round their middle, closed; with fewer than two of them, its centre of mass too. A modal body's points.
+    line, or round their hull, closed, those inside it after that; with fewer than two of them, its centre of mass too.
+    A modal body's points.
     """
     if isinstance(body, FlexibleBeam | AssumedModesBeam):
         x = _along(body.length, body.points)
@@ -246,12 +247,35 @@ def _distinct(places: Array) -> Array:
 
 
 def _round(places: Array) -> NDArray[np.int64]:
-    """Order in which places make a figure: along their line, or round their middle and back to the first."""
+    """Order in which places make a figure: along their line, or round their hull and back to the first, then others."""
     z = places[:, 0] + 1j * places[:, 1]
     if len(z) < 3:
         return np.arange(len(z))
     axis = _axis(z, 0.0)
     if axis is not None:
         return np.argsort((z * np.conj(axis)).real)
-    order = np.argsort(np.angle(z - z.mean()))
-    return np.append(order, order[0])
+    hull = _hull(places)
+    inside = [i for i in range(len(z)) if i not in hull]
+    return np.array([*hull, hull[0], *inside])
+
+
+def _hull(places: Array) -> list[int]:
+    """Corners of the smallest convex figure that holds all places, and what lies on its sides, anticlockwise."""
+    order = np.lexsort((places[:, 1], places[:, 0])).tolist()
+    size = float(np.max(np.ptp(places, axis=0)))
+
+    def side(listed: list[int]) -> list[int]:
+        kept: list[int] = []
+        for i in listed:
+            while len(kept) > 1 and _turn(places, kept[-2], kept[-1], i) < -_SAME * size**2:
+                kept.pop()
+            kept.append(i)
+        return kept[:-1]
+
+    return list(dict.fromkeys([*side(order), *side(order[::-1])]))
+
+
+def _turn(places: Array, a: int, b: int, c: int) -> float:
+    """Twice the area of a triangle, positive if it is passed anticlockwise."""
+    (ux, uy), (vx, vy) = places[b] - places[a], places[c] - places[a]
+    return float(ux * vy - uy * vx)

@@ -141,8 +141,8 @@ def _checked(data: xr.Dataset, file: Path) -> xr.Dataset:
         )
     if not 1 <= schema <= SCHEMA:
         raise InputError(
-            f"written by a later version, paraflex {data.attrs['paraflex_version']} (schema {schema}; this one reads up to "
-            f"{SCHEMA})",
+            f"written by a later version, paraflex {data.attrs['paraflex_version']} (schema {schema}; this one reads "
+            f"up to {SCHEMA})",
             field=str(file),
             remedy="update paraflex",
         )

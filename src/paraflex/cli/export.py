@@ -1,0 +1,46 @@
+"""`paraflex export`: results for other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from paraflex.cli.tables import plain_console
+from paraflex.errors import InputError
+from paraflex.results import open_results
+from paraflex.results.export import export_results, export_table
+
+_TABLE = "results.parquet"
+
+
+@dataclass(frozen=True)
+class ExportRequest:
+    """What `paraflex export` was asked for."""
+
+    results: str
+    to: str
+    output: str | None
+    shapes: bool
+    force: bool
+
+
+def export_command(request: ExportRequest) -> int:
+    """Write the files; the exit code."""
+    results = Path(request.results)
+    folder = results if results.is_dir() else results.parent
+    output = folder / "export" if request.output is None else Path(request.output)
+    table = results / _TABLE if results.is_dir() else results
+    try:
+        if table.name.endswith(".parquet") and table.is_file():
+            files = export_table(table, output, request.to, force=request.force)
+        else:
+            data = open_results(results)
+            files = export_results(data, output, request.to, shapes=request.shapes, force=request.force)
+    except InputError as error:
+        if error.field not in ("to", "output"):
+            raise
+        raise InputError(error.problem, field=f"--{error.field}", value=error.value, remedy=error.remedy) from None
+    console = plain_console(stderr=True)
+    for file in files:
+        console.print(f"{file} ({file.stat().st_size / 1e6:.3g} MB)", soft_wrap=True)
+    return 0

@@ -1,0 +1,50 @@
+"""Colours of drawings and films on light and on dark ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from paraflex.errors import InputError, suggestion
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colours by what they are for; those of links are told apart by colour-blind readers too."""
+
+    ground: str
+    ink: str
+    faint: str
+    earth: str
+    desired: str
+    trail: str
+    links: tuple[str, ...]
+
+    def link(self, number: int) -> str:
+        """Colour of the body of that number."""
+        return self.links[number % len(self.links)]
+
+
+# Okabe and Ito (2008), Color Universal Design; darker where the ground is light, lighter where it is dark.
+THEMES = {
+    "light": Theme(
+        "#ffffff", "#1d2327", "#c3c9ce", "#59636b", "#8a949b", "#d55e00",
+        ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#8c5a2b", "#5a4fcf", "#7a7f00"),
+    ),
+    "dark": Theme(
+        "#14181b", "#e8ecef", "#454d53", "#9aa4ab", "#8e989f", "#ff9a4d",
+        ("#4aa8e0", "#f0b93a", "#2ec49a", "#e39cc4", "#9ad4f5", "#c99565", "#a59df0", "#c6cb4a"),
+    ),
+}  # fmt: skip
+
+
+def theme(name: str) -> Theme:
+    """Colours by name.
+
+    Raises
+    ------
+    InputError
+        There are none of that name.
+    """
+    if name not in THEMES:
+        raise InputError("no such theme", field="theme", value=name, remedy=suggestion(name, THEMES))
+    return THEMES[name]

@@ -1,0 +1,323 @@
+"""Results for other programs: tables as CSV or Parquet, a struct for MATLAB, netCDF."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError, OutputError, suggestion
+from paraflex.results.storage import save_results
+
+FORMATS = ("csv", "parquet", "mat", "netcdf")
+ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
+TIME_SERIES, FIGURES, SHAPES = "time_series", "figures", "shapes"
+# Dimensions that rows of tables are of, outermost first.
+_ROWS = ("model", "mode", "time")
+# MATLAB takes longer names apart.
+_LONGEST_NAME = 63
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: values by name, their unit (empty where there is none) and what they are."""
+
+    name: str
+    unit: str
+    meaning: str
+    values: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one length."""
+
+    columns: tuple[Column, ...]
+
+    def __getitem__(self, name: str) -> Column:
+        """The column of that name."""
+        return next(column for column in self.columns if column.name == name)
+
+
+def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, Table]:
+    """Results as tidy tables, a row an observation.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Of a run, with a path or without, or of a verification.
+    shapes : bool
+        Also the deformed shapes: many rows.
+
+    Returns
+    -------
+    dict of str to Table
+        `time_series`: a row a model (of a verification), mode and time; a variable of more dimensions makes a column
+        for each of their labels, `torque_tau1` or `joint_force_B1_x`. `figures`: a row a model and mode. `shapes`: a
+        row a model, mode, time and drawn point.
+    """
+    drawn = [name for name in data.data_vars if "station" in data[name].dims]
+    over_time = [name for name in data.data_vars if "time" in data[name].dims and name not in drawn]
+    single = [name for name in data.data_vars if name not in drawn and name not in over_time]
+    tables = {
+        TIME_SERIES: _table(data, over_time, [dim for dim in _ROWS if dim in data.dims]),
+        FIGURES: _table(data, single, [dim for dim in _ROWS[:2] if dim in data.dims]),
+    }
+    if shapes and drawn:
+        tables[SHAPES] = _table(
+            data.assign_coords(station=np.arange(data.sizes["station"])),
+            ["station_body", *drawn],
+            [dim for dim in (*_ROWS, "station") if dim in data.dims],
+        )
+    return tables
+
+
+def _table(data: xr.Dataset, names: Sequence[Any], rows: list[str]) -> Table:
+    shape = [data.sizes[dim] for dim in rows]
+    columns = []
+    for axis, dim in enumerate(rows):
+        labels = data[dim].values
+        values = np.broadcast_to(labels.reshape([-1 if k == axis else 1 for k in range(len(rows))]), shape).ravel()
+        columns.append(Column(dim, *_told(data[dim]), values))
+    for name in names:
+        array = data[name]
+        others = [dim for dim in array.dims if dim not in rows]
+        own = [dim for dim in rows if dim in array.dims]
+        values = array.transpose(*own, *others).values
+        # Over rows that a variable does not depend on it is the same.
+        values = values.reshape([data.sizes[dim] if dim in own else 1 for dim in rows] + list(values.shape[len(own) :]))
+        values = np.broadcast_to(values, [*shape, *values.shape[len(rows) :]])
+        labels = [_labels(data, dim) for dim in others]
+        for index in product(*(range(len(one)) for one in labels)):
+            suffix = "".join(f"_{one[i]}" for one, i in zip(labels, index, strict=True))
+            columns.append(Column(f"{name}{suffix}", *_told(array), values[(..., *index)].ravel()))
+    return Table(tuple(columns))
+
+
+def _labels(data: xr.Dataset, dim: Any) -> list[str]:
+    return (
+        [str(label) for label in data[dim].values] if dim in data.coords else [str(i) for i in range(data.sizes[dim])]
+    )
+
+
+def _told(array: xr.DataArray) -> tuple[str, str]:
+    """Unit and meaning of a variable."""
+    unit = str(array.attrs.get("units", ""))
+    return ("" if unit == "1" else unit), str(array.attrs.get("long_name", ""))
+
+
+def export_results(
+    data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = False, force: bool = False
+) -> list[Path]:
+    """Write results for other programs; every file appears whole or not at all.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    output : str or Path
+        A folder, made if it is not there, for a file a table, or results.mat, results.nc. A name that ends in .csv or
+        .parquet is a file for the time series alone, one in .mat or .nc that file.
+    to : str
+        "csv", names of columns with their units; "parquet", units in the metadata of the columns; "mat", see
+        `matlab_struct`; "netcdf".
+    shapes : bool
+        Also the table of deformed shapes; .mat and netCDF always hold them.
+    force : bool
+        Whether files may be written over.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        An unknown format, or a file that is there already.
+    OutputError
+        It cannot be written.
+    """
+    if to not in FORMATS:
+        raise InputError("no such format", field="to", value=to, remedy=suggestion(to, FORMATS))
+    output, ending = Path(output), ENDINGS[to]
+    single = output.suffix.lower() == ending
+    if not single and output.suffix.lower() in ENDINGS.values():
+        raise InputError(f"does not end as {to} does", field="output", value=str(output), remedy=f"end it in {ending}")
+    if to in ("mat", "netcdf"):
+        file = output if single else output / f"results{ending}"
+        _refuse([file], force)
+        with _whole(file) as unfinished:
+            if to == "mat":
+                _write_mat({"results": matlab_struct(data)}, unfinished)
+            else:
+                save_results(data, unfinished)
+        return [file]
+    tables = result_tables(data, shapes=shapes and not single)
+    files = {name: output if single else output / f"{name}{ending}" for name in ([TIME_SERIES] if single else tables)}
+    _refuse(list(files.values()), force)
+    for name, file in files.items():
+        with _whole(file) as unfinished:
+            write_table(tables[name], unfinished, to, {key: _plain(value) for key, value in data.attrs.items()})
+    return list(files.values())
+
+
+def write_table(table: Table, file: Path, to: str, told: dict[str, str] | None = None) -> None:
+    """Write a table as CSV, units in the names of columns, or Parquet, units in their metadata."""
+    import pyarrow as pa
+    from pyarrow import csv, parquet
+
+    arrays = [_arrow(column.values) for column in table.columns]
+    if to == "csv":
+        names = [f"{column.name} [{column.unit}]" if column.unit else column.name for column in table.columns]
+        csv.write_csv(pa.table(arrays, names=names), file)
+        return
+    fields = [
+        pa.field(column.name, array.type, metadata={"unit": column.unit, "long_name": column.meaning})
+        for column, array in zip(table.columns, arrays, strict=True)
+    ]
+    parquet.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=told or {})), file, compression="zstd")
+
+
+def _arrow(values: NDArray[Any]) -> Any:
+    """What a run did not reach is empty."""
+    import pyarrow as pa
+
+    if values.dtype.kind == "f":
+        return pa.array(np.ascontiguousarray(values), from_pandas=True)
+    if values.dtype.kind in "biu":
+        return pa.array(np.ascontiguousarray(values))
+    return pa.array([str(value) for value in values])
+
+
+def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
+    """Results as a struct for MATLAB.
+
+    A field a variable or coordinate. Time is the first dimension, so that `plot(results.time, results.torque(:, :, 1))`
+    draws the torques of the first mode; mode and model are the last. Labels are cells of text. `units`, `dims` and
+    `meaning` have the same fields: text, cells of names of dimensions, text. `attributes` says where results come from.
+    """
+    struct: dict[str, Any] = {"units": {}, "dims": {}, "meaning": {}}
+    for name in (*data.coords, *data.data_vars):
+        array, field = data[name], matlab_name(str(name))
+        first = [dim for dim in ("time",) if dim in array.dims]
+        last = [dim for dim in ("mode", "model") if dim in array.dims]
+        array = array.transpose(*first, *(dim for dim in array.dims if dim not in (*first, *last)), *last)
+        struct[field] = _matlab_value(array.values)
+        struct["units"][field], struct["meaning"][field] = _told(array)
+        struct["dims"][field] = _cells([str(dim) for dim in array.dims])
+    struct["attributes"] = {matlab_name(str(key)): _matlab_attribute(value) for key, value in data.attrs.items()}
+    return struct
+
+
+def matlab_name(name: str) -> str:
+    """A name as MATLAB allows it: letters, digits and underscores, a letter first."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    if not re.match(r"[A-Za-z]", plain):
+        plain = f"x{plain}"
+    return plain[:_LONGEST_NAME]
+
+
+def _matlab_value(values: NDArray[Any]) -> Any:
+    if values.dtype.kind in "fiub":
+        return values if values.ndim else values.item()
+    return str(values.item()) if not values.ndim else _cells([str(value) for value in values.ravel()])
+
+
+def _matlab_attribute(value: Any) -> Any:
+    return _plain(value) if isinstance(value, str) else value
+
+
+def _cells(texts: Sequence[str]) -> NDArray[Any]:
+    """A column of cells."""
+    cells = np.empty((len(texts), 1), dtype=object)
+    cells[:, 0] = texts
+    return cells
+
+
+def _write_mat(variables: dict[str, Any], file: Path) -> None:
+    from scipy.io import savemat
+
+    with file.open("wb") as stream:
+        savemat(stream, variables, long_field_names=True, do_compression=True, oned_as="column")
+
+
+def export_table(source: Path, output: Path, to: str, *, force: bool = False) -> list[Path]:
+    """Write the table of a study of many runs, which is Parquet, as CSV or for MATLAB (a struct, a field a column).
+
+    Raises
+    ------
+    InputError
+        Another format, a file that is there already, or a table that cannot be read.
+    OutputError
+        It cannot be written.
+    """
+    import pyarrow as pa
+    from pyarrow import csv, parquet
+
+    if to not in ("csv", "mat"):
+        raise InputError(
+            f"the table of a study of many runs cannot be written as {to}", field="to",
+            remedy=f"it is Parquet already: {source}; csv and mat can be made of it",
+        )  # fmt: skip
+    file = output if output.suffix.lower() == ENDINGS[to] else output / f"results{ENDINGS[to]}"
+    _refuse([file], force)
+    try:
+        table = parquet.read_table(source)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(
+            "damaged or cut short: not a readable table", field=str(source), remedy="run the study again"
+        ) from error
+    with _whole(file) as unfinished:
+        if to == "csv":
+            units = [(field.metadata or {}).get(b"unit", b"").decode() for field in table.schema]
+            names = [f"{name} [{unit}]" if unit else name for name, unit in zip(table.column_names, units, strict=True)]
+            csv.write_csv(table.rename_columns(names), unfinished)
+        else:
+            columns = {matlab_name(name): _matlab_value(_column(table[name])) for name in table.column_names}
+            _write_mat({"results": columns}, unfinished)
+    return [file]
+
+
+def _column(column: Any) -> NDArray[Any]:
+    """Values of an Arrow column; missing numbers are NaN, missing text empty."""
+    values = column.to_pylist()
+    if all(value is None or isinstance(value, (int, float)) for value in values):
+        return np.array([np.nan if value is None else value for value in values])
+    return np.array(["" if value is None else str(value) for value in values])
+
+
+def _plain(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(np.asarray(value).tolist())
+
+
+def _refuse(files: Sequence[Path], force: bool) -> None:
+    for file in files:
+        if file.exists() and not force:
+            raise InputError("exists already", field=str(file), remedy="name another, or write over it with --force")
+
+
+@contextmanager
+def _whole(file: Path) -> Iterator[Path]:
+    """A file to write to that takes its place when it is whole."""
+    unfinished = file.with_name(file.name + ".part")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        yield unfinished
+        unfinished.replace(file)
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written ({error.strerror or error})", field=str(file), remedy="choose another folder"
+        ) from error
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)

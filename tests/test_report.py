@@ -1,0 +1,372 @@
+"""The report's file: it holds the dataset's numbers, breaks on no name, loads nothing, and says what failed."""
+
+import json
+import re
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from paraflex.errors import InputError, OutputError
+from paraflex.report import (
+    Chart,
+    Curve,
+    Page,
+    Panel,
+    film,
+    motion_page,
+    render,
+    save_page,
+    tracking_page,
+    verification_page,
+)
+from paraflex.report.film import MOST_FRAMES, frames_of
+from paraflex.report.packing import Series, packed
+from paraflex.report.page import plotly_script
+from paraflex.report.text import count, number, symbol
+from paraflex.results import load_results, open_results
+from reports import FAILED, MODES, STOPPED, array_of, chart_of, html_of, rows_of, told, tracked, verified
+from test_cli import FAST, paraflex
+
+OLD = Path(__file__).parent / "data" / "schema1.nc"
+AWKWARD = "α <script>alert(\"1\")</script> & 'two' </title> $x \u2028"
+
+
+@pytest.fixture(scope="module")
+def tracking_html():
+    return html_of(tracking_page(tracked(), FAILED))
+
+
+@pytest.fixture(scope="module")
+def page(tracking_html):
+    return told(tracking_html)
+
+
+def text_of(html):
+    """What is read: tags as spaces."""
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html))
+
+
+def test_rows_come_back_rounded_by_less_than_a_hundred_thousandth_and_once_each():
+    rng = np.random.default_rng(3)
+    values = rng.normal(size=300) * 10.0 ** rng.uniform(-9, 9, 300)
+    values[[0, 7]] = np.nan
+    series = Series()
+    assert [series.add(values), series.add([1.0]), series.add(values)] == [0, 1, 0]
+    kept, one = rows_of(series.told())
+    np.testing.assert_allclose(kept, values, rtol=5e-6)
+    assert one.tolist() == [1.0]
+    assert series.add([np.inf, 1e300]) == 2
+
+
+def test_time_is_told_as_exactly_as_single_precision_has_it(page):
+    time = rows_of(page["series"])[page["time"]]
+    assert time.tolist() == tracked()["time"].values.astype(np.float32).tolist()
+
+
+def test_arrays_come_back_within_half_a_step_with_their_gaps():
+    rng = np.random.default_rng(4)
+    values = np.cumsum(rng.normal(size=(2, 60, 5, 2)), axis=1) + [3.0, -40.0]
+    values[1, 30:] = np.nan
+    back = array_of(packed(values))
+    assert np.array_equal(np.isnan(back), np.isnan(values))
+    span = np.ptp(values[np.isfinite(values).all(axis=-1)], axis=0).max()
+    assert np.nanmax(np.abs(back - values)) <= 0.51 * span / 65534
+    assert array_of(packed(np.full((1, 3, 2, 2), 7.0))).tolist() == np.full((1, 3, 2, 2), 7.0).tolist()
+
+
+def test_the_film_is_the_shapes_of_the_dataset_also_magnified(page):
+    shown, data = page["film"], tracked()
+    base, bend = array_of(shown["base"]), array_of(shown["bend"])
+    shape, stiff = (data[name].values.astype(float) for name in ("shape", "shape_base"))
+    extent = np.nanmax(shape) - np.nanmin(shape)
+    assert np.array_equal(np.isnan(base), np.isnan(stiff))
+    # Magnified two hundred times the deflections are still finer than a pixel of a thousand.
+    for times in (1.0, 200.0):
+        exact = stiff + times * (shape - stiff)
+        assert np.nanmax(np.abs(base + times * bend - exact)) < 1e-3 * extent
+    assert [body[0] for body in shown["bodies"]] == [f"link{k}" for k in range(1, 9)]
+    assert shown["bodies"][-1][2] == data.sizes["station"]
+    assert sum(shown["grounded"]) == 4
+    np.testing.assert_allclose(array_of(shown["tip"])[0], data["end_effector"].values[0], atol=1e-5)
+    np.testing.assert_allclose(array_of(shown["path"])[0], data["end_effector_desired"].values[0], atol=1e-5)
+
+
+def test_a_long_run_is_thinned_to_its_first_and_last_frame():
+    kept = frames_of(12345)
+    assert kept.size == MOST_FRAMES
+    assert (kept[0], kept[-1]) == (0, 12344)
+    assert np.ptp(np.diff(kept)) <= 1
+    assert frames_of(20).tolist() == list(range(20))
+
+
+def test_curves_are_the_values_of_the_dataset(page):
+    data, rows = tracked(), rows_of(page["series"])
+    alone = [curve for curve in chart_of(page, "torques")["curves"] if curve["choice"] == 0]
+    for curve in alone:
+        motor = [symbol(str(name)) for name in data["motor"].values].index(curve["name"])
+        assert curve["shown"] == [curve["run"]]
+        np.testing.assert_allclose(rows[curve["y"]], data["torque"].values[curve["run"], :, motor], rtol=5e-6)
+    assert len(alone) == len(MODES) * data.sizes["motor"]
+    # All modes beside each other share the rows of those alone.
+    beside = [curve for curve in chart_of(page, "torques")["curves"] if curve["choice"] == 1]
+    assert [curve["name"] for curve in beside] == list(MODES)
+    assert {curve["y"] for curve in beside} <= {curve["y"] for curve in alone}
+    chart = chart_of(page, "errors")
+    far = np.linalg.norm(data["end_effector"].values - data["end_effector_desired"].values, axis=-1)
+    assert chart["y"] == "distance [mm]"
+    for curve in chart["curves"]:
+        np.testing.assert_allclose(rows[curve["y"]], 1e3 * far[curve["run"]], rtol=1e-5)
+    assert np.isnan(rows[chart["curves"][2]["y"]][26:]).all()
+
+
+def test_no_two_curves_seen_together_look_alike(page):
+    for panel in page["panels"]:
+        for chart in panel["charts"]:
+            for run in range(len(MODES)):
+                for choice in range(max(1, len(chart["choices"]))):
+                    seen = [
+                        (curve["colour"], curve["dash"])
+                        for curve in chart["curves"]
+                        if (curve["shown"] is None or run in curve["shown"]) and curve["choice"] in (None, choice)
+                    ]
+                    assert len(set(seen)) == len(seen), chart["identity"]
+
+
+def test_the_table_has_the_numbers_of_the_dataset(tracking_html):
+    data, text = tracked(), text_of(tracking_html)
+    for k in (0, 1):
+        row = text[text.index(f" {MODES[k]} complete ") :]
+        cells = row.split()[2:]
+        assert cells[0] == number(float(data["tracking_rms"][k]), 1e3)
+        gaps = np.linalg.norm(data["end_effector"][k] - data["end_effector_desired"][k], axis=-1)
+        assert cells[1] == number(gaps.max(), 1e3)
+        assert cells[2] == number(float(data["peak_torque"][k, 0]))
+        assert cells[3] == number(float(data["rms_torque"][k, 0]))
+    assert count(int(data["newton_iterations"][0])) in tracking_html
+
+
+def test_modes_that_failed_say_why(tracking_html):
+    text = text_of(tracking_html)
+    assert f" {STOPPED} failed " in text
+    assert f"Mode {STOPPED}: failed. no end after 20 steps at t = 0.05 s" in text
+    assert " +--- failed " in text
+    assert "Mode +--- could not be run: mode &quot;+---&quot; cannot drive the mechanism: 1 active" in text
+
+
+def test_nothing_is_loaded_from_anywhere(tracking_html):
+    assert "default-src 'none'" in tracking_html
+    for tag in re.findall(r"<(?:script|link|img|iframe|object|embed)[^>]*>", tracking_html):
+        assert "src=" not in tag
+        assert "http" not in tag
+    assert "@import" not in tracking_html
+    assert re.search(r"url\(|fetch\(|XMLHttpRequest|import\(", tracking_html) is None
+
+
+def test_plotly_is_whole_and_does_not_end_its_script():
+    assert len(plotly_script()) > 3_000_000
+    assert "</script" not in plotly_script()
+    whole = render(Page("a", "test"))
+    assert plotly_script() in whole
+
+
+def test_names_cannot_break_out_of_the_page():
+    bodies = np.array([AWKWARD, "link2"])
+    data = tracked().isel(body=[0, 1]).assign_coords(body=bodies)
+    data = data.assign_coords(mode=[AWKWARD, "b", "c"])
+    data.attrs = data.attrs | {"mechanism": AWKWARD, "parameters": json.dumps({"run": {"path": AWKWARD}})}
+    html = html_of(tracking_page(data, {AWKWARD: AWKWARD}))
+    assert "<script>alert" not in html
+    assert html.count("</title>") == 1
+    assert html.count("<script") == html.count("</script>") == 4
+    kept = told(html)
+    assert kept["runs"][0] == AWKWARD
+    assert AWKWARD in {curve["name"] for curve in chart_of(kept, "deflections")["curves"]}
+    assert "α &lt;script&gt;" in html
+    assert "\u2028" not in html[html.index("report-data") :]
+
+
+def test_an_old_file_has_a_report_that_says_why_nothing_moves():
+    data = open_results(OLD)
+    assert "shape" not in data
+    page = tracking_page(data)
+    assert page.film is None
+    assert "earlier version" in page.no_film
+    html = html_of(page)
+    assert page.no_film in html
+    assert told(html)["film"] is None
+
+
+def test_one_mode_has_no_choice_of_modes():
+    page = told(html_of(tracking_page(tracked().isel(mode=[1]))))
+    assert page["runs"] == [MODES[1]]
+    assert page["selected"] == 0
+    assert [name for name in chart_of(page, "torques")["choices"] if "all modes" in name] == []
+
+
+def test_runs_without_a_single_sample_still_have_a_report():
+    data = tracked().isel(mode=[2]).copy(deep=True)
+    for name in data.data_vars:
+        if "time" in data[name].dims:
+            data[name][:] = np.nan
+    page = told(html_of(tracking_page(data)))
+    assert np.isnan(array_of(page["film"]["base"])).all()
+    assert page["film"]["view"] == [-1.0, -1.0, 1.0, 1.0] or np.isfinite(page["film"]["view"]).all()
+
+
+def test_a_verification_tells_distances_and_overlays_models():
+    data, figures = verified()
+    html = html_of(verification_page(data, figures))
+    page, text = told(html), text_of(html)
+    assert page["runs"] == ["rigid", "linear geometry", "finite segments"]
+    mode = figures["modes"]["++++"]
+    for name in ("rigid", "linear"):
+        assert number(mode["models"][name]["distance_max"]) in text
+        assert number(mode["models"][name]["angle_difference_rms"]["link3"]) in text
+    assert number(mode["distances"]["rigid"]["linear"]) in text
+    rows, chart = rows_of(page["series"]), chart_of(page, "angle_differences")
+    reference = list(data["model"].values).index(data.attrs["reference"])
+    assert chart["choices"][2] == "link 3"
+    drawn = [curve for curve in chart["curves"] if curve["choice"] == 2]
+    apart = data["chord_angle"].values[:, 0, :, 2] - data["chord_angle"].values[reference, 0, :, 2]
+    factor = np.nanmax(np.abs(rows[drawn[0]["y"]])) / np.abs(apart[0]).max()
+    assert factor == pytest.approx(10.0 ** round(np.log10(factor)), rel=1e-5)
+    for k, curve in enumerate(drawn):
+        np.testing.assert_allclose(rows[curve["y"]], factor * apart[k], rtol=1e-5, atol=1e-12)
+    assert array_of(page["film"]["base"]).shape[0] == 3
+
+
+def test_a_models_failure_is_told():
+    data, figures = verified()
+    broken = json.loads(json.dumps(figures))
+    broken["modes"]["++++"]["models"]["mujoco"] = {"status": "failed", "message": "base: diverges <here>"}
+    html = html_of(verification_page(data, broken))
+    assert "MuJoCo: base: diverges &lt;here&gt;" in html
+    assert "not all complete" in html
+
+
+def test_raw_figures_of_plotly_go_through():
+    figure = {"data": [{"type": "parcoords", "dimensions": [{"label": "x", "values": [1, 2]}]}], "layout": {}}
+    page = Page("designs", "sweep", panels=[Panel("All", [Chart("all", "All", "", figure=figure)])])
+    assert chart_of(told(html_of(page)), "all")["figure"] == figure
+    curve = Curve("f", [1.0, 4.0], x=[1.0, 2.0])
+    page = replace(page, panels=[Panel("f", [Chart("f", "f", "f", [curve], over_time=False)])])
+    kept = told(html_of(page))
+    assert rows_of(kept["series"])[chart_of(kept, "f")["curves"][0]["x"]].tolist() == [1.0, 2.0]
+
+
+def test_numbers_and_names_as_print_has_them():
+    assert [number(x) for x in (0.0, 0.377_4, 12.345, 9_876.5, -1.2e-5, None, float("nan"))] == [
+        "0", "0.377", "12.3", "9876", "−1.20 × 10⁻⁵", "–", "–",
+    ]  # fmt: skip
+    assert [symbol(name) for name in ("tau1", "A2", "link10", "α<b>")] == ["τ₁", "A₂", "link 10", "α<b>"]
+    assert count(43708.0) == "43\u2009708"
+
+
+def test_a_page_appears_whole_or_not_at_all(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(OutputError, match="cannot be written"):
+        save_page(Page("a", "test"), tmp_path / "file" / "report.html")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
+
+
+def test_without_plotly_it_is_said(monkeypatch):
+    monkeypatch.setattr("paraflex.report.page.find_spec", lambda name: None)
+    plotly_script.cache_clear()
+    with pytest.raises(InputError, match="plotly: not installed"):
+        render(Page("a", "test"))
+    monkeypatch.undo()
+    plotly_script.cache_clear()
+
+
+# --- The command line ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    out = tmp_path_factory.mktemp("ran")
+    done = paraflex("run", "--mode", "++++", "--mode", "tau1", *FAST, "--out", str(out))
+    return done, out
+
+
+def test_a_run_writes_its_report_with_modes_that_could_not_start(ran):
+    done, out = ran
+    assert done.returncode == 1
+    html = (out / "report.html").read_text(encoding="utf-8")
+    assert "<title>RAParM-I – paraflex run</title>" in html
+    assert "Mode +--- could not be run" in html
+    assert "report.html in" in done.stderr
+
+
+def test_the_report_is_written_again_the_same(ran, tmp_path):
+    _, out = ran
+    before = (out / "report.html").read_bytes()
+    refused = paraflex("report", str(out))
+    assert refused.returncode == 2
+    assert "is there already; say --force to write over it" in refused.stderr
+    assert paraflex("report", str(out), "--output", str(tmp_path / "again.html")).returncode == 0
+    assert (tmp_path / "again.html").read_bytes() == before
+    (out / "report.html").write_text("old")
+    assert paraflex("report", str(out / "results.nc"), "--force").returncode == 0
+    assert (out / "report.html").read_bytes() == before
+
+
+def test_the_command_in_the_report_gives_the_results_again(ran, tmp_path):
+    _, out = ran
+    html = (out / "report.html").read_text(encoding="utf-8")
+    command = text_of(re.search(r'<p class="command"><code>(.*?)</code>', html).group(1))
+    words = shlex.split(command)
+    assert words[:2] == ["paraflex", "run"]
+    again = paraflex(*words[1:], "--no-report", "--out", str(tmp_path))
+    assert again.returncode == 1, again.stderr
+    assert not (tmp_path / "report.html").exists()
+    first, second = load_results(out / "results.nc"), load_results(tmp_path / "results.nc")
+    xr.testing.assert_identical(first.drop_vars("wall_time"), second.drop_vars("wall_time"))
+
+
+def test_a_run_without_a_path_has_a_report(tmp_path):
+    done = paraflex("run", "-m", "pendulum", "--duration", "0.2", "--samples", "41", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<h1>flexible pendulum</h1>" in html
+    data = open_results(tmp_path)
+    page = told(html)
+    rows = rows_of(page["series"])
+    force = [curve for curve in chart_of(page, "forces")["curves"] if curve["name"] == "magnitude"]
+    np.testing.assert_allclose(
+        rows[force[0]["y"]], np.linalg.norm(data["joint_force"].values[:, 0], axis=-1), rtol=1e-5
+    )
+    assert {"angles", "rates", "deflections", "energies", "coordinates", "points"} <= {
+        chart["identity"] for panel in page["panels"] for chart in panel["charts"]
+    }
+    # The bob has no joint: its trail is drawn.
+    np.testing.assert_allclose(
+        array_of(page["film"]["tip"])[0], data["point_position"].sel(point="beam.tip"), atol=1e-4
+    )
+    assert motion_page(data).film is not None
+    assert film(data.drop_vars("shape"), ()) is None
+
+
+def test_verify_has_a_report(tmp_path):
+    done = paraflex("verify", "--model", "rigid", "--model", "linear", "--duration", "0.02", "--samples", "11",
+                    "--tol", "1e-4", "--out", str(tmp_path))  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    before = (tmp_path / "report.html").read_bytes()
+    assert b"paraflex verify" in before
+    assert paraflex("report", str(tmp_path), "--force").returncode == 0
+    assert (tmp_path / "report.html").read_bytes() == before
+
+
+@pytest.mark.parametrize("what", ["nothing", "sweep", "foreign"])
+def test_what_is_no_result_is_refused(tmp_path, what):
+    if what == "sweep":
+        (tmp_path / "results.parquet").write_bytes(b"")
+    if what == "foreign":
+        (tmp_path / "results.nc").write_bytes(b"no netCDF")
+    done = paraflex("report", str(tmp_path / "none" if what == "nothing" else tmp_path))
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1

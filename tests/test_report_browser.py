@@ -1,0 +1,335 @@
+"""The report as a reader has it, in a real Chromium without a window: it opens, moves, follows its keys, fits."""
+
+import os
+import shutil
+from collections import Counter
+
+import pytest
+from playwright.sync_api import Page, sync_playwright
+
+from paraflex.report import Chart, Panel, save_page, tracking_page, verification_page
+from paraflex.report import Page as ReportPage
+from reports import FAILED, MODES, tracked, verified
+
+DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
+# Of opening, on a machine that is busy with other tests as well: the best of so many is told [ms].
+OPENING, TRIES = 2000.0, 5
+
+
+def chromium() -> str | None:
+    """Where a Chromium is."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    return os.environ.get("PARAFLEX_CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = chromium()
+    if path is None:
+        message = "no Chromium: install it, or say where it is in PARAFLEX_CHROMIUM"
+        if os.environ.get("CI", "").lower() in ("1", "true"):
+            pytest.fail(message)
+        pytest.skip(message)
+    with sync_playwright() as playwright:
+        # Root, as containers have it, may not make the sandbox; the pages are our own.
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    file = tmp_path_factory.mktemp("report") / "report.html"
+    save_page(tracking_page(tracked(), FAILED), file)
+    return file
+
+
+@pytest.fixture
+def opened(browser, report):
+    """Opens a report; what its console says and what it asks of a network must be nothing in the end."""
+    complaints, contexts = [], []
+
+    def open_page(file=report, viewport=DESKTOP, **settings) -> Page:
+        contexts.append(browser.new_context(viewport=viewport, **settings))
+        page = contexts[-1].new_page()
+        page.on("console", lambda message: complaints.append(message.text) if is_ours(message.text) else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda request: complaints.append(request.url) if page_asks(request.url) else None)
+        page.goto(file.as_uri())
+        page.wait_for_function("document.documentElement.dataset.charts === 'true'")
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert complaints == []
+
+
+def is_ours(message: str) -> bool:
+    """Whether a message is not one of the driver that stands in for a graphics card."""
+    return "GL Driver Message" not in message and "WebGL-" not in message
+
+
+def page_asks(url: str) -> bool:
+    """Whether a request goes anywhere but to the file and what is in it."""
+    return not url.startswith(("file:", "data:", "blob:"))
+
+
+def drawn(page: Page) -> str:
+    """What is on the canvas, after it is painted."""
+    settle(page)
+    return page.evaluate("document.getElementById('canvas').toDataURL()")
+
+
+def settle(page: Page) -> None:
+    """Two frames of the screen: what has changed is drawn."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
+
+
+def curves(page: Page, chart: str) -> list[list[float]]:
+    """What Plotly draws in a chart, once it is in view and drawn."""
+    page.locator(f"#chart-{chart}").scroll_into_view_if_needed()
+    page.wait_for_function("(id) => document.querySelector(`#chart-${id} .js-plotly-plot .trace`)", arg=chart)
+    settle(page)
+    return page.evaluate(
+        "(id) => document.querySelector(`#chart-${id} .js-plotly-plot`).data.map((trace) => Array.from(trace.y))", chart
+    )
+
+
+def time_of(page: Page) -> float:
+    return page.evaluate("report.state.time")
+
+
+def coloured(page: Page) -> list[int]:
+    """How many pixels of the canvas have very nearly each colour of the page's palette."""
+    return page.evaluate(
+        """() => {
+            const canvas = document.getElementById("canvas");
+            const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+            return report.palette().map((colour) => {
+                const [r, g, b] = [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16));
+                let count = 0;
+                for (let k = 0; k < data.length; k += 4) {
+                    if (data[k + 3] > 200 && Math.hypot(data[k] - r, data[k + 1] - g, data[k + 2] - b) < 8) count++;
+                }
+                return count;
+            });
+        }"""
+    )
+
+
+def test_it_opens_at_once(browser, report):
+    taken = []
+    for _ in range(TRIES):
+        page = browser.new_page(viewport=DESKTOP)
+        page.goto(report.as_uri(), wait_until="commit")
+        page.wait_for_function("document.documentElement.dataset.ready === 'true'")
+        taken.append(page.evaluate("performance.getEntriesByName('ready')[0].startTime"))
+        page.close()
+        if taken[-1] < OPENING:
+            break
+    assert min(taken) < OPENING
+
+
+def test_charts_below_the_screen_wait_until_they_are_seen(opened):
+    page = opened()
+    described = page.evaluate("charts.all.length")
+    before = page.evaluate("charts.all.filter((chart) => chart.drawn).length")
+    assert 0 < before < described
+    curves(page, "strain")
+    assert page.evaluate("charts.all.filter((chart) => chart.drawn).length") > before
+    assert page.evaluate("charts.all.at(-1).drawn")
+
+
+def test_play_moves_the_mechanism_and_pause_stops_it(opened):
+    page = opened()
+    still = drawn(page)
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_function("report.state.time > 0.002")
+    moving = drawn(page)
+    assert moving != still
+    page.get_by_role("button", name="Pause").click()
+    stopped = drawn(page)
+    page.wait_for_timeout(100)
+    assert drawn(page) == stopped
+
+
+def test_the_links_are_drawn_where_the_dataset_has_them(opened):
+    page = opened()
+    page.locator("#names").uncheck()
+    page.evaluate("player.seek(0.04)")
+    settle(page)
+    counts = coloured(page)
+    assert min(counts) > 100
+    # The longest link has most of the pixels: 0.25 m and 0.1 m.
+    assert counts[0] > 1.5 * counts[1]
+
+
+def test_the_slider_and_the_keys_move_in_time(opened):
+    page = opened()
+    still = drawn(page)
+    page.locator("#scrub").fill("500")
+    assert time_of(page) == pytest.approx(0.05, abs=1e-6)
+    assert page.locator("#time").inner_text() == "0.050 s"
+    assert drawn(page) != still
+    page.locator("#canvas").focus()
+    page.keyboard.press("ArrowRight")
+    assert time_of(page) == pytest.approx(0.052, abs=1e-6)
+    page.keyboard.press("Shift+ArrowLeft")
+    assert time_of(page) == pytest.approx(0.032, abs=1e-6)
+    page.keyboard.press("Space")
+    page.wait_for_function("report.state.playing && report.state.time > 0.033")
+    page.keyboard.press("Space")
+    assert not page.evaluate("report.state.playing")
+    page.keyboard.press("End")
+    assert time_of(page) == pytest.approx(0.1)
+    page.keyboard.press("0")
+    assert time_of(page) == 0.0
+    assert drawn(page) == still
+
+
+def test_the_magnifier_bends_links_more_and_leaves_joints_alone(opened):
+    page = opened()
+    page.evaluate("player.seek(0.02)")
+    true = drawn(page)
+    page.locator("#magnify").fill("100")
+    assert page.locator("#magnified").inner_text() == "200"
+    assert drawn(page) != true
+    page.locator("#magnify").fill("0")
+    assert drawn(page) == true
+    page.locator("#canvas").focus()
+    for expected in (2, 5, 10):
+        page.keyboard.press("+")
+        assert page.evaluate("report.state.magnify") == expected
+    page.keyboard.press("-")
+    assert page.evaluate("report.state.magnify") == 5
+
+
+def test_the_selector_of_modes_changes_curves_and_mechanism(opened):
+    page = opened()
+    assert page.evaluate("report.runName()") == "++++"
+    page.evaluate("player.seek(0.05)")
+    before, picture = curves(page, "torques"), drawn(page)
+    page.locator("#runs label", has_text="+-+-").click()
+    after = curves(page, "torques")
+    assert len(before) == len(after) == 4
+    data = tracked()["torque"].values
+    for k, (one, other) in enumerate(zip(before, after, strict=True)):
+        assert one == pytest.approx(data[0, :, k].tolist(), rel=1e-5, abs=1e-30)
+        assert other == pytest.approx(data[1, :, k].tolist(), rel=1e-5, abs=1e-30)
+    assert drawn(page) != picture
+    # Another motor beside itself in all modes: the selected one is the thickest.
+    page.locator("#chart-torques select").select_option(label="τ₁, all modes")
+    settle(page)
+    assert len(curves(page, "torques")) == len(MODES)
+    widths = page.evaluate("document.querySelector('#chart-torques .js-plotly-plot').data.map((t) => t.line.width)")
+    assert widths.index(max(widths)) == 1
+    page.locator("#canvas").focus()
+    page.keyboard.press("m")
+    assert page.evaluate("report.runName()") == MODES[2]
+    assert page.locator("tr.selected th").inner_text().strip() == MODES[2]
+    page.locator("tr[data-run='0'] .pick").click()
+    assert page.evaluate("report.runName()") == MODES[0]
+
+
+def test_a_run_that_stopped_stays_where_it_ended(opened):
+    page = opened()
+    page.evaluate("report.set('run', 2); player.seek(0.06)")
+    ended = drawn(page)
+    page.evaluate("player.seek(0.05)")
+    assert drawn(page) != ended
+    gaps = [sum(value != value for value in curve) for curve in curves(page, "deflections")]
+    assert set(gaps) == {25}
+
+
+def test_a_line_in_every_chart_goes_with_time(opened):
+    page = opened()
+    curves(page, "torques")
+    places = []
+    for time in (0.02, 0.06):
+        page.evaluate(f"player.seek({time})")
+        settle(page)
+        box = page.locator("#chart-torques .cursor").bounding_box()
+        assert box is not None
+        places.append(box["x"])
+    plot = page.evaluate("charts.all.find((c) => c.told.identity === 'torques').plot._fullLayout.xaxis._length")
+    assert places[1] - places[0] == pytest.approx(0.4 * plot, rel=0.02)
+    # In the plane a dot goes along the path.
+    page.locator("#chart-path").scroll_into_view_if_needed()
+    settle(page)
+    assert page.locator("#chart-path .dot").first.is_visible()
+
+
+def test_the_legend_hides_a_curve(opened):
+    page = opened()
+    curves(page, "torques")
+    button = page.locator("#chart-torques .legend button").first
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+    assert page.evaluate("document.querySelector('#chart-torques .js-plotly-plot').data[0].visible") == "legendonly"
+
+
+@pytest.mark.parametrize("viewport", [PHONE, {"width": 820, "height": 1100}, DESKTOP], ids=["phone", "tablet", "desk"])
+def test_nothing_is_wider_than_the_screen(opened, viewport):
+    page = opened(viewport=viewport)
+    curves(page, "phases")
+    assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
+
+
+def test_dark_and_light_follow_the_system_and_the_button(opened):
+    page = opened(color_scheme="dark")
+    ground = "getComputedStyle(document.body).backgroundColor"
+    ink = "document.querySelector('#chart-errors .js-plotly-plot').layout.font.color"
+    dark = page.evaluate(ground), page.evaluate(ink), drawn(page)
+    page.emulate_media(color_scheme="light")
+    settle(page)
+    light = page.evaluate(ground), page.evaluate(ink), drawn(page)
+    assert all(one != other for one, other in zip(dark, light, strict=True))
+    button = page.locator("#theme")
+    for expected in ("light", "dark"):
+        button.click()
+        assert button.get_attribute("aria-label") == f"Theme: {expected}"
+    settle(page)
+    assert (page.evaluate(ground), page.evaluate(ink)) == dark[:2]
+
+
+def test_everything_is_reached_by_keyboard_and_has_a_name(opened):
+    page = opened()
+    nameless = page.evaluate(
+        """[...document.querySelectorAll("main button, main input, main select, canvas")].filter((one) =>
+            !(one.getAttribute("aria-label") || one.textContent.trim() || (one.labels && one.labels.length))
+        ).map((one) => one.outerHTML)"""
+    )
+    assert nameless == []
+    seen = Counter()
+    page.locator("#theme").focus()
+    for _ in range(14):
+        page.keyboard.press("Tab")
+        name, outline = page.evaluate(
+            """() => {
+                const one = document.activeElement, shown = one.type === "radio" ? one.parentElement : one;
+                return [one.id || one.name || one.className, getComputedStyle(shown).outlineStyle];
+            }"""
+        )
+        seen[name] += 1
+        assert outline == "solid"
+    assert {"play", "scrub", "run", "canvas", "magnify", "speed", "ghost", "trail", "names"} <= set(seen)
+
+
+def test_models_of_a_verification_move_and_are_overlaid(opened, tmp_path):
+    save_page(verification_page(*verified()), tmp_path / "report.html")
+    page = opened(tmp_path / "report.html")
+    page.evaluate("player.seek(0.03)")
+    picture = drawn(page)
+    assert len(curves(page, "angle_differences")) == 3
+    page.locator("#runs label", has_text="rigid").click()
+    assert drawn(page) != picture
+
+
+def test_parallel_coordinates_are_drawn_too(opened, tmp_path):
+    dimensions = [{"label": "x", "values": [1, 2]}, {"label": "y", "values": [3, 4]}]
+    chart = Chart("all", "All", "", figure={"data": [{"type": "parcoords", "dimensions": dimensions}], "layout": {}})
+    save_page(ReportPage("a", "sweep", panels=[Panel("All", [chart])]), tmp_path / "a.html")
+    page = opened(tmp_path / "a.html")
+    page.locator("#chart-all").scroll_into_view_if_needed()
+    page.wait_for_function("document.querySelector('#chart-all .parcoords')")
