@@ -72,8 +72,10 @@ const charts = (() => {
       // What the reader zoomed to stays while other runs are looked at.
       uirevision: `${chart.choice} ${chart.picked}`,
     };
-    if (figure && figure.layout.noAxes) return { ...common, margin: figure.layout.margin };
-    if (figure) return { ...common, ...figure.layout, xaxis: axis(chart.told.x, figure.layout.xaxis), yaxis: axis(chart.told.y, figure.layout.yaxis) };
+    if (figure) {
+      const { xaxis, yaxis, noAxes, ...own } = figure.layout || {};
+      return { ...common, ...own, ...(noAxes ? {} : { xaxis: axis(chart.told.x, xaxis), yaxis: axis(chart.told.y, yaxis) }) };
+    }
     return {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
