@@ -11,16 +11,8 @@ import pytest
 from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable
 from paraflex.plots.responses import undominated
-from paraflex.report.designs import (
-    MOST_RUNS,
-    Studied,
-    best_runs,
-    drawn_rows,
-    fronts,
-    in_conflict,
-    read_studied,
-    reasons,
-)
+from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows, fronts, in_conflict
+from paraflex.report.designs import Studied, read_studied, reasons
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
 from paraflex.studies.sweeps.report import study_page

@@ -69,7 +69,8 @@ def traces(page: Page, chart: str) -> list[dict]:
     settle(page)
     return page.evaluate(
         """(id) => document.querySelector(`#chart-${id} .js-plotly-plot`).data.map((trace) => ({
-            mode: trace.mode || trace.type, name: trace.name, x: Array.from(trace.x || []), y: Array.from(trace.y || []),
+            mode: trace.mode || trace.type, name: trace.name,
+            x: Array.from(trace.x || []), y: Array.from(trace.y || []),
             customdata: Array.from(trace.customdata || []),
         }))""",
         chart,

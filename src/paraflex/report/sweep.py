@@ -8,24 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from paraflex.report.curves import compared, followed, look, plane_path, thinned
-from paraflex.report.designs import (
-    Picked,
-    Studied,
-    columns,
-    drawn_rows,
-    in_conflict,
-    metric_name,
-    reasons,
-    shown_unit,
-)
+from paraflex.report.choice import Picked, drawn_rows
+from paraflex.report.curves import compared, followed, plane_path, thinned
+from paraflex.report.designs import Studied, columns, metric_name, reasons, shown_unit
 from paraflex.report.film import film
-from paraflex.report.page import Chart, Column, Curve, Designs, Look, Page, Panel, Picker
+from paraflex.report.page import Page, Panel
+from paraflex.report.survey import LOWER, Step, drawn_designs, survey
 from paraflex.report.text import NOTHING, count, number, table
 
-LOWER = "Less is taken as better in every metric."
 _NO_RUN = "None of the best designs was simulated again, so there is no animation."
 # Of the table of best designs; others are in the study's table.
 _MOST_COLUMNS = 12
@@ -46,14 +37,6 @@ class Parameter(NamedTuple):
     low: float
     high: float
     spread: str
-
-
-class Step(NamedTuple):
-    """A design of a search: its number, its objective (NaN where it failed), and whether limits hold."""
-
-    number: int
-    objective: float
-    allowed: bool
 
 
 @dataclass(frozen=True)
@@ -116,8 +99,8 @@ def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount
         subtitle=_subtitle(studied, account),
         facts=account.facts,
         figures=_tiles(studied, account),
-        survey=_survey(studied, rows, drawn, account) if rows.size else [],
-        designs=_designs(studied, rows, drawn, {row: k for k, row in enumerate(shown)}) if rows.size else None,
+        survey=survey(studied, rows, drawn, account.history) if rows.size else [],
+        designs=drawn_designs(studied, rows, drawn, {row: k for k, row in enumerate(shown)}) if rows.size else None,
         tables=[("Best designs", _best_table(studied, picked, list(shown), units))] if picked else [],
         more=[("What was varied", _parameter_table(account)), *_trouble(studied)],
         panels=[] if few is None else _panels(few, labels),
@@ -178,76 +161,6 @@ def _tiles(studied: Studied, account: StudyAccount) -> list[tuple[str, str, str]
             value = f"{number(values[row], factor)} {unit}".rstrip()
             tiles.append((metric_name(name), value, f"least, of {studied.label(row)}"))
     return tiles
-
-
-def _survey(studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], account: StudyAccount) -> list[Panel]:
-    """What all designs do."""
-    parameters = [k for k, column in enumerate(drawn) if column.parameter]
-    metrics = [k for k, column in enumerate(drawn) if not column.parameter]
-    place = {column.identity: k for k, column in enumerate(drawn)}
-    charts = []
-    if account.history:
-        charts.append(_history(account.history))
-    if parameters and metrics:
-        charts += _responses(parameters, metrics)
-    if len(metrics) > 1:
-        pair = [place[name] for name in in_conflict(studied)]
-        first, second = pair if len(pair) == 2 else metrics[:2]
-        charts.append(Chart(
-            "front", "Pareto front", "metric", x="metric", over_time=False, drawer="front",
-            pickers=[Picker("across", metrics, metrics.index(first)), Picker("up", metrics, metrics.index(second))],
-            note=f"Large, joined: no run of the same mode is better in one and as good in the other. {LOWER}",
-        ))  # fmt: skip
-    if metrics:
-        charts.append(Chart(
-            "distribution", "Distribution", "runs", x="metric", over_time=False, drawer="distribution",
-            pickers=[Picker("of", metrics)],
-        ))  # fmt: skip
-        charts.append(Chart(
-            "parallel", "All numbers of each run", "metrics", x="parameters", over_time=False, drawer="parallel",
-            pickers=[Picker("coloured by", metrics)],
-            note="A line a run. Drag along an axis to keep the runs that pass there; drag names to reorder.",
-        ))  # fmt: skip
-    return [Panel(_drawn(studied, rows), charts)] if charts else []
-
-
-def _responses(parameters: Sequence[int], metrics: Sequence[int]) -> list[Chart]:
-    """Two charts of the same kind to look at side by side: of the first two parameters, or metrics."""
-    note = "A mark a run; thick, the median over the other parameters." if len(parameters) > 1 else "A mark a run."
-    starts = [(0, 0), (0, 1)] if len(parameters) > 1 else [(k, 0) for k in range(min(2, len(metrics)))]
-    return [
-        Chart(
-            f"responses{k + 1}", "Response", "metric", x="parameter", over_time=False, drawer="responses",
-            pickers=[Picker("of", metrics, metric), Picker("to", parameters, parameter)], note=note,
-        )
-        for k, (metric, parameter) in enumerate(starts)
-    ]  # fmt: skip
-
-
-def _drawn(studied: Studied, rows: NDArray[np.intp]) -> str:
-    complete = int(np.count_nonzero(studied.table.complete))
-    if rows.size == complete:
-        return f"All designs: {count(complete)} runs"
-    return (
-        f"{count(rows.size)} of {count(complete)} complete runs, drawn by lot; the best and those of the fronts are "
-        "among them"
-    )
-
-
-def _designs(studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], shown: Mapping[int, int]) -> Designs:
-    table = studied.table
-    pairs = list(dict.fromkeys(zip(table.path.tolist(), table.mode.tolist(), strict=True)))
-    several_paths, several_modes = (len({pair[k] for pair in pairs}) > 1 for k in (0, 1))
-    names = [", ".join([mode] * several_modes + [path] * several_paths) or mode for path, mode in pairs]
-    known = {pair: k for k, pair in enumerate(pairs)}
-    return Designs(
-        columns=drawn,
-        telling="mode" if several_modes or not several_paths else "path",
-        series=[(name, look(k)) for k, name in enumerate(names)],
-        member=[known[str(table.path[row]), str(table.mode[row])] for row in rows],
-        number=studied.design[rows],
-        shown=[shown.get(int(row), -1) for row in rows],
-    )
 
 
 def _best_table(studied: Studied, picked: Sequence[Picked], shown: Sequence[int], units: Mapping[str, str]) -> str:
@@ -331,18 +244,3 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     energy = data["strain_energy"].transpose("mode", "time").values
     charts.append(compared("strain", "Strain energy", "strain energy", "J", energy, runs))
     return [Panel("The best designs in motion", charts)]
-
-
-def _history(steps: Sequence[Step]) -> Chart:
-    """Objectives of a search in the order its designs were looked at, and the least until then."""
-    numbers = np.array([step.number for step in steps], dtype=float)
-    values = np.array([step.objective for step in steps], dtype=float)
-    allowed = np.array([step.allowed for step in steps], dtype=bool)
-    least = np.minimum.accumulate(np.where(allowed & np.isfinite(values), values, np.inf))
-    curves = [
-        Curve("a design", values, numbers, Look(4, 2)),
-        Curve("least until then", np.where(np.isfinite(least), least, np.nan), numbers, Look(0)),
-    ]
-    known = values[np.isfinite(values)]
-    wide = bool(known.size and known.min() > 0.0 and known.max() > 50.0 * known.min())
-    return Chart("history", "Convergence", "objective", curves, x="design", over_time=False, log=wide)

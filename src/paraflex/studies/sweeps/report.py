@@ -17,8 +17,10 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.errors import InputError, ParaflexError
 from paraflex.files import model_from
 from paraflex.report import Page
-from paraflex.report.designs import Picked, Studied, best_runs, read_studied
-from paraflex.report.sweep import Parameter, Step, StudyAccount, sweep_page
+from paraflex.report.choice import MOST_RUNS, Picked, best_runs
+from paraflex.report.designs import Studied, read_studied
+from paraflex.report.survey import Step
+from paraflex.report.sweep import Parameter, StudyAccount, sweep_page
 from paraflex.studies.sweeps.reopen import StudyFolder, open_study, reason_of, run_again
 from paraflex.studies.sweeps.run import Abandoned
 from paraflex.studies.sweeps.table import RESULTS, parts
@@ -64,7 +66,7 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
         mechanism=study.setting.source,
         total=study.runs,
         parameters=_parameters(study, studied),
-        facts=_facts(study),
+        facts=_facts(study, found),
         runs=runs,
         failed=failed,
         history=[Step(n, np.nan if value is None else value, bool(holds)) for n, value, holds in _history(found)],
@@ -124,10 +126,10 @@ def _parameters(study: StudyFolder, studied: Studied) -> dict[str, Parameter]:
     return out
 
 
-def _facts(study: StudyFolder) -> list[tuple[str, str]]:
+def _facts(study: StudyFolder, found: Mapping[str, Any]) -> list[tuple[str, str]]:
     setting = study.setting
     told = setting.integration
-    facts = [("sampling", study.sampling)]
+    facts = [("search", str(found["method"]))] if "method" in found else [("sampling", study.sampling)]
     if setting.duration is not None:
         facts.append(("duration", f"{setting.duration:g} s"))
     for name, unit in (("method", ""), ("tolerance", " m"), ("step", " s"), ("constraints", "")):
@@ -180,6 +182,6 @@ def _searched(studied: Studied, found: Mapping[str, Any], picked: Sequence[Picke
     for row, why in picked:
         if row in out:
             out[row] += why
-        elif len(out) < 8:
+        elif len(out) < MOST_RUNS:
             out[row] = list(why)
     return [Picked(row, tuple(why)) for row, why in out.items()]
