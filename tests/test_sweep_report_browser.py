@@ -112,7 +112,7 @@ def test_selectors_of_metric_and_parameter_change_the_response(opened):
 
 def test_a_grid_is_joined_by_lines_and_medians(opened):
     page = opened()
-    marks, lines, middles = traces(page, "responses1")[:3]
+    marks, _, lines, middles = traces(page, "responses1")[:4]
     assert (lines["mode"], middles["mode"]) == ("lines", "lines")
     # Three masses, each a line over three thicknesses and a gap.
     assert len(lines["x"]) == 3 * 4

@@ -105,7 +105,7 @@ def drawn_designs(
     known = {pair: k for k, pair in enumerate(pairs)}
     return Designs(
         columns=drawn,
-        telling="mode" if several_modes or not several_paths else "path",
+        telling=", ".join(["mode"] * several_modes + ["path"] * several_paths) or "mode",
         series=[(name, look(k)) for k, name in enumerate(names)],
         member=[known[str(table.path[row]), str(table.mode[row])] for row in rows],
         number=studied.design[rows],

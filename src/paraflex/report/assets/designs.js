@@ -33,8 +33,14 @@ const designs = (() => {
     const title = { text: plain(label(column)), standoff: 8, font: { size: 12.5 } };
     if (!log) return { title, type: "linear", hoverformat: ".4~g", ...more };
     const known = values.filter((value) => value > 0);
-    const wide = Math.max(...known) > 10 * Math.min(...known);
-    return { title, type: "log", dtick: wide ? undefined : "D2", tickformat: "~g", hoverformat: ".4~g", ...more };
+    const most = known.reduce((a, b) => Math.max(a, b), 0), least = known.reduce((a, b) => Math.min(a, b), Infinity);
+    return { title, type: "log", dtick: most > 200 * least ? 1 : "D2", tickformat: "~g", hoverformat: ".4~g", ...more };
+  }
+
+  // Numbers of axes without powers of ten where they are of a common size.
+  function formatOf(values) {
+    const most = values.reduce((a, b) => (Number.isFinite(b) ? Math.max(a, Math.abs(b)) : a), 0);
+    return most >= 1e-3 && most < 1e6 ? ".3~r" : ".3~g";
   }
 
   // Marks of some rows in the look of their series; hovered, they tell their design.
@@ -114,15 +120,16 @@ const designs = (() => {
 
   function responses(y, x) {
     const several = columns.filter((column) => column.parameter).length > 1;
-    const data = members.flatMap((rows, k) => {
-      const out = [marks(rows, k, x, y)];
+    const data = members.map((rows, k) => marks(rows, k, x, y));
+    const over = members.flatMap((rows, k) => {
+      const out = [];
       const lines = gridLines(rows, x, y);
       const quiet = { type: "scatter", mode: "lines", hoverinfo: "skip", legendgroup: `${k}`, showlegend: false };
       if (lines) out.push({ ...quiet, x: lines.x, y: lines.y, line: lineOf(k, lines.alone ? 1.8 : 0.8), opacity: lines.alone ? 1 : 0.55 });
       if (several && (!lines || !lines.alone) && rows.length > 4) out.push({ ...quiet, ...medians(rows, x, y), line: { ...lineOf(k, 2.6), shape: "linear" } });
       return out;
     });
-    return { data: [...data, ...ring(x, y)], layout: { ...legend(), xaxis: axisOf(x), yaxis: axisOf(y) } };
+    return { data: [...data, ...over, ...ring(x, y)], layout: { ...legend(), xaxis: axisOf(x), yaxis: axisOf(y) } };
   }
 
   // Rows, in order of x, that no other is below in one number without being above in the other.
@@ -155,10 +162,12 @@ const designs = (() => {
     const low = all.reduce((a, b) => Math.min(a, b), Infinity), high = all.reduce((a, b) => Math.max(a, b), -Infinity);
     const bins = Math.min(40, Math.max(8, Math.round(3 * Math.cbrt(Math.max(...known.map((values) => values.length))))));
     const size = (high - low) / bins || 1;
+    let most = 0;
     const back = (value) => (log ? 10 ** value : value);
     const data = known.map((values, k) => {
       const counts = new Array(bins).fill(0);
       for (const value of values) counts[Math.min(bins - 1, Math.max(0, Math.floor((value - low) / size)))]++;
+      most = Math.max(most, ...counts);
       const edges = counts.flatMap((_, bin) => [back(low + bin * size), back(low + (bin + 1) * size)]);
       return {
         type: "scatter", mode: "lines", fill: "tozeroy", fillcolor: `${colour(k)}30`, name: plain(series[k].name), line: lineOf(k, 1.8),
@@ -166,7 +175,7 @@ const designs = (() => {
         hovertemplate: `%{y} runs<extra>${plain(series[k].name)}</extra>`,
       };
     });
-    return { data, layout: { ...legend(), xaxis: axisOf(x), yaxis: { title: { text: "runs", standoff: 8, font: { size: 12.5 } }, rangemode: "tozero", tickformat: "d" } } };
+    return { data, layout: { ...legend(), xaxis: axisOf(x), yaxis: { title: { text: "runs", standoff: 8, font: { size: 12.5 } }, rangemode: "tozero", tickformat: "d", dtick: most <= 8 ? 1 : undefined } } };
   }
 
   // Small values stand out, for less is better.
@@ -197,24 +206,24 @@ const designs = (() => {
       const values = rows.map((row) => columns[k].values[row]), logged = columns[k].log;
       const scaled = logged ? values.map(Math.log10) : values;
       const ticks = logged ? logTicks(values) : {};
-      return { label: plain(short(columns[k].name)) + (columns[k].unit ? `<br>[${columns[k].unit}]` : ""), values: scaled, tickformat: ".3~g", ...ticks };
+      return { label: plain(short(columns[k].name)) + (columns[k].unit ? `<br>[${columns[k].unit}]` : ""), values: scaled, tickformat: formatOf(values), ...ticks };
     });
     return {
       data: [{
         type: "parcoords", dimensions: [...named, ...dimensions], labelfont: { size: 12 }, tickfont: { size: 10.5 }, rangefont: { size: 10, color: "rgba(0,0,0,0)" }, labelside: "top",
         line: {
           color: log ? values.map(Math.log10) : values, colorscale: scales[report.isDark() ? "dark" : "light"], showscale: true,
-          colorbar: { thickness: 12, outlinewidth: 0, tickfont: { size: 10.5 }, title: { text: plain(columns[judge].unit ? `[${columns[judge].unit}]` : ""), font: { size: 11 } }, ...(log ? logTicks(values) : { tickformat: ".3~g" }) },
+          colorbar: { thickness: 12, outlinewidth: 0, tickfont: { size: 10.5 }, title: { text: plain(columns[judge].unit ? `[${columns[judge].unit}]` : ""), font: { size: 11 } }, ...(log ? logTicks(values) : { tickformat: formatOf(values) }) },
         },
         unselected: { line: { color: report.colour("line"), opacity: 0.25 } },
       }],
-      layout: { noAxes: true, margin: { l: 62, r: 40, t: 62, b: 24 } },
+      layout: { noAxes: true, margin: { l: Math.max(62, 26 + 7.5 * Math.max(...series.map((one) => short(one.name).length))), r: 40, t: 62, b: 24 } },
     };
   }
 
   function logTicks(values) {
     const known = values.filter((value) => value > 0);
-    const low = Math.min(...known), high = Math.max(...known), ticks = [];
+    const low = known.reduce((a, b) => Math.min(a, b), Infinity), high = known.reduce((a, b) => Math.max(a, b), 0), ticks = [];
     const digits = high > 200 * low ? [1] : [1, 2, 5];
     for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
       for (const digit of digits) {
