@@ -58,7 +58,7 @@ STUDIES = {
     + '[[target]]\nmetric = "tracking_rms"\nvalue = 1.23e-4\n'
     + '[[target]]\nmetric = "peak_torque_max"\nvalue = 8.441\n'
     + '[[target]]\nmetric = "deflection_max"\nvalue = 4.519e-3\n'
-    + "[search]\nevaluations = 60\n"
+    + '[search]\nevaluations = 40\ngradients = "exact"\n'
     + VARIED,
     "indices": METRICS + SHARED + "[sampling]\nnumber = 32\nseed = 1\n" + VARIED,
     "sensitivity": METRICS + SHARED + VARIED,
@@ -107,8 +107,8 @@ take `--mode`, which may be repeated; the others show the modes named, or all. F
 `--style single` makes them 84 mm wide, one column of most journals, and `--style double` 174 mm, two columns; panels
 that do not fit beside one another stand below one another. Text is 8 pt, numbers on axes 7 pt, fonts are embedded in
 PDF as TrueType. Colours are those of Okabe and Ito, and lines differ in their dashes as well, so that they are told
-apart in grey and by colour-blind readers. Files go to `figures/` in the folder of the results, or to `--output`; nothing
-is written over without `--force`.
+apart in grey and by colour-blind readers. Files go to `figures/` in the folder of the results, or to `--output`;
+nothing is written over without `--force`.
 
 In Python each is a function of `paraflex.plots`:
 
@@ -180,11 +180,11 @@ def entry(figure: CatalogueFigure, source: Source, *, again: bool) -> str:
 
 
 def shrink(file: Path) -> None:
-    """A picture of at most 64 colours: line drawings need no more."""
+    """A picture of at most 160 colours: line drawings need no more."""
     from PIL import Image
 
     with Image.open(file) as picture:
-        small = picture.convert("RGB").quantize(64, dither=Image.Dither.NONE)
+        small = picture.convert("RGB").quantize(160, dither=Image.Dither.NONE)
     small.save(file, optimize=True)
 
 

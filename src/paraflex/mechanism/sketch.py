@@ -161,6 +161,6 @@ def _joint(name: str, place: Place, *, slides: bool) -> str:
     told = f"<title>{escape(name)}</title>"
     look = 'fill="currentColor" fill-opacity="0.25" stroke="currentColor" stroke-width="1.2"'
     if slides:
-        place = f'x="{x - 1.6 * r:.1f}" y="{y - r:.1f}" width="{3.2 * r:.1f}" height="{2.0 * r:.1f}"'
-        return f"<rect {place} {look}>{told}</rect>"
+        corner = f'x="{x - 1.6 * r:.1f}" y="{y - r:.1f}" width="{3.2 * r:.1f}" height="{2.0 * r:.1f}"'
+        return f"<rect {corner} {look}>{told}</rect>"
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}" {look}>{told}</circle>'

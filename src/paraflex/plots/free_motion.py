@@ -17,7 +17,7 @@ _MOST, _STILL = 7, 1e-3
 # Coordinates that change by less rest, but for rounding.
 _NOTHING = 1e-12
 # Of modal coordinates, what they are by the last part of their names.
-_KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1.0)}
+_KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1e3)}
 
 
 @journal_style()

@@ -38,7 +38,7 @@ QUANTITIES = {
     "force": Quantity("force", "", "N"),
     "energy": Quantity("energy", "", "J"),
     "condition": Quantity("condition number", "", "1"),
-    "flexible": Quantity("modal coordinate", r"$\eta$", "m kg$^{1/2}$"),
+    "flexible": Quantity("modal coordinate", r"$\eta$", "mm kg$^{1/2}$"),
     "wall_time": Quantity("wall time", "", "s"),
 }
 

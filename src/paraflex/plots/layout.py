@@ -67,6 +67,11 @@ def column_width(style: str | None) -> Iterator[None]:
         _width.reset(before)
 
 
+def page_width(width: float) -> float:
+    """The width that `column_width` asks for, else this one [mm]."""
+    return _width.get() or width
+
+
 def figure_width(panel: Axes) -> float:
     """Width of the figure that a panel is in [mm]."""
     figure = panel.figure
@@ -76,7 +81,7 @@ def figure_width(panel: Axes) -> float:
 
 def is_narrow(width: float = TWO_COLUMNS) -> bool:
     """Whether a figure that would take this width [mm] is to stand in one column."""
-    return (_width.get() or width) < 0.75 * TWO_COLUMNS
+    return page_width(width) < 0.75 * TWO_COLUMNS
 
 
 def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
@@ -84,7 +89,7 @@ def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figu
 
     In `column_width` the width is that asked for.
     """
-    width = _width.get() or width
+    width = page_width(width)
     figure = Figure(figsize=(width * MM, width * MM))
     return figure, figure.subplots(rows, columns, squeeze=False)
 

@@ -123,8 +123,8 @@ def sobol_bars(figures: Mapping[str, Any]) -> Figure:
         panel.set_title(_panel_name(name, list(panels_of)), loc="left")
     for panel in axes.flat[len(panels_of) :]:
         panel.set_visible(False)
-    for column in axes.T:
-        [panel for panel in column if panel.get_visible()][-1].set_xlabel("share of the variance")
+    for panel in axes.flat:
+        panel.set_xlabel("share of the variance" if panel.get_visible() else "")
     most = max(len(parameters) for parameters in panels_of.values())
     return lay_out(figure, axes, panel_height=1.6 * _LINE * most + 2.0)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable
-from paraflex.plots.labels import mode_label, plain
+from paraflex.plots.labels import mode_label, peak, plain, power_of_ten
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
 from paraflex.plots.style import journal_style, look_of
 
@@ -50,11 +51,12 @@ def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) ->
     for row, metric in zip(axes, rows, strict=True):
         label, factor = table.labelled(metric)
         for panel, parameter in zip(row, columns, strict=True):
+            scale = _scale(table.parameters[parameter])
             for k, (pair, runs) in enumerate(series.items()):
-                x, y = runs.parameters[parameter], factor * runs.metrics[metric]
+                x, y = runs.parameters[parameter] / scale, factor * runs.metrics[metric]
                 _draw_response(panel, x, y, k, _series_name(pair, table), alone=len(table.varied) == 1)
             panel.margins(x=0.05)
-            panel.set_xlabel(plain(parameter))
+            panel.set_xlabel(plain(parameter) + (f" [{power_of_ten(scale)}]" if scale != 1.0 else ""))
             panel.locator_params(axis="x", nbins=5)
         row[0].set_ylabel(label)
     return lay_out(figure, axes, panel_height=42.0 if len(rows) > 1 else 52.0)
@@ -71,6 +73,12 @@ def _draw_response(panel: Axes, x: Array, y: Array, number: int, name: str, *, a
     panel.plot(x, y, linestyle="none", **mark, markersize=2.2, markeredgewidth=0.0, alpha=shade)
     middles = _medians(x[order], y[order])
     panel.plot(*middles, **look, linewidth=1.3, label=f"{name}, median")
+
+
+def _scale(values: Array) -> float:
+    """A power of a thousand that leaves few zeros in very large or small numbers; 1 for all others."""
+    size = peak(values)
+    return 1.0 if size == 0.0 or 1e-3 <= size < 1e5 else 1e3 ** math.floor(math.log10(size) / 3.0)
 
 
 def _medians(x: Array, y: Array) -> tuple[Array, Array]:
@@ -118,7 +126,7 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
         known = np.isfinite(x) & np.isfinite(y)
         x, y, name, look = x[known], y[known], _series_name(pair, table), look_of(k)
         mark: dict[str, Any] = {"marker": _MARKS[k % len(_MARKS)], "color": look["color"], "markersize": 2.4}
-        panel.plot(x, y, linestyle="none", alpha=0.35, markeredgewidth=0.0, **mark, label=name)
+        panel.plot(x, y, linestyle="none", alpha=0.35, markeredgewidth=0.0, **mark, label=f"{name}, designs")
         front = undominated(x, y)
         panel.plot(
             x[front], y[front], **look | mark | {"markersize": 3.4}, drawstyle="steps-post", label=f"{name}, front"

@@ -1,0 +1,261 @@
+"""What objects show in notebooks: well-formed HTML, the right numbers, text escaped, colours of the page."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import paraflex as pf
+from made_up import STUDY, made_up, write_study
+from paraflex.display import facts, table, written
+from paraflex.errors import IntegrationError
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism.html import freedoms, mechanism_html
+from paraflex.mechanism.sketch import places_of, sketch
+from paraflex.motion import simulate_motion
+from paraflex.results import tracking_dataset
+from paraflex.studies import (
+    Measurement,
+    MethodComparison,
+    Reference,
+    Sensitivities,
+    load_optimisation,
+    load_sweep,
+    optimise,
+    run_study,
+    sweep,
+    verify,
+)
+from paraflex.studies.html import identification_html, indices_html
+from paraflex.studies.optimisation import IdentificationResult, IndicesResult, Reached, SobolIndices, Target
+from paraflex.studies.sweeps import SweepResult
+
+_EMPTY = {"circle", "path", "rect", "br", "polygon", "polyline"}
+EVIL = '<script>alert("x")</script> & co'
+
+
+class _Reader(HTMLParser):
+    """Rows of tables as text, and whether every element is closed in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.rows: list[list[str]] = []
+        self.names: set[str] = set()
+        self.text = ""
+
+    def handle_starttag(self, tag, attrs) -> None:
+        self.names.add(tag)
+        self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_startendtag(self, tag, attrs) -> None:
+        self.names.add(tag)
+
+    def handle_endtag(self, tag) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, text) -> None:
+        self.text += text
+        if {"td", "th"} & set(self.open):
+            self.rows[-1][-1] += text
+
+
+def read(thing: object) -> _Reader:
+    html = thing if isinstance(thing, str) else thing._repr_html_()  # pyright: ignore[reportAttributeAccessIssue]
+    reader = _Reader()
+    reader.feed(html)
+    reader.close()
+    assert reader.open == []
+    # The page's own colours, light or dark.
+    assert "background" not in html
+    assert "color: #" not in html
+    assert "script" not in reader.names
+    return reader
+
+
+def row(reader: _Reader, name: str) -> list[str]:
+    (found,) = [cells for cells in reader.rows if cells[0] == name]
+    return found
+
+
+@pytest.fixture(scope="module")
+def task():
+    model = pf.load("five_bar")
+    return pf.plan_tracking(model.mechanism, model.path("line"), duration=0.05, samples=26)
+
+
+@pytest.fixture(scope="module")
+def run(task):
+    return task.simulate("++")
+
+
+@pytest.mark.parametrize("name", pf.library_names())
+def test_every_mechanism_of_the_library_shows_itself(name: str) -> None:
+    mechanism = pf.load(name).mechanism
+    shown = read(mechanism)
+    for body in mechanism.bodies:
+        assert row(shown, body.name)
+    for joint in mechanism.joints:
+        assert f"{joint.a} – {joint.b}" in [cells[-1] for cells in shown.rows]
+    assert "svg" in shown.names
+
+
+def test_counts_of_a_mechanism() -> None:
+    shown = read(pf.load("raparm_i"))
+    assert row(shown, "bodies") == ["bodies", "8, 8 of them flexible"]
+    assert row(shown, "closed loops")[1] == "3"
+    assert row(shown, "degrees of freedom (Grübler)")[1] == "2"
+    assert "tau1 at A1 [N m]" in row(shown, "motors")[1]
+    assert row(shown, "link2") == ["link2", "flexible beam", "0.1", "D1, E1"]
+    assert row(shown, "study: path")[1] == "square"
+    assert "held rigid" in read(pf.load("five_bar").mechanism.with_bodies(
+        [replace(pf.load("five_bar").mechanism.bodies[0], flexible=False)])).text  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("slider_crank", 1), ("3rrr", 3), ("3prr", 3), ("pendulum", 1), ("four_bar", 0), ("andrews", 1)],
+)
+def test_freedoms_as_gruebler_counts_them(name: str, expected: int) -> None:
+    assert freedoms(pf.load(name).mechanism) == expected
+
+
+def test_names_are_escaped() -> None:
+    mechanism = replace(pf.load("five_bar").mechanism, name=EVIL, description="1 < 2")
+    html = mechanism_html(mechanism)
+    assert EVIL not in html
+    assert "&lt;script&gt;" in html
+    shown = read(html)
+    assert EVIL in shown.text
+    assert "1 < 2" in shown.text
+    assert "<b>" not in table(["<b>"], [["<b>", 1.0]], "<b>") + facts([("<b>", "<b>")])
+
+
+def test_the_sketch_puts_links_end_to_end() -> None:
+    mechanism = pf.load("raparm_i").mechanism
+    places = places_of(mechanism)
+    angles = mechanism.assemblies[0].angles
+    for body in mechanism.bodies:
+        first, last = places[body.name][next(iter(body.points))], places[body.name][list(body.points)[-1]]
+        length = max(body.points.values()) - min(body.points.values())  # pyright: ignore[reportArgumentType, reportAttributeAccessIssue]
+        assert np.hypot(last[0] - first[0], last[1] - first[1]) == pytest.approx(length)
+        assert np.arctan2(last[1] - first[1], last[0] - first[0]) == pytest.approx(angles[body.name])
+    assert places["link1"]["A1"] == mechanism.ground["A1"]
+    assert places["link1"]["B1"] == pytest.approx(places["link4"]["B1"])
+    drawn = sketch(mechanism)
+    assert drawn.count("<polyline") == 8
+    assert drawn.count("<circle") == 11
+    assert sketch(replace(mechanism, assemblies=())) == ""
+    assert "<polygon" in sketch(pf.load("3rrr").mechanism)
+    assert sketch(pf.load("3prr").mechanism).count("<rect") == 3
+
+
+def test_a_slider_hangs_on_its_rod_not_on_its_axis() -> None:
+    places = places_of(pf.load("slider_crank").mechanism)
+    slider, rod = list(places.values())[-1], list(places.values())[1]
+    assert any(place == pytest.approx(end) for place in slider.values() for end in rod.values())
+
+
+def test_a_tracking_run_tells_what_its_dataset_does(run) -> None:
+    shown = read(run)
+    data = tracking_dataset([run]).isel(mode=0)
+    assert "complete" in shown.text
+    assert row(shown, "tracking error, RMS")[1] == f"{1e3 * float(data['tracking_rms']):.4g} mm"
+    bent = np.hypot(data["tip_axial"], data["tip_transverse"]).max()
+    assert row(shown, "largest deflection")[1] == f"{1e3 * float(bent):.4g} mm"
+    for motor in data["motor"].values:
+        peak, rms = (float(data[key].sel(motor=motor)) for key in ("peak_torque", "rms_torque"))
+        assert row(shown, str(motor)) == [str(motor), "active", f"{peak:.4g}", f"{rms:.4g}", "N m"]
+    assert row(shown, "steps")[1].startswith(f"{run.solution.steps},")
+
+
+def test_a_run_that_failed_says_why(task) -> None:
+    with pytest.raises(IntegrationError) as caught:
+        task.simulate("++", options=IntegrationOptions(max_steps=3))
+    shown = read(caught.value.partial)
+    assert "failed" in shown.text
+    assert caught.value.partial.solution.message in shown.text
+
+
+def test_a_motion_run() -> None:
+    run = simulate_motion(pf.load("pendulum").mechanism, 0.05, samples=6)
+    shown = read(run)
+    assert "complete at t = 0.05 s" in shown.text
+    assert row(shown, "kinetic energy, largest")[1] == f"{run.solution.kinetic_energy.max():.4g} J"
+    x, y = (float(cell) for cell in row(shown, "beam.tip")[1:])
+    assert np.hypot(x, y) == pytest.approx(0.6, rel=2e-3)
+
+
+def test_a_study_with_a_mode_that_cannot(task) -> None:
+    result = run_study(task, ["++", "+-"])
+    shown = read(result)
+    assert result.data is not None
+    assert row(shown, "++")[2] == f"{1e3 * float(result.data['tracking_rms'][0]):.4g}"
+    assert row(shown, "+-")[1] == "failed"
+    assert "cannot drive the mechanism" in shown.text
+    assert "no mode ran" in read(run_study(task, ["+-"])).text
+
+
+def test_models_compared(task) -> None:
+    found = verify(task, ["++"], models=["rigid", "linear"])
+    shown = read(found)
+    assert [cells[1] for cells in shown.rows[1:]] == ["rigid", "linear"]
+    assert [cells[2] for cells in shown.rows[1:]] == ["complete", "complete"]
+
+
+def test_a_sweep_and_a_search(tmp_path: Path) -> None:
+    run = made_up(
+        tracking_rms=lambda mode, x, y: 1e-3 * x, peak_torque_max=lambda mode, x, y: y, total_mass=lambda *_: 3.0
+    )
+    sampled = STUDY.replace("[vary.x]", '[sampling]\nkind = "sobol"\nnumber = 4\n\n[vary.x]')
+    done = sweep(load_sweep(write_study(tmp_path, sampled)), tmp_path / "out", run=run)
+    assert row(read(done), "runs")[1] == "4 of 4"
+    assert row(read(SweepResult(tmp_path, 9, {"complete": 3}, interrupted=True)), "runs")[1] == "3 of 9"
+    text = STUDY + "\n[objective]\nminimise = { tracking_rms = 1.0 }\n[search]\nevaluations = 20\n"
+    best = optimise(load_optimisation(write_study(tmp_path, text, "best.toml")), tmp_path / "best", run=run)
+    shown = read(best)
+    assert row(shown, "x") == ["x", "0.005", "0.002", "low"]
+    assert row(shown, "tracking_rms")[2] == "2e-06"
+
+
+def test_an_identification_and_indices(tmp_path: Path) -> None:
+    target = Target(run=0, path="square", mode="++", column="tracking_rms", value=2.0, weight=1.0)  # pyright: ignore[reportCallIssue]
+    found = IdentificationResult(
+        folder=tmp_path, table=tmp_path / "t", values={"x": 1.5}, start={"x": 1.0}, residual=0.05, start_residual=0.5,
+        targets=(Reached(target, 2.1, 1.0, 0.05),), confidence=None, bounds={}, evaluations=7, fresh=0, failed=0,
+        reasons=(), stopped="converged", interrupted=False, seconds=1.0,
+    )  # fmt: skip
+    shown = read(identification_html(found))
+    assert row(shown, "x")[:3] == ["x", "1", "1.5"]
+    assert row(shown, "tracking_rms") == ["tracking_rms", "square", "++", "2", "1", "2.1"]
+    numbers = np.array([0.25]), np.array([0.01]), np.array([0.5]), np.array([0.02])
+    index = SobolIndices("square", "++", "tracking_rms", ("x",), *numbers, 1.0, 0.1, 64, 0)
+    result = IndicesResult(SweepResult(tmp_path, 1, {"complete": 1}), (index,), tmp_path / "i")
+    assert row(read(indices_html(result)), "tracking_rms")[3:] == ["x", "0.25", "0.01", "0.5", "0.02"]
+
+
+def test_sensitivities_and_methods() -> None:
+    one = np.array([[[2.0]]])
+    found = Sensitivities("s", "arm", (("square", "++"),), ("x<y",), np.array([3.0]), (("a",),), ("work",), ("J",),
+                          np.array([[12.0]]), one, one, np.zeros(1))  # fmt: skip
+    assert row(read(found), "work") == ["work", "square", "++", "12", "J", "0.5"]
+    assert "by x<y" in read(found).text
+    run = Measurement("esdirk5", tolerance=1e-4, wall_time=0.5, error=1e-5, steps=40)
+    compared = MethodComparison("mode ++", "arm", 1.0, 11, 6, 4, Reference("a", 1e-9, "b", 1e-9, 1e-10, 1.0), (run,))
+    assert row(read(compared), "ESDIRK 5(4)")[1:] == ["0.0001", "", "complete", "1e-05", "0.5", "40"]
+
+
+def test_values_as_text() -> None:
+    values = (1.23456, 3, "a", None, float("nan"), [1, "b"], True, np.inf)
+    assert [written(value) for value in values] == ["1.235", "3", "a", "", "", "1, b", "yes", ""]
+    assert re.search("right.*left", table(["a", "b"], [[1.0, "x"]])) is not None
+    assert table(["a"], []) == facts([]) == ""
