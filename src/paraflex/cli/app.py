@@ -229,7 +229,8 @@ def verify(
 @app.command()
 def report(
     results: Annotated[
-        str, typer.Argument(metavar="RESULTS", help="A folder that run or verify wrote, or the .nc file in it.")
+        str,
+        typer.Argument(metavar="RESULTS", help="A folder that run, verify, sweep or optimise wrote, or a file of it."),
     ],
     output: Annotated[
         str | None, typer.Option("--output", metavar="FILE", help="Default: report.html beside the results.")
@@ -315,16 +316,17 @@ def sweep(
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
     limit: Annotated[int | None, typer.Option(metavar="N", help="Runs this time, rounded up to whole designs.")] = None,
+    report: ReportOption = True,
     json: Json = False,
 ) -> None:
     """Run a mechanism thousands of times with other numbers; the same command goes on where it was stopped.
 
-    Writes results.parquet and summary.json, and trajectories/ where the study says so.
+    Writes report.html, results.parquet and summary.json, and trajectories/ where the study says so.
     """
     from paraflex.cli.sweep import SweepRequest, sweep_command
 
     raise typer.Exit(
-        sweep_command(SweepRequest(study, output, _engine(engine, cluster), workers, cluster, limit, json))
+        sweep_command(SweepRequest(study, output, _engine(engine, cluster), workers, cluster, limit, report, json))
     )
 
 

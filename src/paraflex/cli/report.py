@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import xarray as xr
+from rich.console import Console
 
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
@@ -22,14 +23,34 @@ def report_command(results: str, output: str | None, *, force: bool) -> None:
     InputError
         No results of ours, or a file that would be written over.
     """
-    file = results_file(results)
+    study = study_of(Path(results))
+    file = study / "results.parquet" if study is not None else results_file(results)
     target = file.with_name("report.html") if output is None else Path(output)
     if target.is_dir():
         target = target / "report.html"
     if target.exists() and not force:
         raise InputError("is there already", field=str(target), remedy="say --force to write over it, or --output FILE")
-    save_page(page_of(open_results(file), file.parent), target)
+    if study is None:
+        save_page(page_of(open_results(file), file.parent), target)
+    else:
+        save_study_report(study, plain_console(stderr=True), target)
     plain_console(stderr=True).print(f"report in {target}", soft_wrap=True)
+
+
+def study_of(results: Path) -> Path | None:
+    """The folder of a study of many designs that was named, or whose table was; None where there is none."""
+    from paraflex.studies.sweeps.folder import STUDY
+
+    folder = results.parent if results.is_file() and results.suffix in (".parquet", ".json") else results
+    return folder if (folder / STUDY).is_file() else None
+
+
+def save_study_report(folder: Path, console: Console, target: Path | None = None) -> None:
+    """Write the report of a study's folder, saying what takes time."""
+    from paraflex.studies.sweeps.report import study_page
+
+    page = study_page(folder, lambda doing: console.print(doing, soft_wrap=True))
+    save_page(page, folder / "report.html" if target is None else target)
 
 
 def page_of(data: xr.Dataset, folder: Path) -> Page:

@@ -16,6 +16,8 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.studies import SweepProgress, SweepResult, load_sweep, sweep
 from paraflex.studies.sweeps import SweepStudy
 
+REPORT = "report.html"
+
 
 @dataclass(frozen=True)
 class SweepRequest:
@@ -27,6 +29,7 @@ class SweepRequest:
     workers: int | None
     cluster: str | None
     limit: int | None
+    report: bool
     json: bool
 
 
@@ -37,10 +40,13 @@ def sweep_command(request: SweepRequest) -> int:
     folder = study_folder(request.study, request.output)
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
+    told = request.report and bool(result.done) and _write_report(console, folder)
     if request.json:
         print(json.dumps(_figures(result), indent=2))
     else:
         _report(console, result)
+        if told:
+            console.print(f"report: {folder / REPORT}", soft_wrap=True)
     if result.interrupted:
         return INTERRUPTED
     return TROUBLE if result.done and not result.counts.get("complete") else COMPLETE
@@ -70,6 +76,18 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
             limit=request.limit,
             on_progress=report,
         )
+
+
+def _write_report(console: Console, folder: Path) -> bool:
+    """Whether the report is written: another Ctrl-C leaves it out."""
+    from paraflex.cli.report import save_study_report
+
+    try:
+        save_study_report(folder, console)
+    except KeyboardInterrupt:
+        console.print(f"no report: paraflex report {folder} writes it", soft_wrap=True)
+        return False
+    return True
 
 
 def _report(console: Console, result: SweepResult) -> None:

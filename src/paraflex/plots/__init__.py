@@ -45,7 +45,7 @@ _SAVES = (
     "save_search_figures",
     "save_work_precision",
 )
-_HOME = homes() | dict.fromkeys(_SAVES, "save")
+_HOME = homes() | dict.fromkeys(_SAVES, "save") | {"mechanism_drawing": "drawing"}
 
 __all__ = [
     "actuation_condition",

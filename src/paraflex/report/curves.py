@@ -118,10 +118,15 @@ def compared(
 
 
 def plane_path(actual: NDArray[np.float64], desired: NDArray[np.float64], runs: Sequence[str]) -> Chart:
-    """Paths of the end-effector (runs, samples, 2) and where it should go (samples, 2), deviations also magnified."""
-    way = 1e3 * desired
-    curves = [Curve("desired", way[:, 1], way[:, 0], Look(dash=1))]
+    """Paths of the end-effector (runs, samples, 2), deviations also magnified, and where it should go.
+
+    The desired path is of all runs (samples, 2), or of each (runs, samples, 2).
+    """
+    curves = []
     for r in range(len(runs)):
+        way, shown = (1e3 * desired, None) if desired.ndim == 2 else (1e3 * desired[r], (r,))
+        if r == 0 or shown:
+            curves.append(Curve("desired", way[:, 1], way[:, 0], Look(dash=1), shown=shown))
         places = 1e3 * actual[r]
         curves.append(Curve("actual", places[:, 1], places[:, 0], Look(0), run=r, shown=(r,)))
         times = round_magnification(places - way, float(np.ptp(way, axis=0).max()))

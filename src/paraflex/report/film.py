@@ -43,8 +43,8 @@ class Film:
         Joints with the ground.
     tip : (runs, frames, 2) array, optional
         The end-effector, or another point whose trail is drawn [m].
-    path : (samples, 2) array, optional
-        Where it should go [m].
+    path : (samples, 2) or (runs, samples, 2) array, optional
+        Where it should go [m], in all runs or in each.
     """
 
     time: NDArray[np.float64]
@@ -74,7 +74,7 @@ class Film:
             "jointKinds": list(self.joint_kinds),
             "grounded": [bool(one) for one in self.grounded],
             "tip": None if self.tip is None else packed(self.tip),
-            "path": None if self.path is None else packed(self.path[None]),
+            "path": None if self.path is None else packed(self.path.reshape(-1, *self.path.shape[-2:])),
             "view": _view(self.shape, self.joints, self.path, self.springs),
         }
 
@@ -91,8 +91,9 @@ def film(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Film | None:
     tip = None if followed is None else _runs(followed.isel(time=kept), dims)
     path = None
     if "end_effector_desired" in data:
-        path = _runs(data["end_effector_desired"], dims)[0]
-        path = path[frames_of(path.shape[0], 2 * MOST_FRAMES)]
+        path = _runs(data["end_effector_desired"], dims)
+        path = path[:, frames_of(path.shape[1], 2 * MOST_FRAMES)]
+        path = path[0] if all(np.array_equal(path[0], each) for each in path) else path
     names = [str(name) for name in data["joint"].values]
     return Film(
         time=time[kept],

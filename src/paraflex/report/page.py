@@ -22,7 +22,7 @@ from paraflex.report.film import Film
 from paraflex.report.packing import Series
 
 _STYLES = ("page.css",)
-_SCRIPTS = ("report.js", "charts.js", "player.js", "start.js")
+_SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
 
 
 class Look(NamedTuple):
@@ -70,6 +70,14 @@ class Curve:
     quiet: bool = False
 
 
+class Picker(NamedTuple):
+    """A choice of a chart of designs: what is chosen, among which columns, and which of them at first."""
+
+    name: str
+    columns: Sequence[int]
+    chosen: int = 0
+
+
 @dataclass(frozen=True)
 class Chart:
     """A diagram.
@@ -93,6 +101,10 @@ class Chart:
         A sentence under it.
     figure : mapping, optional
         Plotly's own `data` and `layout` instead of curves; colours and fonts of the page are added.
+    drawer : str
+        What of the page's designs it shows instead of curves: "responses", "front", "parallel" or "distribution".
+    pickers : sequence of Picker
+        What the reader chooses for the drawer.
     """
 
     identity: str
@@ -107,6 +119,62 @@ class Chart:
     over_time: bool = True
     note: str = ""
     figure: Mapping[str, Any] | None = None
+    drawer: str = ""
+    pickers: Sequence[Picker] = ()
+
+
+@dataclass(frozen=True)
+class Column:
+    """A number of every design.
+
+    Attributes
+    ----------
+    identity : str
+        Its name in the table.
+    name, unit : str
+        As it is shown.
+    values : (k,) array
+        In that unit; NaN where there is none.
+    parameter : bool
+        Whether it was varied, or came of it.
+    log : bool
+        Shown on a logarithmic axis.
+    """
+
+    identity: str
+    name: str
+    unit: str
+    values: ArrayLike
+    parameter: bool = False
+    log: bool = False
+
+
+@dataclass(frozen=True)
+class Designs:
+    """Runs of many designs, which charts of the page draw.
+
+    Attributes
+    ----------
+    columns : sequence of Column
+        Parameters first.
+    telling : str
+        What runs are told apart by: "mode".
+    series : sequence of (str, Look)
+        Its names and looks.
+    member : (k,) array of int
+        Which of them each run is of.
+    number : (k,) array of int
+        Of its design.
+    shown : (k,) array of int
+        Which of the page's runs it is; -1 for most.
+    """
+
+    columns: Sequence[Column]
+    telling: str
+    series: Sequence[tuple[str, Look]]
+    member: ArrayLike
+    number: ArrayLike
+    shown: ArrayLike
 
 
 @dataclass(frozen=True)
@@ -134,6 +202,10 @@ class Page:
         The few numbers that matter: name, value, and what it is of.
     tables, more : sequence of (str, str)
         Headings and HTML of what stands before the charts and after them; see `text.table`.
+    survey : sequence of Panel
+        Charts before the tables: what all designs do.
+    designs : Designs, optional
+        What they draw.
     panels : sequence of Panel
     time : (k,) array
         What curves without x are drawn over; empty where nothing moves.
@@ -159,6 +231,8 @@ class Page:
     figures: Sequence[tuple[str, str, str]] = ()
     tables: Sequence[tuple[str, str]] = ()
     more: Sequence[tuple[str, str]] = ()
+    survey: Sequence[Panel] = ()
+    designs: Designs | None = None
     panels: Sequence[Panel] = ()
     time: ArrayLike = ()
     runs: Sequence[str] = ()
@@ -183,6 +257,7 @@ def render(page: Page) -> str:
         more=_sections(page.more),
         no_film=escape(page.no_film),
         no_charts="" if page.panels else "hidden",
+        no_survey="" if page.survey else "hidden",
         version=escape(version("paraflex")),
         style="\n".join(map(_asset, _STYLES)),
         data=_script_json(_told(page)),
@@ -242,18 +317,37 @@ def _told(page: Page) -> dict[str, Any]:
         "runs": list(page.runs),
         "selecting": page.selecting,
         "selected": page.selected,
-        "panels": [
-            {"title": panel.title, "charts": [_chart(chart, series, time) for chart in panel.charts]}
-            for panel in page.panels
-        ],
+        "panels": _panels(page.panels, series, time),
+        "survey": _panels(page.survey, series, time),
+        "designs": None if page.designs is None else _designs(page.designs, series),
         "film": None if page.film is None else page.film.told(),
         "series": series.told(),
     }
 
 
+def _panels(panels: Sequence[Panel], series: Series, time: int) -> list[dict[str, Any]]:
+    return [
+        {"title": panel.title, "charts": [_chart(chart, series, time) for chart in panel.charts]} for panel in panels
+    ]
+
+
+def _designs(designs: Designs, series: Series) -> dict[str, Any]:
+    plain = ("identity", "name", "unit", "parameter", "log")
+    numbers = {name: series.add(getattr(designs, name), exact=True) for name in ("member", "number", "shown")}
+    return numbers | {
+        "telling": designs.telling,
+        "columns": [
+            {name: getattr(column, name) for name in plain} | {"row": series.add(column.values)}
+            for column in designs.columns
+        ],
+        "series": [{"name": name, "colour": look.colour, "dash": look.dash} for name, look in designs.series],
+    }
+
+
 def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
-    plain = ("identity", "title", "y", "x", "choosing", "log", "equal", "over_time", "note")
+    plain = ("identity", "title", "y", "x", "choosing", "log", "equal", "over_time", "note", "drawer")
     return {name: getattr(chart, name) for name in plain} | {
+        "pickers": [picker._asdict() for picker in chart.pickers],
         "choices": list(chart.choices),
         "figure": None if chart.figure is None else dict(chart.figure),
         "curves": [_curve(curve, series, time) for curve in chart.curves],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -16,7 +17,7 @@ _GREEK = {
 # Magnitudes written out; others as powers of ten.
 _SMALLEST, _LARGEST = 1e-3, 1e5
 NOTHING = "–"
-_WORDS = ' class="words"'
+_WORDS, _SORTABLE = ' class="words"', ' class="sortable"'
 
 
 def number(value: float | None, factor: float = 1.0) -> str:
@@ -57,6 +58,7 @@ def table(
     caption: str,
     note: str = "",
     runs: Mapping[str, int] | None = None,
+    keys: Mapping[str, Sequence[float | str | None]] | None = None,
 ) -> str:
     r"""An HTML table with a name before each row; it scrolls within the page where it is too wide.
 
@@ -72,6 +74,9 @@ def table(
         A sentence under it.
     runs : mapping of str to int, optional
         Which rows select which run of the page.
+    keys : mapping of str to sequence, optional
+        What rows are sorted by when the reader chooses a column, one for each column of a row, the rows' own first;
+        None stands last.
     """
     runs = runs or {}
     wordy = [k > 0 and any(_is_words(cells[k - 1]) for _, cells in rows) for k in range(len(heads))]
@@ -80,12 +85,14 @@ def table(
         for (name, unit), words in zip(heads, wordy, strict=True)
     )
     body = "".join(
-        f"<tr{_data_run(runs.get(name))}>{_row_head(name, runs.get(name))}{''.join(map(_cell, cells))}</tr>"
+        f"<tr{_data_run(runs.get(name))}{_data_keys(keys, name)}>"
+        f"{_row_head(name, runs.get(name))}{''.join(map(_cell, cells))}</tr>"
         for name, cells in rows
     )
+    sortable = _SORTABLE if keys else ""
     below = f'<p class="note">{escape(note)}</p>' if note else ""
     return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}"><table>'
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}"><table{sortable}>'
         f'<caption class="unseen">{escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{below}"
     )
@@ -102,6 +109,13 @@ def _small(text: str) -> str:
 
 def _data_run(run: int | None) -> str:
     return "" if run is None else f' data-run="{run}"'
+
+
+def _data_keys(keys: Mapping[str, Sequence[float | str | None]] | None, name: str) -> str:
+    if keys is None:
+        return ""
+    told = [None if isinstance(key, float) and not math.isfinite(key) else key for key in keys[name]]
+    return f' data-keys="{escape(json.dumps(told))}"'
 
 
 def _row_head(name: str, run: int | None) -> str:

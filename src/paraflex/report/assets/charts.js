@@ -11,8 +11,11 @@ const charts = (() => {
   const isShown = (chart, curve) =>
     (curve.shown === null || curve.shown.includes(state.run)) && (curve.choice === null || curve.choice === chart.choice);
 
+  const isOwn = (chart) => Boolean(chart.told.figure || chart.told.drawer);
+  const ownFigure = (chart) => (chart.told.drawer ? designs.figure(chart) : chart.told.figure);
+
   function traces(chart) {
-    const own = chart.told.figure;
+    const own = ownFigure(chart);
     if (own) return own.data;
     const shown = chart.told.curves.filter((curve) => isShown(chart, curve));
     const beside = new Set(shown.filter((curve) => curve.run !== null).map((curve) => curve.run)).size > 1;
@@ -58,7 +61,8 @@ const charts = (() => {
   }
 
   function layout(chart) {
-    const { log, equal, over_time: overTime, figure } = chart.told;
+    const { log, equal, over_time: overTime } = chart.told;
+    const figure = ownFigure(chart);
     const common = {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false,
       font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: report.colour("text") },
@@ -66,9 +70,12 @@ const charts = (() => {
       hoverlabel: { bgcolor: report.colour("card"), bordercolor: report.colour("line"), font: { color: report.colour("text") } },
       modebar: { color: report.colour("soft"), activecolor: report.colour("accent"), bgcolor: "rgba(0,0,0,0)" },
       // What the reader zoomed to stays while other runs are looked at.
-      uirevision: `${chart.choice}`,
+      uirevision: `${chart.choice} ${chart.picked}`,
     };
-    if (figure) return { ...common, xaxis: axis(chart.told.x), yaxis: axis(chart.told.y), ...figure.layout };
+    if (figure) {
+      const { xaxis, yaxis, noAxes, ...own } = figure.layout || {};
+      return { ...common, ...own, ...(noAxes ? {} : { xaxis: axis(chart.told.x, xaxis), yaxis: axis(chart.told.y, yaxis) }) };
+    }
     return {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
@@ -89,7 +96,8 @@ const charts = (() => {
     await Plotly.react(chart.plot, traces(chart), layout(chart), { ...config, toImageButtonOptions: { filename: chart.told.identity, format: "svg" } });
     if (first) {
       chart.plot.on("plotly_afterplot", () => moveCursor(chart));
-      if (chart.told.over_time && !chart.told.figure) chart.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
+      if (chart.told.drawer) chart.plot.on("plotly_click", (event) => designs.choose(event.points[0]));
+      else if (chart.told.over_time && !chart.told.figure) chart.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
     }
     drawLegend(chart);
     moveCursor(chart);
@@ -127,7 +135,7 @@ const charts = (() => {
   // A line at the time over time; else a dot on every curve of the selected run.
   function moveCursor(chart) {
     const drawn = chart.plot._fullLayout;
-    if (!chart.drawn || chart.told.figure || !drawn || !drawn.xaxis || !drawn.xaxis._length) return;
+    if (!chart.drawn || isOwn(chart) || !drawn || !drawn.xaxis || !drawn.xaxis._length) return;
     const { xaxis, yaxis } = drawn;
     const inside = (x, y) => x >= -1 && x <= xaxis._length + 1 && y >= -1 && y <= yaxis._length + 1;
     const put = (mark, x, y) => {
@@ -163,9 +171,9 @@ const charts = (() => {
 
   function make(described) {
     const plot = element("div", { style: "width:100%;height:100%" });
-    const kind = described.figure ? " own" : described.equal ? " square" : "";
+    const kind = described.drawer ? ` own ${described.drawer}` : described.figure ? " own" : described.equal ? " square" : "";
     const holder = element("div", { class: `plot${kind}`, role: "img", "aria-label": `${described.title}: ${described.y} over ${described.x}` }, plot);
-    const chart = { told: described, plot, choice: 0, hidden: new Set(), dots: [], drawn: false, stale: true, inView: false };
+    const chart = { told: described, plot, choice: 0, picked: described.pickers.map((picker) => picker.chosen), hidden: new Set(), dots: [], drawn: false, stale: true, inView: false };
     const header = element("header", {}, element("h3", {}, described.title));
     if (described.choices.length) {
       const select = element("select", { "aria-label": `${described.title}: ${described.choosing}` });
@@ -173,6 +181,13 @@ const charts = (() => {
       select.addEventListener("change", () => { chart.choice = Number(select.value); draw(chart); });
       header.append(select);
     }
+    described.pickers.forEach((picker, k) => {
+      const select = element("select", { "aria-label": `${described.title}: ${picker.name}` });
+      picker.columns.forEach((column, choice) => select.append(new Option(designs.columnName(column), choice)));
+      select.value = String(picker.chosen);
+      select.addEventListener("change", () => { chart.picked[k] = Number(select.value); draw(chart); });
+      header.append(element("label", {}, element("span", {}, picker.name), select));
+    });
     chart.cursor = element("div", { class: "cursor" });
     holder.append(chart.cursor);
     chart.legend = element("div", { class: "legend", role: "group", "aria-label": `Curves of ${described.title}` });
@@ -183,9 +198,9 @@ const charts = (() => {
   }
 
   function start() {
-    const holder = document.getElementById("panels");
-    for (const panel of told.panels) {
-      holder.append(element("h2", {}, panel.title), element("div", { class: "charts" }, ...panel.charts.map(make)));
+    const holders = [...told.survey.map((panel) => [panel, "survey"]), ...told.panels.map((panel) => [panel, "panels"])];
+    for (const [panel, place] of holders) {
+      document.getElementById(place).append(element("h2", {}, panel.title), element("div", { class: "charts" }, ...panel.charts.map(make)));
     }
     const byFigure = new Map(all.map((chart) => [chart.figure, chart]));
     const watch = new IntersectionObserver((entries) => {

@@ -92,7 +92,8 @@ const player = (() => {
   function drawPath() {
     if (!arrays.path) return;
     pen.setLineDash([6, 5]); pen.lineWidth = 1.4; pen.strokeStyle = colours.text; pen.globalAlpha = 0.75;
-    line(arrays.path.values, 0, arrays.path.values.length / 2);
+    const { values, runs } = arrays.path, long = values.length / runs, from = runs > 1 ? state.run * long : 0;
+    line(values.subarray(from, from + long), 0, long / 2);
     pen.setLineDash([]); pen.globalAlpha = 1;
   }
 

@@ -103,11 +103,12 @@ const begin = (() => {
     const time = report.row(told.time);
     report.timeRange = time.length > 1 ? [time[0], time[time.length - 1]] : undefined;
     showRun();
+    designs.start();
     charts.start();
     await player.start();
     document.documentElement.dataset.ready = "true";
     performance.mark("ready");
-    if (!told.panels.length) return;
+    if (!told.panels.length && !told.survey.length) return;
     // After the screen shows what there is.
     await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0)));
     loadPlotly();

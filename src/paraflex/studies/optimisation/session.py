@@ -16,7 +16,7 @@ from paraflex.studies.optimisation.record import Record, record_schema
 from paraflex.studies.optimisation.slopes import EXACT, run_with_slopes
 from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.studies.sweeps.engines import THREADS, Engine, open_engine
-from paraflex.studies.sweeps.folder import claim_for, forget_unfinished, held
+from paraflex.studies.sweeps.folder import claim_for, forget_unfinished, held, ranges_of
 from paraflex.studies.sweeps.run import run_task
 from paraflex.studies.sweeps.samples import SOBOL, designs
 
@@ -119,7 +119,8 @@ def search(
         The folder cannot be written any more; what was written stays, and the same call goes on from there.
     """
     with held(folder):
-        claim_for(folder, study.content(), study.setting.versions, {"name": study.name})
+        told = {"name": study.name, "ranges": ranges_of(study.parameters)}
+        claim_for(folder, study.content(), study.setting.versions, told)
         forget_unfinished(folder)
         began = time.perf_counter()
         run, exact = _run(study, workers)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, OutputError
+from paraflex.studies.sweeps.samples import Varied
 from paraflex.studies.sweeps.study import SweepStudy, digest
 from paraflex.studies.sweeps.table import PARTS, RESULTS, parts, runs_in, whole_file
 
@@ -22,7 +23,7 @@ TRAJECTORIES = "trajectories"
 
 def claim(folder: Path, study: SweepStudy) -> None:
     """Make a folder that of a sweep, or see that it is; see `claim_for`."""
-    told = {"name": study.name, "runs": study.runs, "sampling": study.kind}
+    told = {"name": study.name, "runs": study.runs, "sampling": study.kind, "ranges": ranges_of(study.parameters)}
     claim_for(folder, study.content(), study.setting.versions, told)
 
 
@@ -49,7 +50,7 @@ def claim_for(folder: Path, content: dict[str, Any], versions: Mapping[str, str]
     said = {"content": digest(content), "versions": dict(versions)}
     file = folder / STUDY
     if file.exists():
-        _check_same(folder, _read(file), said)
+        _check_same(folder, read_told(file), said)
         return
     try:
         others = [each.name for each in folder.iterdir() if each.name != LOCK] if folder.exists() else []
@@ -131,7 +132,25 @@ def _check_same(folder: Path, found: dict, said: dict) -> None:
             )  # fmt: skip
 
 
-def _read(file: Path) -> dict:
+def ranges_of(parameters: Sequence[Varied]) -> dict[str, list]:
+    """Lowest and highest value of each parameter, and "log", "linear" or "values"."""
+    out = {}
+    for parameter in parameters:
+        if parameter.values is not None:
+            out[parameter.name] = [min(parameter.values), max(parameter.values), "values"]
+        else:
+            out[parameter.name] = [parameter.low, parameter.high, "log" if parameter.log else "linear"]
+    return out
+
+
+def read_told(file: Path) -> dict:
+    """What a `study.json` says.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or is none of ours.
+    """
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,0 +1,113 @@
+"""Charts of all designs of a study: responses, front, distribution, all numbers, convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.report.choice import in_conflict
+from paraflex.report.curves import look
+from paraflex.report.designs import Studied
+from paraflex.report.page import Chart, Column, Curve, Designs, Look, Panel, Picker
+from paraflex.report.text import count
+
+LOWER = "Less is taken as better in every metric."
+
+
+class Step(NamedTuple):
+    """A design of a search: its number, its objective (NaN where it failed), and whether limits hold."""
+
+    number: int
+    objective: float
+    allowed: bool
+
+
+def survey(studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], history: Sequence[Step]) -> list[Panel]:
+    """What all designs do."""
+    parameters = [k for k, column in enumerate(drawn) if column.parameter]
+    metrics = [k for k, column in enumerate(drawn) if not column.parameter]
+    place = {column.identity: k for k, column in enumerate(drawn)}
+    charts = []
+    if history:
+        charts.append(_history(history))
+    if parameters and metrics:
+        charts += _responses(parameters, metrics)
+    if len(metrics) > 1:
+        pair = [place[name] for name in in_conflict(studied)]
+        first, second = pair if len(pair) == 2 else metrics[:2]
+        charts.append(Chart(
+            "front", "Pareto front", "metric", x="metric", over_time=False, drawer="front",
+            pickers=[Picker("across", metrics, metrics.index(first)), Picker("up", metrics, metrics.index(second))],
+            note=f"Large, joined: no run of the same mode is better in one and as good in the other. {LOWER}",
+        ))  # fmt: skip
+    if metrics:
+        charts.append(Chart(
+            "distribution", "Distribution", "runs", x="metric", over_time=False, drawer="distribution",
+            pickers=[Picker("of", metrics)],
+        ))  # fmt: skip
+        charts.append(Chart(
+            "parallel", "All numbers of each run", "metrics", x="parameters", over_time=False, drawer="parallel",
+            pickers=[Picker("coloured by", metrics)],
+            note="A line a run. Drag along an axis to keep the runs that pass there; drag names to reorder.",
+        ))  # fmt: skip
+    return [Panel(_drawn(studied, rows), charts)] if charts else []
+
+
+def _responses(parameters: Sequence[int], metrics: Sequence[int]) -> list[Chart]:
+    """Two charts of the same kind to look at side by side: of the first two parameters, or metrics."""
+    note = "A mark a run; thick, the median over the other parameters." if len(parameters) > 1 else "A mark a run."
+    starts = [(0, 0), (0, 1)] if len(parameters) > 1 else [(k, 0) for k in range(min(2, len(metrics)))]
+    return [
+        Chart(
+            f"responses{k + 1}", "Response", "metric", x="parameter", over_time=False, drawer="responses",
+            pickers=[Picker("of", metrics, metric), Picker("to", parameters, parameter)], note=note,
+        )
+        for k, (metric, parameter) in enumerate(starts)
+    ]  # fmt: skip
+
+
+def _drawn(studied: Studied, rows: NDArray[np.intp]) -> str:
+    complete = int(np.count_nonzero(studied.table.complete))
+    if rows.size == complete:
+        return f"All designs: {count(complete)} runs"
+    return (
+        f"{count(rows.size)} of {count(complete)} complete runs, drawn by lot; the best and those of the fronts are "
+        "among them"
+    )
+
+
+def _history(steps: Sequence[Step]) -> Chart:
+    """Objectives of a search in the order its designs were looked at, and the least until then."""
+    numbers = np.array([step.number for step in steps], dtype=float)
+    values = np.array([step.objective for step in steps], dtype=float)
+    allowed = np.array([step.allowed for step in steps], dtype=bool)
+    least = np.minimum.accumulate(np.where(allowed & np.isfinite(values), values, np.inf))
+    curves = [
+        Curve("a design", values, numbers, Look(4, 2)),
+        Curve("least until then", np.where(np.isfinite(least), least, np.nan), numbers, Look(0)),
+    ]
+    known = values[np.isfinite(values)]
+    wide = bool(known.size and known.min() > 0.0 and known.max() > 50.0 * known.min())
+    return Chart("history", "Convergence", "objective", curves, x="design", over_time=False, log=wide)
+
+
+def drawn_designs(
+    studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], shown: Mapping[int, int]
+) -> Designs:
+    """Drawn rows as the page's charts take them; `shown` tells which of the page's runs a row is."""
+    table = studied.table
+    pairs = list(dict.fromkeys(zip(table.path.tolist(), table.mode.tolist(), strict=True)))
+    several_paths, several_modes = (len({pair[k] for pair in pairs}) > 1 for k in (0, 1))
+    names = [", ".join([mode] * several_modes + [path] * several_paths) or mode for path, mode in pairs]
+    known = {pair: k for k, pair in enumerate(pairs)}
+    return Designs(
+        columns=drawn,
+        telling=", ".join(["mode"] * several_modes + ["path"] * several_paths) or "mode",
+        series=[(name, look(k)) for k, name in enumerate(names)],
+        member=[known[str(table.path[row]), str(table.mode[row])] for row in rows],
+        number=studied.design[rows],
+        shown=[shown.get(int(row), -1) for row in rows],
+    )

@@ -1,0 +1,246 @@
+"""The report of a study of many designs: what was varied, what became of it, and the best designs in motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from paraflex.report.choice import Picked, drawn_rows
+from paraflex.report.curves import compared, followed, plane_path, thinned
+from paraflex.report.designs import Studied, columns, metric_name, reasons, shown_unit
+from paraflex.report.film import film
+from paraflex.report.page import Page, Panel
+from paraflex.report.survey import LOWER, Step, drawn_designs, survey
+from paraflex.report.text import NOTHING, count, number, table
+
+_NO_RUN = "None of the best designs was simulated again, so there is no animation."
+# Of the table of best designs; others are in the study's table.
+_MOST_COLUMNS = 12
+_KEPT = (
+    "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
+    "joint_position", "joint_direction", "spring_position",
+)  # fmt: skip
+_COORDINATES = (
+    "time", "axis", "body", "motor", "joint", "end", "station_body", "joint_kind", "joint_grounded",
+)  # fmt: skip
+
+
+class Parameter(NamedTuple):
+    """What was varied: fields of the mechanism's file, unit, lowest and highest value, how they are spread."""
+
+    fields: tuple[str, ...]
+    unit: str
+    low: float
+    high: float
+    spread: str
+
+
+@dataclass(frozen=True)
+class StudyAccount:
+    """What a report of a study tells besides its rows.
+
+    Attributes
+    ----------
+    kind : str
+        "sweep", "optimisation", "identification".
+    name, mechanism : str
+    total : int or None
+        Runs of the whole study.
+    parameters : mapping of str to Parameter
+    facts : sequence of (str, str)
+    runs : mapping of int to Dataset
+        Runs made again, by row.
+    failed : mapping of int to str
+        Why others could not be.
+    history : sequence of Step
+        Of a search.
+    notes : sequence of str
+    """
+
+    kind: str
+    name: str
+    mechanism: str
+    total: int | None
+    parameters: Mapping[str, Parameter]
+    facts: Sequence[tuple[str, str]] = ()
+    runs: Mapping[int, xr.Dataset] = field(default_factory=dict)
+    failed: Mapping[int, str] = field(default_factory=dict)
+    history: Sequence[Step] = ()
+    notes: Sequence[str] = ()
+
+
+def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount) -> Page:
+    """The report of a study.
+
+    Parameters
+    ----------
+    studied : Studied
+        From `designs.read_studied`.
+    picked : sequence of Picked
+        From `designs.best_runs`: the table of best designs.
+    account : StudyAccount
+    """
+    shown, others = _of_one_kind({row: account.runs[row] for row, _ in picked if row in account.runs})
+    labels = [studied.label(row) for row in shown]
+    data = side_by_side(list(shown.values()), labels) if shown else None
+    rows = drawn_rows(studied, [one.row for one in picked])
+    units = {name: one.unit for name, one in account.parameters.items()}
+    logarithmic = [name for name, one in account.parameters.items() if one.spread == "log"]
+    drawn = columns(studied, rows, units, logarithmic)
+    few = None if data is None else data.isel(time=thinned(data.sizes["time"]))
+    missing = dict(account.failed) | dict.fromkeys(others, "it has other bodies, joints or elements than the first")
+    return Page(
+        title=account.name,
+        kind=account.kind,
+        subtitle=_subtitle(studied, account),
+        facts=account.facts,
+        figures=_tiles(studied, account),
+        survey=survey(studied, rows, drawn, account.history) if rows.size else [],
+        designs=drawn_designs(studied, rows, drawn, {row: k for k, row in enumerate(shown)}) if rows.size else None,
+        tables=[("Best designs", _best_table(studied, picked, list(shown), units))] if picked else [],
+        more=[("What was varied", _parameter_table(account)), *_trouble(studied)],
+        panels=[] if few is None else _panels(few, labels),
+        time=[] if few is None else few["time"].values,
+        runs=labels,
+        selecting="design",
+        film=None if data is None else film(data),
+        no_film=_NO_RUN,
+        notes=[*account.notes, *_unfinished(studied, account), *_not_shown(studied, missing)],
+    )
+
+
+def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Dataset:
+    """Runs of one mechanism with different numbers as one dataset, on the longest of their times; NaN after an end."""
+    longest = max((one["time"].values for one in runs), key=lambda time: time[-1])
+    parts = []
+    for one in runs:
+        kept = one[[name for name in _KEPT if name in one]].isel(mode=0)
+        kept = kept.drop_vars([name for name in kept.coords if name not in _COORDINATES])
+        same = np.array_equal(one["time"].values, longest)
+        parts.append(kept if same else kept.interp(time=longest))
+    first = parts[0]
+    # Coordinates of the first: those that all have are the same.
+    data = xr.concat(parts, dim="mode", coords="minimal", compat="override", join="override", combine_attrs="override")
+    return data.assign_coords(mode=list(labels)).assign_attrs(runs[0].attrs | first.attrs)
+
+
+def _of_one_kind(runs: Mapping[int, xr.Dataset]) -> tuple[dict[int, xr.Dataset], list[int]]:
+    """Runs with as many drawn points, bodies and joints as the first, and the rows of the others."""
+    sizes = {row: {dim: size for dim, size in one.sizes.items() if dim != "time"} for row, one in runs.items()}
+    first = next(iter(sizes.values()), None)
+    return {row: one for row, one in runs.items() if sizes[row] == first}, [r for r in runs if sizes[r] != first]
+
+
+def _subtitle(studied: Studied, account: StudyAccount) -> str:
+    designs = len(np.unique(studied.design))
+    modes = list(dict.fromkeys(studied.table.mode.tolist()))
+    paths = list(dict.fromkeys(studied.table.path.tolist()))
+    told = [account.mechanism, f"{count(designs)} designs" if designs != 1 else "one design"]
+    if modes:
+        told.append(f"modes {', '.join(modes)}" if len(modes) > 1 else f"mode {modes[0]}")
+        told.append(f"paths {', '.join(paths)}" if len(paths) > 1 else f"path “{paths[0]}”")
+    return ", ".join(told)
+
+
+def _tiles(studied: Studied, account: StudyAccount) -> list[tuple[str, str, str]]:
+    counts = studied.counts
+    done = sum(counts.values())
+    rest = [f"{count(number)} {status}" for status, number in sorted(counts.items()) if status != "complete"]
+    of = f"of {count(account.total)} runs" if account.total is not None else f"of {count(done)} runs"
+    tiles = [("complete", f"{count(counts.get('complete', 0))}", ", ".join([of, *rest]))]
+    for name in studied.judged[:3]:
+        values = studied.table.metrics[name]
+        known = np.flatnonzero(studied.table.complete & np.isfinite(values))
+        if known.size:
+            row = int(known[np.argmin(values[known])])
+            unit, factor = shown_unit(studied.table.units.get(name, ""), values[known])
+            value = f"{number(values[row], factor)} {unit}".rstrip()
+            tiles.append((metric_name(name), value, f"least, of {studied.label(row)}"))
+    return tiles
+
+
+def _best_table(studied: Studied, picked: Sequence[Picked], shown: Sequence[int], units: Mapping[str, str]) -> str:
+    """The best designs: their numbers, metrics, and what they are best in."""
+    named = [*((name, True) for name in studied.table.varied), *((name, False) for name in studied.judged)]
+    heads, cells, keys = [("design", "")], {}, {}
+    names = {row: studied.label(row) for row, _ in picked}
+    for row, why in picked:
+        cells[row], keys[row] = ["; ".join(why)], [int(studied.design[row]), None]
+    heads.append(("best in", ""))
+    for name, parameter in named[:_MOST_COLUMNS]:
+        values = (studied.table.parameters if parameter else studied.table.metrics)[name]
+        told = units.get(name, "") if parameter else studied.table.units.get(name, "")
+        unit, factor = shown_unit(told, values)
+        heads.append((name.replace("_", " ") if parameter else metric_name(name), f"[{unit}]" if unit else ""))
+        for row, _ in picked:
+            cells[row].append(number(values[row], factor))
+            keys[row].append(float(values[row]))
+    selects = {names[row]: k for k, row in enumerate(shown)}
+    note = f"{LOWER} A row chosen is shown in motion below and ringed in the charts." if shown else LOWER
+    return table(
+        heads, [(names[row], cells[row]) for row, _ in picked], caption="The best designs", note=note, runs=selects,
+        keys={names[row]: keys[row] for row, _ in picked},
+    )  # fmt: skip
+
+
+def _parameter_table(account: StudyAccount) -> str:
+    rows = []
+    for name, one in account.parameters.items():
+        unit, factor = shown_unit(one.unit, np.array([one.low, one.high]))
+        spread = {"log": "in their logarithm", "values": "as listed", "linear": "evenly"}.get(one.spread, one.spread)
+        rows.append((name, ["\n".join([one.fields[0], ", ".join(one.fields[1:])]) if one.fields else NOTHING,
+                            number(one.low, factor), number(one.high, factor), unit or NOTHING, spread]))  # fmt: skip
+    heads = [("parameter", ""), ("field", ""), ("from", ""), ("to", ""), ("unit", ""), ("spread", "")]
+    return table(heads, rows, caption="What was varied")
+
+
+def _trouble(studied: Studied) -> list[tuple[str, str]]:
+    """Why runs are not complete, alike ones together."""
+    told = reasons(studied)
+    if not told:
+        return []
+    rows = [(status or NOTHING, [count(number), reason]) for status, reason, number in told]
+    heads = [("status", ""), ("runs", ""), ("reason", "one of those alike")]
+    return [("Runs that are not complete", f'<div class="long">{table(heads, rows, caption="Reasons")}</div>')]
+
+
+def _unfinished(studied: Studied, account: StudyAccount) -> list[str]:
+    done = studied.run.size
+    if account.total is None or done >= account.total:
+        return []
+    return [f"The study is not finished: this is of the {count(done)} of {count(account.total)} runs that are done."]
+
+
+def _not_shown(studied: Studied, missing: Mapping[int, str]) -> list[str]:
+    return [f"{studied.label(row)} is not shown in motion: {reason}" for row, reason in missing.items()]
+
+
+def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
+    """The runs shown in motion, over time."""
+    place, desired = (data[name].transpose("mode", "time", "axis").values for name in _KEPT[:2])
+    gaps = np.linalg.norm(place - desired, axis=-1)
+    motors, bodies = ([str(name) for name in data[dim].values] for dim in ("motor", "body"))
+    torque = data["torque"].transpose("mode", "time", "motor").values
+    unit = str(data["torque"].attrs.get("units", "N m"))
+    charts = [
+        compared("errors", "Tracking error", "distance", "m", gaps, runs, log=True,
+                 note="Distance of the end-effector from its desired place."),
+        plane_path(place, desired, runs),
+        followed("torques", "Motor forces" if unit == "N" else "Motor torques", "force" if unit == "N" else "torque",
+                 unit, torque, motors, runs, selecting="design", choosing="motor"),
+    ]  # fmt: skip
+    deflection = data["tip_transverse"].transpose("mode", "time", "body").values
+    bent = [b for b in range(len(bodies)) if np.nanmax(np.abs(deflection[:, :, b]), initial=0.0) > 0.0]
+    if bent:
+        charts.append(followed(
+            "deflections", "Deflections of the links", "transverse deflection of the tip", "m", deflection[:, :, bent],
+            [bodies[b] for b in bent], runs, selecting="design",
+            note="Of a link's last end, across the link, in its own frame.",
+        ))  # fmt: skip
+    energy = data["strain_energy"].transpose("mode", "time").values
+    charts.append(compared("strain", "Strain energy", "strain energy", "J", energy, runs))
+    return [Panel("The best designs in motion", charts)]

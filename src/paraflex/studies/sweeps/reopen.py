@@ -1,0 +1,139 @@
+"""A study's folder opened again: what was varied in what, and single runs of it made once more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from paraflex.errors import InputError, ParaflexError
+from paraflex.results import tracking_dataset
+from paraflex.simulate import simulate
+from paraflex.studies.sweeps.folder import STUDY, read_told
+from paraflex.studies.sweeps.metrics import measure
+from paraflex.studies.sweeps.overlay import Place
+from paraflex.studies.sweeps.run import Abandoned, Task, plan_task
+from paraflex.studies.sweeps.study import Setting, versions
+
+_AGAIN = "run the study again, in a new folder"
+
+
+@dataclass(frozen=True)
+class StudyFolder:
+    """What a folder's `study.json` says.
+
+    Attributes
+    ----------
+    folder : Path
+    name : str
+    runs : int or None
+        Of the whole study; None of a search, which has no number of its own.
+    sampling : str
+        "grid", "sobol", ...; "search" of an optimisation.
+    setting : Setting
+    ranges : mapping of str to (float, float, str)
+        Lowest and highest value of parameters and how they are spread, where the folder tells.
+    versions : mapping of str to str
+        That its runs were made by.
+    """
+
+    folder: Path
+    name: str
+    runs: int | None
+    sampling: str
+    setting: Setting
+    ranges: Mapping[str, tuple[float, float, str]]
+    versions: Mapping[str, str]
+
+    @property
+    def same_versions(self) -> bool:
+        """Whether runs made now are those of the folder to the last bit."""
+        return all(versions()[name] == had for name, had in self.versions.items() if name in versions())
+
+
+def open_study(folder: str | Path) -> StudyFolder:
+    """The study whose results a folder holds.
+
+    Raises
+    ------
+    InputError
+        `study.json` cannot be read, or is not that of a study.
+    """
+    folder = Path(folder)
+    told = read_told(folder / STUDY)
+    try:
+        return StudyFolder(
+            folder=folder,
+            name=told["name"],
+            runs=told.get("runs"),
+            sampling=told.get("sampling", "search"),
+            setting=_setting(told["study"], told.get("versions", {})),
+            ranges={name: (low, high, spread) for name, (low, high, spread) in told.get("ranges", {}).items()},
+            versions=told.get("versions", {}),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError("not the study of a folder of ours", field=str(folder / STUDY), remedy=_AGAIN) from error
+
+
+def run_again(
+    setting: Setting,
+    values: Sequence[float],
+    path: str,
+    mode: str,
+    watch: Callable[[float], None] | None = None,
+) -> tuple[xr.Dataset, dict[str, float | int]]:
+    """A run of a design as `paraflex run` keeps it, and its metrics.
+
+    Parameters
+    ----------
+    setting : Setting
+    values : sequence of float
+        Of the parameters.
+    path, mode : str
+    watch : callable, optional
+        Told the time reached in the run [s]; a KeyboardInterrupt from it abandons the run.
+
+    Raises
+    ------
+    InputError, NumericalError
+        It cannot be run.
+    Abandoned
+        See `watch`.
+    """
+    planned, options = plan_task(setting, Task(0, 0, tuple(values), path))
+    run = simulate(planned, mode, options=options, on_progress=watch)
+    if run.solution.status == "interrupted":
+        raise Abandoned
+    return tracking_dataset([run], options=options), measure(run, setting.metrics)
+
+
+def reason_of(error: ParaflexError) -> str:
+    """Why a run cannot be made again, in one line."""
+    return " ".join(str(error).split())
+
+
+def _setting(content: Mapping[str, Any], had: Mapping[str, str]) -> Setting:
+    data, parameters = content["mechanism"], content["parameters"]
+    return Setting(
+        data=data,
+        source=str(data["name"]),
+        names=tuple(each["name"] for each in parameters),
+        places=tuple(tuple(_place(place) for place in each["places"]) for each in parameters),
+        whole=tuple(each["whole"] for each in parameters),
+        paths=tuple(content["paths"]),
+        modes=tuple(content["modes"]),
+        duration=content["duration"],
+        samples=content["samples"],
+        assembly=content["assembly"],
+        integration=content["integration"],
+        metrics=tuple(content["metrics"]),
+        trajectories=False,
+        versions=had,
+    )
+
+
+def _place(place: Sequence[str | int]) -> Place:
+    return tuple(place)

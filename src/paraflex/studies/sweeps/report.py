@@ -1,0 +1,187 @@
+"""The report of a study's folder: its rows, and the best of its runs made again to be seen in motion."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from paraflex.compilation import compile_kernels_for
+from paraflex.errors import InputError, ParaflexError
+from paraflex.files import model_from
+from paraflex.report import Page
+from paraflex.report.choice import MOST_RUNS, Picked, best_runs
+from paraflex.report.designs import Studied, read_studied
+from paraflex.report.survey import Step
+from paraflex.report.sweep import Parameter, StudyAccount, sweep_page
+from paraflex.studies.sweeps.reopen import StudyFolder, open_study, reason_of, run_again
+from paraflex.studies.sweeps.run import Abandoned
+from paraflex.studies.sweeps.table import RESULTS, parts
+from paraflex.studies.sweeps.units import unit_of
+
+_FOUND = "result.json"
+# So much a metric may differ from its row's before the reader is told: other machines round otherwise.
+_SAME = 1e-6
+
+
+def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = None) -> Page:
+    """The report of the study in a folder, finished or not.
+
+    The best runs are made once more, in threads.
+
+    Parameters
+    ----------
+    folder : str or Path
+        That `sweep`, `optimise` or `identify` wrote.
+    on_progress : callable, optional
+        Told what is done now, in a few words.
+
+    Raises
+    ------
+    InputError
+        It holds no study of ours, or has no rows yet.
+    """
+    study = open_study(folder)
+    files = [study.folder / RESULTS] if (study.folder / RESULTS).is_file() else parts(study.folder)
+    if not files:
+        raise InputError("no run is done yet", field=str(folder), remedy="run the study first")
+    studied = read_studied(files)
+    found = _found(study.folder / _FOUND)
+    picked = best_runs(studied)
+    if found:
+        picked = _searched(studied, found, picked)
+    if on_progress is not None and picked:
+        on_progress(f"simulating {len(picked)} of the best designs again, to be seen in motion")
+    runs, failed, differ = _again(study, studied, picked)
+    account = StudyAccount(
+        kind=str(found.get("kind", "sweep")),
+        name=study.name,
+        mechanism=study.setting.source,
+        total=study.runs,
+        parameters=_parameters(study, studied),
+        facts=_facts(study, found),
+        runs=runs,
+        failed=failed,
+        history=[Step(n, np.nan if value is None else value, bool(holds)) for n, value, holds in _history(found)],
+        notes=_notes(study, studied, differ),
+    )
+    return sweep_page(studied, picked, account)
+
+
+def _again(
+    study: StudyFolder, studied: Studied, picked: Sequence[Picked]
+) -> tuple[dict[int, xr.Dataset], dict[int, str], list[int]]:
+    """The picked runs, why some cannot be made, and which come out otherwise than their rows say."""
+    if not picked:
+        return {}, {}, []
+    compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism, lambda _: None)
+    table = studied.table
+
+    stop = threading.Event()
+
+    def watch(_: float) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+
+    def again(row: int) -> tuple[xr.Dataset, bool] | str:
+        if stop.is_set():
+            raise Abandoned
+        values, path, mode = studied.values(row), str(table.path[row]), str(table.mode[row])
+        try:
+            data, metrics = run_again(study.setting, values, path, mode, watch)
+        except ParaflexError as error:
+            return reason_of(error)
+        told = {name: table.metrics[name][row] for name in metrics if name in table.metrics}
+        return data, all(np.isclose(metrics[name], told[name], rtol=_SAME, equal_nan=True) for name in told)
+
+    rows = [one.row for one in picked]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        try:
+            outcomes = dict(zip(rows, pool.map(again, rows), strict=True))
+        except KeyboardInterrupt:
+            # Ctrl-C reaches the main thread only; the others hear of it at their next report.
+            stop.set()
+            raise
+    runs = {row: outcome[0] for row, outcome in outcomes.items() if not isinstance(outcome, str)}
+    failed = {row: outcome for row, outcome in outcomes.items() if isinstance(outcome, str)}
+    differ = [row for row, outcome in outcomes.items() if not isinstance(outcome, str) and not outcome[1]]
+    return runs, failed, differ
+
+
+def _parameters(study: StudyFolder, studied: Studied) -> dict[str, Parameter]:
+    out = {}
+    for name, places in zip(study.setting.names, study.setting.places, strict=True):
+        values = studied.table.parameters[name]
+        low, high, spread = study.ranges.get(name, (float(values.min()), float(values.max()), study.sampling))
+        units = {unit_of(place) for place in places}
+        fields = tuple(".".join(map(str, place)) for place in places)
+        out[name] = Parameter(fields, units.pop() if len(units) == 1 else "", low, high, spread)
+    return out
+
+
+def _facts(study: StudyFolder, found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    setting = study.setting
+    told = setting.integration
+    facts = [("search", str(found["method"]))] if "method" in found else [("sampling", study.sampling)]
+    if setting.duration is not None:
+        facts.append(("duration", f"{setting.duration:g} s"))
+    for name, unit in (("method", ""), ("tolerance", " m"), ("step", " s"), ("constraints", "")):
+        if told.get(name) is not None:
+            value = told[name]
+            facts.append((name, f"{value:g}{unit}" if isinstance(value, float) else f"{value}"))
+    return facts + [(name, study.versions[name]) for name in ("paraflex", "numba", "numpy") if name in study.versions]
+
+
+def _notes(study: StudyFolder, studied: Studied, differ: Sequence[int]) -> list[str]:
+    notes = []
+    if not studied.table.complete.any():
+        notes.append("No run is complete: there is nothing to draw. The reasons stand below.")
+    if differ:
+        why = "" if study.same_versions else " The versions of the packages are not those of the study."
+        names = ", ".join(studied.label(row) for row in differ)
+        notes.append(f"Simulated again, these runs come out otherwise than the table says: {names}.{why}")
+    return notes
+
+
+def _found(file: Path) -> Mapping[str, Any]:
+    """What a search found; empty of a sweep."""
+    if not file.is_file():
+        return {}
+    try:
+        told = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError("cannot be read", field=str(file), remedy="run the command again") from error
+    return told if isinstance(told, dict) else {}
+
+
+def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool]]:
+    """Number, objective and whether limits hold, where what was found tells all three."""
+    steps = found.get("history") or []
+    return [tuple(step) for step in steps if len(step) == 3]
+
+
+def _searched(studied: Studied, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:
+    """The runs of the design that a search found and of its start, and some of the best by single metrics."""
+    out: dict[int, list[str]] = {}
+    for key, why in (("values", "what was sought"), ("start", "the start")):
+        design = found.get(key) or {}
+        if set(design) != set(studied.table.parameters) or not design:
+            continue
+        alike = studied.table.complete.copy()
+        for name, value in design.items():
+            alike &= studied.table.parameters[name] == value
+        for row in np.flatnonzero(alike)[:3]:
+            out.setdefault(int(row), []).append(why)
+    for row, why in picked:
+        if row in out:
+            out[row] += why
+        elif len(out) < MOST_RUNS:
+            out[row] = list(why)
+    return [Picked(row, tuple(why)) for row, why in out.items()]
