@@ -55,7 +55,7 @@ def test_five_bar_of_your_own(run):
     state = consistent_state(system, finer.assemblies[0])
     frequency = natural_frequencies(system, state, held=["A1", "A2"]).frequencies[0] / (2 * np.pi)
     assert found["frequency"] == pytest.approx(frequency, rel=1e-6)
-    # Twice the mesh, another method and a hundredth of the tolerance.
+    # Twice the mesh, another method and a tenth of the tolerance.
     circle = pf.Circle(centre=(0.0, 0.280), radius=0.030, max_acceleration=30.0)
     task = pf.plan_tracking(finer, circle, duration=0.5)
     converged = pf.tracking_dataset(

@@ -21,7 +21,8 @@ def execute(path: Path, folder: str | Path) -> Any:
         cell.metadata = {}
         cell.pop("id", None)
         for output in cell.get("outputs", []):
-            output.metadata = {}
+            if "metadata" in output:
+                output.metadata = {}
     notebook.metadata = {
         "kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"},
         "language_info": {"name": "python"},

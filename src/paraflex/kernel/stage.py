@@ -41,7 +41,7 @@ CONVERGED, DIVERGED = 0, 1
 WORST_RATE = 0.5
 # A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it. It is not
 # taken to be better than this: motion that sets in makes it worse at once.
-AGEING, BEST_RATE = 1.05, 0.005
+AGEING, BEST_RATE = 1.05, 0.02
 # Changes that fall no more are rounding where they are smaller than this part of the accelerations, or where they
 # move nothing further than this [m]: there are no more digits to be had.
 ROUNDING, FINEST = 1e-8, 1e-15
