@@ -55,7 +55,7 @@ class _Cache:
 
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
-    found = njit(**{**_OPTIONS, **options})(function)
+    found: Any = njit(**{**_OPTIONS, **options})(function)
     found._cache = _Cache(function)
     return found
 

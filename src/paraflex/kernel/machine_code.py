@@ -73,7 +73,7 @@ class _QuickLibrary(_Library):
 
 @cache
 def _quick_machine(codegen: Any) -> binding.TargetMachine:
-    options = {"opt": _LITTLE}
+    options: dict[str, Any] = {"opt": _LITTLE}
     codegen._customize_tm_options(options)
     return binding.Target.from_triple(binding.get_process_triple()).create_target_machine(**options)
 

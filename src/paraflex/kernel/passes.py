@@ -36,7 +36,8 @@ _found: dict[Any, Any] = {}
 @contextmanager
 def remembered_signatures() -> Iterator[None]:
     """Meanwhile Numba's look-up of what an operator or a built-in function makes of given types remembers."""
-    look_up = types.Function.get_call_type
+    functions: Any = types.Function
+    look_up = functions.get_call_type
 
     def remember(function: Any, context: Any, arguments: Any, named: Any) -> Any:
         if named:
@@ -50,11 +51,11 @@ def remembered_signatures() -> Iterator[None]:
         function._impl_keys[signature.args] = implementation
         return signature
 
-    types.Function.get_call_type = remember
+    functions.get_call_type = remember
     try:
         yield
     finally:
-        types.Function.get_call_type = look_up
+        functions.get_call_type = look_up
 
 
 class _Manager(PassManager):
