@@ -39,6 +39,9 @@ MAX_ITERATIONS = 8
 CONVERGED, DIVERGED = 0, 1
 # The slowest contraction worth going on with, assumed of a new factor until one is measured.
 WORST_RATE = 0.5
+# After a guess that was right but for a direction that the norm hardly sees, the second change may be larger than the
+# first by so much.
+SECOND_RATE = 20.0
 # A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it. It is not
 # taken to be better than this: motion that sets in makes it worse at once.
 AGEING, BEST_RATE = 1.05, 0.02
@@ -123,8 +126,8 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
             return DIVERGED, iteration, rate
         if iteration > 1:
             rate = change / previous
-            # From a good guess the second change may be no smaller than the first; from then on each has to be.
-            if change > tolerance and rate > (1.0 / WORST_RATE if iteration == 2 else WORST_RATE):
+            # From a good guess the second change may be larger than the first; from then on each has to be smaller.
+            if change > tolerance and rate > (SECOND_RATE if iteration == 2 else WORST_RATE):
                 if b * size > FINEST and size > ROUNDING * mass_norm(p, ws, a):
                     return DIVERGED, iteration, rate
                 rate = 0.0
