@@ -1,6 +1,9 @@
-"""Mechanisms, paths and plans that several test files share."""
+"""Mechanisms, paths, plans and a browser that several test files share."""
 
 from __future__ import annotations
+
+import os
+import shutil
 
 import numpy as np
 import pytest
@@ -27,6 +30,7 @@ from paraflex.mechanism import (
 from paraflex.simulate import plan_tracking
 
 SQUARE = ((0.050, 0.314), (-0.050, 0.314), (-0.050, 0.214), (0.050, 0.214))
+DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
 # Soft enough that bending, stretching and inertia are of one magnitude in a random state.
 RUBBER = Material(youngs_modulus=5e6, density=1100.0)
 
@@ -148,3 +152,57 @@ def make_five_bar(base=0.1, proximal=0.25, distal=0.25):
         end_effector=EndEffector(PointRef("distal1", "C")),
         assemblies=(Assembly("outward", angles),),
     )
+
+
+def chromium() -> str | None:
+    """Where a Chromium is."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    return os.environ.get("PARAFLEX_CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = chromium()
+    if path is None:
+        message = "no Chromium: install it, or say where it is in PARAFLEX_CHROMIUM"
+        if os.environ.get("CI", "").lower() in ("1", "true"):
+            pytest.fail(message)
+        pytest.skip(message)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        # Root, as containers have it, may not make the sandbox; the pages are our own.
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(browser, report):
+    """Opens a report; what its console says and what it asks of a network must be nothing in the end."""
+    complaints, contexts = [], []
+
+    def open_page(file=report, viewport=DESKTOP, **settings):
+        contexts.append(browser.new_context(viewport=viewport, **settings))
+        page = contexts[-1].new_page()
+        page.on("console", lambda message: complaints.append(message.text) if is_ours(message.text) else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda request: complaints.append(request.url) if page_asks(request.url) else None)
+        page.goto(file.as_uri())
+        page.wait_for_function("document.documentElement.dataset.charts === 'true'")
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert complaints == []
+
+
+def is_ours(message: str) -> bool:
+    """Whether a message is not one of the driver that stands in for a graphics card."""
+    return "GL Driver Message" not in message and "WebGL-" not in message
+
+
+def page_asks(url: str) -> bool:
+    """Whether a request goes anywhere but to the file and what is in it."""
+    return not url.startswith(("file:", "data:", "blob:"))

@@ -1,40 +1,17 @@
 """The report as a reader has it, in a real Chromium without a window: it opens, moves, follows its keys, fits."""
 
-import os
-import shutil
 from collections import Counter
 
 import pytest
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 
+from conftest import DESKTOP, PHONE
 from paraflex.report import Chart, Panel, save_page, tracking_page, verification_page
 from paraflex.report import Page as ReportPage
 from reports import FAILED, MODES, tracked, verified
 
-DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
 # Of opening, on a machine that is busy with other tests as well: the best of so many is told [ms].
 OPENING, TRIES = 2000.0, 5
-
-
-def chromium() -> str | None:
-    """Where a Chromium is."""
-    names = ("chromium", "chromium-browser", "google-chrome")
-    return os.environ.get("PARAFLEX_CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    path = chromium()
-    if path is None:
-        message = "no Chromium: install it, or say where it is in PARAFLEX_CHROMIUM"
-        if os.environ.get("CI", "").lower() in ("1", "true"):
-            pytest.fail(message)
-        pytest.skip(message)
-    with sync_playwright() as playwright:
-        # Root, as containers have it, may not make the sandbox; the pages are our own.
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
@@ -42,37 +19,6 @@ def report(tmp_path_factory):
     file = tmp_path_factory.mktemp("report") / "report.html"
     save_page(tracking_page(tracked(), FAILED), file)
     return file
-
-
-@pytest.fixture
-def opened(browser, report):
-    """Opens a report; what its console says and what it asks of a network must be nothing in the end."""
-    complaints, contexts = [], []
-
-    def open_page(file=report, viewport=DESKTOP, **settings) -> Page:
-        contexts.append(browser.new_context(viewport=viewport, **settings))
-        page = contexts[-1].new_page()
-        page.on("console", lambda message: complaints.append(message.text) if is_ours(message.text) else None)
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("request", lambda request: complaints.append(request.url) if page_asks(request.url) else None)
-        page.goto(file.as_uri())
-        page.wait_for_function("document.documentElement.dataset.charts === 'true'")
-        return page
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert complaints == []
-
-
-def is_ours(message: str) -> bool:
-    """Whether a message is not one of the driver that stands in for a graphics card."""
-    return "GL Driver Message" not in message and "WebGL-" not in message
-
-
-def page_asks(url: str) -> bool:
-    """Whether a request goes anywhere but to the file and what is in it."""
-    return not url.startswith(("file:", "data:", "blob:"))
 
 
 def drawn(page: Page) -> str:

@@ -9,9 +9,8 @@ import pandas as pd
 import pytest
 
 from paraflex.errors import InputError
-from paraflex.plots.designs import DesignTable
-from paraflex.plots.responses import undominated
-from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows, fronts, in_conflict
+from paraflex.plots.designs import DesignTable, in_conflict, undominated
+from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows, fronts
 from paraflex.report.designs import Studied, read_studied, reasons
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
@@ -222,7 +221,7 @@ def test_of_many_runs_a_part_is_drawn_and_the_best_and_the_fronts_stay():
     rows = drawn_rows(studied, best)
     assert rows.size == np.unique(rows).size == 5000
     assert set(best) <= set(rows.tolist())
-    for front in fronts(studied, *in_conflict(studied)):
+    for front in fronts(studied, *in_conflict(studied.table, studied.judged)):
         assert set(front.tolist()) <= set(rows.tolist())
     assert studied.table.complete[rows].all()
     account = StudyAccount("sweep", "many", "made up", 100_000, {})

@@ -3,10 +3,11 @@
 import pytest
 from playwright.sync_api import Page
 
+from conftest import DESKTOP, PHONE
 from paraflex.report import save_page
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
-from test_report_browser import DESKTOP, PHONE, browser, drawn, is_ours, page_asks, settle  # noqa: F401
+from test_report_browser import drawn, settle
 
 STUDY = """
 mechanism = "raparm_i"
@@ -39,27 +40,6 @@ def report(tmp_path_factory):
     result = sweep(load_sweep(folder / "study.toml"), folder / "out", workers=1)
     save_page(study_page(result.folder), folder / "report.html")
     return folder / "report.html"
-
-
-@pytest.fixture
-def opened(browser, report):  # noqa: F811
-    """Opens the report; what its console says and what it asks of a network must be nothing in the end."""
-    complaints, contexts = [], []
-
-    def open_page(viewport=DESKTOP, **settings) -> Page:
-        contexts.append(browser.new_context(viewport=viewport, **settings))
-        page = contexts[-1].new_page()
-        page.on("console", lambda message: complaints.append(message.text) if is_ours(message.text) else None)
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("request", lambda request: complaints.append(request.url) if page_asks(request.url) else None)
-        page.goto(report.as_uri())
-        page.wait_for_function("document.documentElement.dataset.charts === 'true'")
-        return page
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert complaints == []
 
 
 def traces(page: Page, chart: str) -> list[dict]:

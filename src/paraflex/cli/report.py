@@ -12,7 +12,7 @@ from rich.console import Console
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.report import Page, motion_page, save_page, tracking_page, verification_page
-from paraflex.results.storage import open_results, results_file
+from paraflex.results.storage import kind_of, open_results, results_file
 
 
 def report_command(results: str, output: str | None, *, force: bool) -> None:
@@ -55,9 +55,10 @@ def save_study_report(folder: Path, console: Console, target: Path | None = None
 
 def page_of(data: xr.Dataset, folder: Path) -> Page:
     """The report of a dataset and of what stands in its folder."""
-    if "model" in data.dims:
+    kind = kind_of(data)
+    if kind == "verification":
         return verification_page(data, _beside(folder / "verify.json"))
-    if data.attrs.get("kind") == "motion":
+    if kind == "motion":
         return motion_page(data)
     summary = folder / "summary.json"
     modes = _beside(summary)["modes"] if summary.is_file() else {}

@@ -151,3 +151,24 @@ def read_designs(files: Sequence[Path]) -> DesignTable:
         mode=np.array(table["mode"].to_pylist(), dtype=str),
         complete=np.array(table["status"].to_pylist(), dtype=str) == "complete",
     )
+
+
+def in_conflict(table: DesignTable, judged: Sequence[str]) -> list[str]:
+    """The first of some metrics, and the one with which it makes the longest fronts; fewer where there are not two."""
+    if len(judged) < 2:
+        return list(judged)
+    first, *others = judged
+    series = table.series.values()
+
+    def length(other: str) -> int:
+        return sum(undominated(runs.metrics[first], runs.metrics[other]).size for runs in series)
+
+    return [first, max(others, key=length)]
+
+
+def undominated(x: Array, y: Array) -> NDArray[np.intp]:
+    """Indices, in order of x, of the points that no other is below in one of two numbers without being above in one."""
+    order = np.lexsort((y, x))
+    least = np.minimum.accumulate(y[order])
+    better = np.concatenate([[True], y[order][1:] < least[:-1]]) if order.size else np.zeros(0, dtype=bool)
+    return order[better]

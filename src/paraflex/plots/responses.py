@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.plots.designs import DesignTable
+from paraflex.plots.designs import DesignTable, in_conflict, undominated
 from paraflex.plots.labels import mode_label, peak, plain, power_of_ten
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
 from paraflex.plots.style import journal_style, look_of
@@ -113,7 +113,7 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
     InputError
         No such metric, or not two of them.
     """
-    chosen = table.judged_by(metrics, 2) if metrics else _in_conflict(table)
+    chosen = table.judged_by(metrics, 2) if metrics else in_conflict(table, table.judged_by(None, len(table.metrics)))
     if len(chosen) != 2:
         raise InputError(
             "a front is of two metrics", field="metric", value=", ".join(chosen), remedy="name two that vary"
@@ -135,21 +135,3 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
     panel.set_xlabel(across)
     panel.set_ylabel(up)
     return lay_out(figure, axes, panel_height=58.0)
-
-
-def _in_conflict(table: DesignTable) -> list[str]:
-    """The first metric that varies, and the one with which it makes the longest fronts."""
-    first, *others = table.judged_by(None, len(table.metrics))
-
-    def length(other: str) -> int:
-        return sum(undominated(runs.metrics[first], runs.metrics[other]).size for runs in table.series.values())
-
-    return [first, max(others, key=length)] if others else [first]
-
-
-def undominated(x: Array, y: Array) -> NDArray[np.intp]:
-    """Indices, in order of x, of the points that no other is below in one of two numbers without being above in one."""
-    order = np.lexsort((y, x))
-    least = np.minimum.accumulate(y[order])
-    better = np.concatenate([[True], y[order][1:] < least[:-1]]) if order.size else np.zeros(0, dtype=bool)
-    return order[better]

@@ -15,8 +15,6 @@ _OURS = "name a folder or file that paraflex wrote"
 # Files of results, those that tell what a folder is first.
 _TABLES = ("results.parquet",)
 _FILES = ("results.nc", "verify.nc", "compare-methods.json", "sensitivity.json", "indices.json", "result.json")
-# The latest version of what datasets hold that is known.
-_LATEST = 2
 _BEGINNINGS = {b"\x89HDF": "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", b"PAR1": "parquet"}
 
 
@@ -86,19 +84,10 @@ def _format(file: Path) -> str:
 
 
 def _netcdf(file: Path) -> Source:
-    import xarray as xr
+    from paraflex.results import kind_of, open_results
 
-    try:
-        data = xr.load_dataset(file, engine="netcdf4")
-    except (OSError, ValueError) as error:
-        raise InputError("damaged, or not netCDF", field=str(file), remedy="make these results again") from error
-    if "schema" not in data.attrs or "time" not in data.dims:
-        raise InputError("a netCDF file, but none that paraflex wrote", field=str(file), remedy=_OURS)
-    if data.attrs["schema"] > _LATEST:
-        raise InputError("written by a later version", field=str(file), remedy="update paraflex")
-    if data.attrs.get("kind") == "motion":
-        return Source("motion", data, file.parent)
-    return Source("verification" if "model" in data.dims else "tracking", data, file.parent)
+    data = open_results(file)
+    return Source(kind_of(data), data, file.parent)
 
 
 def _table(file: Path) -> Source:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.plots.responses import undominated
+from paraflex.plots.designs import in_conflict, undominated
 from paraflex.report.designs import Studied, metric_name
 
 # Rows drawn at most, runs looked at closely, the best of the first metric and of the front among them.
@@ -44,7 +44,7 @@ def best_runs(studied: Studied) -> list[Picked]:
             continue
         if row in why or len(why) < MOST_RUNS - _FRONT:
             why.setdefault(row, []).append(f"{metric_name(first)} in {name}")
-    pair = in_conflict(studied)
+    pair = in_conflict(studied.table, studied.judged)
     if len(pair) == 2:
         for row in _knees(studied, *pair):
             if len(why) < MOST_RUNS:
@@ -56,22 +56,6 @@ def best_runs(studied: Studied) -> list[Picked]:
     return [Picked(row, tuple(reasons)) for row, reasons in why.items()]
 
 
-def in_conflict(studied: Studied) -> list[str]:
-    """The first metric that varies, and the one with which most runs are on the front; fewer where there are not two.
-
-    As `plots.pareto_front` chooses them.
-    """
-    first, *others = studied.judged or [""]
-    if not others:
-        return [first] if first else []
-    series = studied.table.series.values()
-
-    def length(other: str) -> int:
-        return sum(undominated(runs.metrics[first], runs.metrics[other]).size for runs in series)
-
-    return [first, max(others, key=length)]
-
-
 def drawn_rows(studied: Studied, kept: Sequence[int], most: int = MOST_ROWS) -> NDArray[np.intp]:
     """Rows that are drawn: all complete ones, or where there are too many a part of them evenly chosen by lot.
 
@@ -81,7 +65,7 @@ def drawn_rows(studied: Studied, kept: Sequence[int], most: int = MOST_ROWS) -> 
     if complete.size <= most:
         return complete
     chosen = dict.fromkeys(int(row) for row in kept)
-    pair, names = in_conflict(studied), studied.judged[:_FRONTS]
+    pair, names = in_conflict(studied.table, studied.judged), studied.judged[:_FRONTS]
     for two in [tuple(pair), *combinations(names, 2)]:
         if len(two) == 2 and len(chosen) < most:
             chosen |= dict.fromkeys(int(row) for rows in fronts(studied, *two) for row in rows)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.report.choice import in_conflict
+from paraflex.plots.designs import in_conflict
 from paraflex.report.curves import look
 from paraflex.report.designs import Studied
 from paraflex.report.page import Chart, Column, Curve, Designs, Look, Panel, Picker
@@ -36,7 +36,7 @@ def survey(studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], hi
     if parameters and metrics:
         charts += _responses(parameters, metrics)
     if len(metrics) > 1:
-        pair = [place[name] for name in in_conflict(studied)]
+        pair = [place[name] for name in in_conflict(studied.table, studied.judged)]
         first, second = pair if len(pair) == 2 else metrics[:2]
         charts.append(Chart(
             "front", "Pareto front", "metric", x="metric", over_time=False, drawer="front",

@@ -15,12 +15,13 @@ if TYPE_CHECKING:
     from paraflex.results.dataset import tracking_dataset
     from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
     from paraflex.results.motion_data import motion_dataset, motion_summary
-    from paraflex.results.storage import load_results, open_results, results_file, save_results
+    from paraflex.results.storage import kind_of, load_results, open_results, results_file, save_results
 
 _HOME = {
     "load_results": "storage",
     "motion_dataset": "motion_data",
     "motion_summary": "motion_data",
+    "kind_of": "storage",
     "open_results": "storage",
     "peak_torque": "metrics",
     "residual_vibration": "metrics",
@@ -32,6 +33,7 @@ _HOME = {
 }
 
 __all__ = [
+    "kind_of",
     "load_results",
     "motion_dataset",
     "motion_summary",

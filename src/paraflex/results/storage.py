@@ -74,6 +74,13 @@ def load_results(path: str | Path) -> xr.Dataset:
     return open_results(path)
 
 
+def kind_of(data: xr.Dataset) -> str:
+    """What a dataset is of: a "verification", a "motion" without a path, or "tracking"."""
+    if "model" in data.dims:
+        return "verification"
+    return "motion" if data.attrs.get("kind") == "motion" else "tracking"
+
+
 def results_file(path: str | Path) -> Path:
     """The netCDF file that a folder of results or a file name means.
 
