@@ -20,10 +20,12 @@ from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, build_system, consistent_state
+from paraflex.fem import ReferenceCondition
 from paraflex.integrators import METHODS, IntegrationOptions, Solution, integrate
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import (
     Assembly,
+    Curvature,
     FlexibleBeam,
     Geometry,
     Material,
@@ -49,6 +51,7 @@ def four_bar(modes: int | None = None, geometry: Geometry = Geometry.LINEAR) -> 
         return FlexibleBeam(
             name, length, Section.rectangle(0.02, 0.003), Material(210e9, 7850.0), points={a: 0.0, b: length},
             elements=2, modes=modes, damping=ModalDamping((0.05,)),
+            reference=ReferenceCondition.CANTILEVER, curvature=Curvature.SHARED,
         )  # fmt: skip
 
     ends = {"O": ("ground", "crank"), "A": ("crank", "coupler"), "B": ("coupler", "rocker"), "Q": ("ground", "rocker")}

@@ -13,8 +13,10 @@ from paraflex.fem import ReferenceCondition
 from paraflex.kinematics import Polygon
 from paraflex.mechanism import (
     Assembly,
+    Curvature,
     EndEffector,
     FlexibleBeam,
+    Geometry,
     LumpedMass,
     Material,
     Mechanism,
@@ -75,6 +77,7 @@ def make_linkage(condition=ReferenceCondition.CANTILEVER):
         elements=2,
         lumps=(LumpedMass("O", 0.02, 1e-5), LumpedMass("P", 0.05, 4e-5)),
         reference=condition,
+        curvature=Curvature.SHARED,
     )
     coupler = FlexibleBeam(
         "coupler",
@@ -85,6 +88,7 @@ def make_linkage(condition=ReferenceCondition.CANTILEVER):
         elements=(1, 2),
         lumps=(LumpedMass("Q", 0.04, 2e-5), LumpedMass("R", 0.03, 3e-5)),
         reference=condition,
+        curvature=Curvature.SHARED,
     )
     rocker = RigidBody("rocker", 0.2, 3e-3, (0.1, 0.04), {"S": (-0.02, 0.01), "Q": (0.3, -0.05)})
     flap = RigidBody("flap", 0.1, 1e-3, (-0.05, 0.02), {"R": (0.0, 0.1)})
@@ -103,6 +107,7 @@ def make_linkage(condition=ReferenceCondition.CANTILEVER):
         ),
         motors=(Motor("base", "O"), Motor("knee", "P"), Motor("foot", "S"), Motor("hand", "R")),
         prescribed=(PrescribedAngle("wave", "R", ramp), PrescribedAngle("turn", "S", swing)),
+        geometry=Geometry.LINEAR,
     )
 
 

@@ -20,6 +20,7 @@ from paraflex.dynamics import (
     static_equilibrium,
 )
 from paraflex.errors import InputError
+from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.linear import factor_system, solve_system
@@ -71,6 +72,8 @@ def make_sliders(geometry=Geometry.LINEAR):
         points={"O": 0.0, "M": 0.2, "P": 0.3},
         lumps=(LumpedMass("P", 0.05, 4e-5),),
         damping=RayleighDamping(0.7, 2e-4),
+        reference=ReferenceCondition.CANTILEVER,
+        curvature=Curvature.SHARED,
     )
     rod = FlexibleBeam(
         "rod",
@@ -80,6 +83,8 @@ def make_sliders(geometry=Geometry.LINEAR):
         points={"R": 0.0, "W": 0.5},
         elements=2,
         damping=ModalDamping((0.1, 0.03)),
+        reference=ReferenceCondition.CANTILEVER,
+        curvature=Curvature.SHARED,
     )
     block = RigidBody("block", 0.2, 3e-3, (0.1, 0.04), {"B": (-0.02, 0.01), "S": (0.03, -0.05)})
     plate = RigidBody("plate", 0.1, 1e-3, (-0.05, 0.02), {"W": (0.0, 0.1), "T": (0.2, 0.03)})
@@ -550,7 +555,8 @@ def test_two_welded_beams_swing_as_one():
 
 def test_a_damped_cantilever_decays_by_its_ratio():
     ratio = 0.02
-    mechanism = clamped((bar("beam", 0.6, {"A": 0.0, "B": 0.6}, modes=1, damping=ModalDamping((ratio,))),), ())
+    mechanism = clamped((bar("beam", 0.6, {"A": 0.0, "B": 0.6}, modes=1, damping=ModalDamping((ratio,)),
+                             reference=ReferenceCondition.CANTILEVER),), ())  # fmt: skip
     run = simulate_motion(mechanism, 0.5, samples=2001, options=IntegrationOptions(tolerance=1e-9))
     omega = run.system.body("beam").modes.omega[0]
     eta = run.solution.q[:, run.system.body("beam").flexible][:, 0]

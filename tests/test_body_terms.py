@@ -340,6 +340,7 @@ def test_accelerations_do_not_depend_on_the_number_of_the_bodies():
         mechanism.joints[2:] + mechanism.joints[:2],
         mechanism.motors,
         mechanism.prescribed,
+        geometry=mechanism.geometry,
     )
     one, two = build_system(mechanism), build_system(shuffled)
     q, v, _ = twins.random_state(one, 23)

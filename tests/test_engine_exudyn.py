@@ -14,6 +14,7 @@ from paraflex.dynamics import build_system, consistent_state
 from paraflex.engines.cables import turn_of
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.errors import InputError, IntegrationError
+from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Line
 from paraflex.mechanism import (
@@ -65,6 +66,7 @@ def four_bar(youngs_modulus=280e9):
         # The one at Q lets the curvature jump where the spring's moment acts.
         lumps=(LumpedMass("M", 0.05, 3e-5), LumpedMass("Q", 0.0, 1e-5)),
         curvature=Curvature.SEPARATE,
+        reference=ReferenceCondition.CANTILEVER,
     )
     rocker = RigidBody("rocker", 0.15, 4e-4, (0.1, 0.03), {"S": (0.02, -0.01), "Q": (0.25, 0.02)})
     return Mechanism(

@@ -9,6 +9,7 @@ import scipy.optimize
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.dynamics.state import point_position
 from paraflex.errors import AssemblyError, InputError
+from paraflex.fem import ReferenceCondition
 from paraflex.fem.element import TRANSVERSE
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
@@ -60,8 +61,9 @@ def test_an_arm_on_springs_stands_where_moments_balance():
 def test_a_clamped_beam_sags_and_stays(geometry):
     EI, length, per_length = 5.0, 0.5, 0.27
     beam = FlexibleBeam(
-        "beam", length, Section(1e-4, EI / 70e9), Material(70e9, per_length / 1e-4), {"A": 0.0, "B": length}, 2
-    )
+        "beam", length, Section(1e-4, EI / 70e9), Material(70e9, per_length / 1e-4), {"A": 0.0, "B": length}, 2,
+        reference=ReferenceCondition.CANTILEVER,
+    )  # fmt: skip
     mechanism = Mechanism(
         "clamped",
         {"O": (0.0, 0.0)},

@@ -31,8 +31,8 @@ def test_edited_copy_is_read(tmp_path):
 # What is replaced, by what, and what the message must name: the field, and the remedy or value.
 BROKEN = [
     (
-        'name = "RAParM-I"\n',
-        'name = "RAParM-I"\ngeometry = "second-oder"\n',
+        'geometry = "linear"\n',
+        'geometry = "second-oder"\n',
         "geometry: should be 'linear' or 'second-order'",
         "the shape of beams",
     ),
@@ -48,7 +48,7 @@ BROKEN = [
     ),
     ("length = 0.250 # m", "length = true", "body.link1.length", "give the length in m"),
     ("length = 0.250 # m", "length = inf", "body.link1.length: should be a finite number", "in m"),
-    ("length = 0.250 # m", "length =", "not valid TOML", "line 38"),
+    ("length = 0.250 # m", "length =", "not valid TOML", "line 45"),
     ('type = "beam"', 'type = "bean"', "body.link1.type: unknown type (got 'bean')", "'beam', 'rigid'"),
     ('section = "bar"', 'section = "baar"', "body.link1.section: unknown section", 'did you mean "bar"?'),
     ('material = "aluminium"', 'material = "steel"', "body.link1.material: unknown material", "aluminium"),

@@ -17,10 +17,12 @@ from paraflex.dynamics import (
 )
 from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError, IntegrationError
+from paraflex.fem import ReferenceCondition
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.mechanism import (
     Assembly,
+    Curvature,
     FlexibleBeam,
     Material,
     Mechanism,
@@ -41,6 +43,8 @@ def beam(**changes) -> FlexibleBeam:
         "material": Material(70e9, 2700.0),
         "points": {"O": 0.0, "P": 1.0},
         "elements": 2,
+        "reference": ReferenceCondition.CANTILEVER,
+        "curvature": Curvature.SHARED,
     }
     return FlexibleBeam(**(values | changes))
 

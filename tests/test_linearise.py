@@ -12,6 +12,7 @@ from paraflex.dynamics.state import mass_matrix
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism import (
     Assembly,
+    Curvature,
     FlexibleBeam,
     LinearSpring,
     Material,
@@ -195,6 +196,7 @@ def beam_on_a_motor(condition, elements=6) -> Mechanism:
         points={"A": 0.0, "B": 0.8},
         elements=elements,
         reference=condition,
+        curvature=Curvature.SHARED,
     )
     return Mechanism(
         name="beam",

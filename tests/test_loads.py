@@ -10,6 +10,7 @@ from conftest import make_five_bar
 from paraflex.dynamics import State, build_system, consistent_state, pack_signals
 from paraflex.dynamics.state import point_position
 from paraflex.errors import InputError
+from paraflex.fem import ReferenceCondition
 from paraflex.fem.element import TRANSVERSE
 from paraflex.files import library_file, load
 from paraflex.integrators import IntegrationOptions, integrate
@@ -19,6 +20,7 @@ from paraflex.kinematics import Line
 from paraflex.mechanism import (
     AppliedTorque,
     Assembly,
+    Curvature,
     FlexibleBeam,
     Geometry,
     LinearSpring,
@@ -89,8 +91,9 @@ def test_a_free_beam_falls_without_bending(geometry):
 def test_a_clamped_beam_sags_as_the_textbook_says():
     EI, length, per_length, tip = 5.0, 0.5, 0.27, 3.0
     beam = FlexibleBeam(
-        "beam", length, Section(1e-4, EI / 70e9), Material(70e9, per_length / 1e-4), {"A": 0.0, "B": length}, 2
-    )
+        "beam", length, Section(1e-4, EI / 70e9), Material(70e9, per_length / 1e-4), {"A": 0.0, "B": length}, 2,
+        reference=ReferenceCondition.CANTILEVER, curvature=Curvature.SHARED,
+    )  # fmt: skip
     end = PointRef("beam", "B")
     for acting, deflection, within in (
         ({"gravity": (0.0, -G)}, -per_length * G * length**4 / (8 * EI), 2e-5),

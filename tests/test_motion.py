@@ -153,7 +153,7 @@ def test_the_library_pendulum_runs_from_the_command_line(tmp_path):
     ]
     data = load_results(tmp_path / "out" / "results.nc")
     assert data.sizes["time"] == 51
-    assert data.sizes["coordinate"] == 15
+    assert data.sizes["coordinate"] == 16
     # Let go from the horizontal it falls.
     tip = data["point_position"].sel(point="beam.tip", axis="y")
     assert float(tip[-1]) < -0.5

@@ -13,12 +13,14 @@ import pytest
 from paraflex.dynamics import State, build_system, consistent_state, constant_signals, pack_signals
 from paraflex.dynamics.signals import InputSignals
 from paraflex.errors import InputError, IntegrationError, StiffnessWarning
+from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions, integrate, make_problem
 from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.stepper import attempts
 from paraflex.integrators.stiffness import LIMITS, largest_rate
 from paraflex.mechanism import (
     Assembly,
+    Curvature,
     FlexibleBeam,
     Geometry,
     Material,
@@ -44,7 +46,10 @@ def joint(name, a, b):
 def arm(material=SOFT, geometry=Geometry.LINEAR):
     """A soft beam driven at its root, a rigid bob at its end, under weight."""
     section, points = Section.rectangle(0.02, 0.02), {"O": 0.0, "P": 0.5}
-    rod = FlexibleBeam("rod", 0.5, section, material, points=points, modes=2)
+    rod = FlexibleBeam(
+        "rod", 0.5, section, material, points=points, modes=2,
+        reference=ReferenceCondition.CANTILEVER, curvature=Curvature.SHARED,
+    )  # fmt: skip
     bob = RigidBody("bob", 0.05, 1e-4, (0.05, 0.0), {"P": (0.0, 0.0)})
     return Mechanism(
         name="arm",

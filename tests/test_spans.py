@@ -11,9 +11,11 @@ import scipy.optimize
 from paraflex.cli.inspect import describe
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.errors import InputError
+from paraflex.fem import ReferenceCondition
 from paraflex.files import load
 from paraflex.mechanism import (
     Assembly,
+    Curvature,
     FlexibleBeam,
     Geometry,
     LumpedMass,
@@ -58,6 +60,7 @@ section = "bar"
 material = "steel"
 points = { tip = "L" }
 elements = 8
+reference = "cantilever"
 """
 
 
@@ -193,6 +196,8 @@ def stepped_beam(elements=2):
         {"O": 0.0, "M": 0.37, "N": 0.8, "P": 1.0},
         elements,
         lumps=(LumpedMass("N", 0.05, 1e-3),),
+        reference=ReferenceCondition.CANTILEVER,
+        curvature=Curvature.SHARED,
     )
 
 

@@ -22,6 +22,7 @@ from paraflex.mechanism import (
     Assembly,
     BodyValues,
     ConstantSpeed,
+    Curvature,
     Deflection,
     FlexibleBeam,
     Geometry,
@@ -35,6 +36,7 @@ from paraflex.mechanism import (
     Start,
 )
 from paraflex.motion import simulate_motion
+from paraflex.results.motion import point_motion
 from test_cli import paraflex
 
 LENGTH, EI = 0.8, 70e9 * 0.02 * 0.004**3 / 12
@@ -43,7 +45,8 @@ TIP = PointRef("beam", "tip")
 
 def clamped(**changes):
     beam = FlexibleBeam("beam", LENGTH, Section.rectangle(0.02, 0.004), Material(70e9, 2700.0),
-                        {"root": 0.0, "middle": LENGTH / 2, "tip": LENGTH}, elements=2)  # fmt: skip
+                        {"root": 0.0, "middle": LENGTH / 2, "tip": LENGTH}, elements=2,
+                        reference=ReferenceCondition.CANTILEVER, curvature=Curvature.SHARED)  # fmt: skip
     mechanism = Mechanism(
         "clamped",
         {"O": (0.0, 0.0)},
@@ -94,22 +97,36 @@ def test_given_deflections_are_met_whatever_the_frame(condition):
     system = build_system(mechanism)
     given = {"middle": Deflection(transverse=0.002, slope=-0.01)}
     u = static_shape(system, "beam", given)
-    marker = system.marker(PointRef("beam", "middle"))
-    np.testing.assert_allclose([marker.N[1] @ u, marker.slope @ u], [0.002, -0.01], rtol=1e-9)
+    marker, root = system.marker(PointRef("beam", "middle")), system.marker(PointRef("beam", "root"))
+    C = np.vstack([marker.N[1] - root.N[1] - LENGTH / 2 * root.slope, marker.slope - root.slope])
+    np.testing.assert_allclose(C @ u, [0.002, -0.01], rtol=1e-9)
     # Nothing else that meets them has less energy.
     stiffness = system.bodies[0].modes.omega ** 2
     for other in np.random.default_rng(3).normal(size=(20, u.size)) / np.sqrt(stiffness):
-        C = np.vstack([marker.N[1], marker.slope])
         free = other - np.linalg.pinv(C) @ (C @ other)
         assert abs(u @ (stiffness * free)) < 1e-8 * np.linalg.norm(np.sqrt(stiffness) * u) * np.linalg.norm(
             np.sqrt(stiffness) * free
         )
 
 
-def test_what_the_frame_does_not_allow_is_refused():
+def test_a_deflection_is_the_same_whatever_the_frame(condition):
+    """It counts from the tangent at the first end, which the assembly places."""
+    places = []
+    for reference in (ReferenceCondition.CANTILEVER, condition):
+        mechanism = dataclasses.replace(clamped(reference=reference, elements=4), prescribed=())
+        system = build_system(mechanism)
+        given = Start(deflection={"beam": {"tip": Deflection(1e-5, 0.01)}})
+        q = start_state(system, given, mechanism.assembly()).q
+        places.append([point_motion(system, PointRef("beam", name), *q[None, None].repeat(3, 0)).position[0]
+                       for name in ("root", "middle", "tip")])  # fmt: skip
+    # Alike to what a turn by the slope takes from displacements to first order.
+    np.testing.assert_allclose(places[1], places[0], rtol=0, atol=2e-6)
+
+
+def test_what_contradicts_itself_is_refused():
     system = build_system(clamped(reference=ReferenceCondition.PINNED))
-    with pytest.raises(InputError, match=r"start\.deflection\.beam\.tip\.transverse: the body frame or the other"):
-        static_shape(system, "beam", {"tip": Deflection(transverse=0.01)})
+    with pytest.raises(InputError, match=r"start\.deflection\.beam\.root\.transverse: the other deflections"):
+        static_shape(system, "beam", {"root": Deflection(transverse=0.01)})
 
 
 def test_a_loop_closes_around_a_deflected_link():
@@ -230,6 +247,7 @@ def values(system, x, flexible=True):
 
 def swinging():
     mechanism = dataclasses.replace(load("four_bar").mechanism, prescribed=())
+    mechanism = mechanism.with_beams(reference=ReferenceCondition.CANTILEVER, curvature=Curvature.SHARED)
     system = build_system(mechanism)
     shape = {"coupler": {"B": Deflection(transverse=0.01)}}
     return mechanism, system, start_state(system, Start(deflection=shape, angular={"crank": 3.0}), mechanism.assembly())
@@ -292,7 +310,7 @@ def test_rates_of_some_bodies_carry_the_others_along():
         ),
         (
             Start(coordinates={"coupler": BodyValues(0, 0, 0, (0.0, 1.0))}),
-            "start.coordinates.coupler.flexible: the body has 12 flexible coordinates (got 2); give 12 numbers",
+            "start.coordinates.coupler.flexible: the body has 13 flexible coordinates (got 2); give 13 numbers",
         ),
         (
             Start(coordinates={"crank": BodyValues(0, 0, 0, (1.0,))}),

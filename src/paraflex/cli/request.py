@@ -32,6 +32,17 @@ class StudyRequest:
     report: bool = field(default=True, kw_only=True)
 
 
+def with_frames(mechanism: Mechanism, reference: str | None, curvature: str | None) -> Mechanism:
+    """The mechanism with all beams in the frames and of the curvature asked for; None leaves them as they are."""
+    for name, value in (("reference", reference), ("curvature", curvature)):
+        if value is not None:
+            try:
+                mechanism = mechanism.with_beams(**{name: value})
+            except InputError as error:
+                raise InputError(error.problem, field=f"--{name}", value=value, remedy=error.remedy) from None
+    return mechanism
+
+
 def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
     """A path of the model or of a file, and its name."""
     if name is not None and name not in model.paths and name.endswith(".toml"):

@@ -23,6 +23,7 @@ from paraflex.cli.request import (
     plan_study,
     report_too,
     results_folder,
+    with_frames,
     write_json,
 )
 from paraflex.cli.tables import events, failures, plain_console, study_table
@@ -44,6 +45,8 @@ class RunRequest(StudyRequest):
     integration: IntegrationRequest = field(default_factory=IntegrationRequest)
     rigid: bool = False
     geometry: str | None = None
+    reference: str | None = None
+    curvature: str | None = None
     segments: int | None = None
     ked: bool = False
 
@@ -133,6 +136,9 @@ def _check_fidelity(request: RunRequest) -> None:
     asked = [flag for flag, given in chosen.items() if given]
     if len(asked) > 1:
         raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
+    for flag, given in (("--reference", request.reference), ("--curvature", request.curvature)):
+        if given is not None and (request.rigid or request.segments is not None):
+            raise InputError(f"means nothing with {asked[0]}", field=flag, value=given, remedy="leave one of them out")
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
     given = request.integration.given() | ({"--balanced": True} if request.balanced else {})
@@ -154,6 +160,7 @@ def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
 def asked_mechanism(model: Model, request: RunRequest) -> Mechanism:
     """The mechanism at the fidelity asked for."""
     mechanism = model.mechanism.rigid() if request.rigid else model.mechanism
+    mechanism = with_frames(mechanism, request.reference, request.curvature)
     if request.geometry is None:
         return mechanism
     try:
@@ -183,6 +190,8 @@ def _parameters(
             "ked": request.ked,
             "balanced": request.balanced,
             "geometry": task.mechanism.geometry.value,
+            "reference": request.reference,
+            "curvature": request.curvature,
         }
         | how,
     }

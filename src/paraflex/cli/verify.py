@@ -21,6 +21,7 @@ from paraflex.cli.request import (
     plan_study,
     report_too,
     results_folder,
+    with_frames,
     write_json,
 )
 from paraflex.cli.tables import plain_console
@@ -44,6 +45,8 @@ class VerifyRequest(StudyRequest):
     segments: int | None
     tolerance: float | None = None
     method: str | None = None
+    reference: str | None = None
+    curvature: str | None = None
 
 
 def verify_command(request: VerifyRequest) -> int:
@@ -54,20 +57,22 @@ def verify_command(request: VerifyRequest) -> int:
     modes = find_modes(model, request.modes)
     if not request.modes:
         modes = [max(modes, key=lambda mode: len(mode.motors))]
-    options = _options(request)
+    options, mechanism = _options(request), with_frames(model.mechanism, request.reference, request.curvature)
     models = _models(request)
     for name in models:
-        check_model(name, model.mechanism)
+        check_model(name, mechanism)
     folder = results_folder(request.out)
     for geometry in Geometry:
         if geometry is Geometry.LINEAR or "second-order" in models:
             compile_kernels(geometry, console.print)
     began = time.perf_counter()
-    task = plan_study(model, model.mechanism, path, path_name, request)
+    task = plan_study(model, mechanism, path, path_name, request)
     verification = _run(console, task, modes, models, options)
     parameters = {
         "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "path": path_name, "modes": [mode.name for mode in modes]} | asdict(options),
+        "run": {"mechanism": model.source, "path": path_name, "modes": [mode.name for mode in modes]}
+        | {"reference": request.reference, "curvature": request.curvature}
+        | asdict(options),
     }
     figures = agreement(verification) | {"parameters": parameters}
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):

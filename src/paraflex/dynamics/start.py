@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from paraflex.dynamics.coordinates import BodyCoordinates
+from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.signals import moment_signals
@@ -68,16 +68,21 @@ def start_state(
 def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> NDArray[np.float64]:
     """Modal coordinates (nf,) of a beam of least elastic energy at given deflections of its points.
 
+    Deflections count from the tangent at the first end, whatever the reference condition; of a body of given shapes
+    from its frame.
+
     Raises
     ------
     InputError
-        Deflections that the body frame does not allow or that contradict each other.
+        Deflections that contradict each other, or that the body's shapes do not allow.
     """
     body = system.body(name)
+    root = _root_rows(system, name)
     rows, values, fields = [], [], []
     for point, deflection in points.items():
         marker = system.marker(PointRef(name, point))
-        for what, row in (("axial", marker.N[0]), ("transverse", marker.N[1]), ("slope", marker.slope)):
+        across = marker.N[1] - root[1] - marker.x0[0] * root[2]
+        for what, row in (("axial", marker.N[0] - root[0]), ("transverse", across), ("slope", marker.slope - root[2])):
             value = getattr(deflection, what)
             if value is not None:
                 rows.append(row)
@@ -95,11 +100,20 @@ def static_shape(system: System, name: str, points: Mapping[str, Deflection]) ->
     worst = int(np.argmax(np.abs(left)))
     if abs(left[worst]) > _SAME * np.max(np.abs(d), initial=0.0):
         raise InputError(
-            f"the body frame or the other deflections do not allow it: {abs(left[worst]):.3g} is left",
+            f"the other deflections or the shapes of the body do not allow it: {abs(left[worst]):.3g} is left",
             field=f"start.deflection.{name}.{fields[worst]}", value=values[worst],
-            remedy="displacements count from the body frame: see the beam's reference",
+            remedy="a beam's deflections count from the tangent at its first end, others from the body frame",
         )  # fmt: skip
     return u
+
+
+def _root_rows(system: System, name: str) -> NDArray[np.float64]:
+    """Displacement and slope of a beam's first end in its frame (3, nf); zero for bodies of given shapes."""
+    body = system.body(name)
+    if body.mesh is None:
+        return np.zeros((3, body.nf))
+    first = end_markers(system.index[name], body)[0]
+    return np.vstack([first.N, first.slope])
 
 
 def point_rows(system: System, q: NDArray[np.float64], ref: PointRef) -> NDArray[np.float64]:
@@ -127,8 +141,14 @@ def _coordinates(
         held[body.all] = True
     for name, points in start.deflection.items():
         body = system.body(name)
-        q[body.flexible] = static_shape(system, name, points)
+        u = static_shape(system, name, points)
+        q[body.flexible] = u
         held[body.flexible] = True
+        # The assembly places the tangent at the first end.
+        x, y, slope = _root_rows(system, name) @ u
+        q[body.angle] -= slope
+        cos, sin = np.cos(q[body.angle]), np.sin(q[body.angle])
+        q[body.position] -= [cos * x - sin * y, sin * x + cos * y]
     return _closed(system, signals, time, q, held)
 
 

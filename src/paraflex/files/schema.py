@@ -102,6 +102,10 @@ class DampingTable(_Table):
     ratios: list[Number] = Field(default=[], description="the damping ratio of each mode; the last serves the rest")
 
 
+ReferenceName = Literal["pinned", "cantilever", "free"]
+CurvatureName = Literal["separate", "shared"]
+
+
 class BeamTable(_Table):
     """A flexible beam along its x axis."""
 
@@ -112,11 +116,13 @@ class BeamTable(_Table):
     points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
     elements: Count | list[Count] = Field(default=1, description="elements per span, one number or one a span")
     lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
-    reference: Literal["cantilever", "pinned", "free"] = Field(
-        default="cantilever", description='how the body frame is fixed to the beam: "cantilever", "pinned" or "free"'
+    reference: ReferenceName | None = Field(
+        default=None,
+        description='how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default',
     )
-    curvature: Literal["shared", "separate"] = Field(
-        default="shared", description='curvature at lumped moments of inertia: "shared" or "separate"'
+    curvature: CurvatureName | None = Field(
+        default=None,
+        description='curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default',
     )
     modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
     damping: DampingTable | None = Field(default=None, description="a damping table")
@@ -400,7 +406,15 @@ class ModelTable(_Table):
     name: Text = Field(description="a name for the mechanism")
     description: Text = Field(default="", description="a sentence or two")
     geometry: Literal["linear", "second-order"] = Field(
-        default="linear", description='the shape of beams: "linear" or "second-order"'
+        default="second-order", description='the shape of beams: "second-order", or "linear" as in the paper'
+    )
+    reference: ReferenceName = Field(
+        default="pinned",
+        description='how frames are fixed to beams: "pinned" (along the chord), "cantilever" (the paper\'s) or "free"',
+    )
+    curvature: CurvatureName = Field(
+        default="separate",
+        description='curvature of beams at lumped moments of inertia: "separate", or "shared" as in the paper',
     )
     parameters: dict[str, Any] = Field(default={}, description="numbers by name, for expressions of them in quotes")
     section: dict[str, SectionTable | GeneralSectionTable] = {}

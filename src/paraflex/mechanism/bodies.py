@@ -122,10 +122,11 @@ class FlexibleBeam:
         Elements per span between neighbouring points and ends.
     lumps : tuple of LumpedMass
     reference : ReferenceCondition
-        How the floating frame is fixed to the beam; the paper's is the cantilever.
+        How the floating frame is fixed to the beam. Pinned by default: deflections count from the chord, and stay small
+        where those from a tangent do not. The paper's is the cantilever.
     curvature : Curvature
-        At nodes with a lumped moment of inertia; the paper's is shared. Where sections of different bending stiffness
-        meet there is always one on either side.
+        At nodes with a lumped moment of inertia, and at the tip. Separate by default; the paper's is shared. Where
+        sections of different bending stiffness meet there is always one on either side.
     modes : int, optional
         Modes of lowest frequency kept as flexible coordinates, in its frame; all by default.
     damping : RayleighDamping or ModalDamping, optional
@@ -141,8 +142,8 @@ class FlexibleBeam:
     points: Mapping[str, float] = field(default_factory=dict)
     elements: int | tuple[int, ...] = 1
     lumps: tuple[LumpedMass, ...] = ()
-    reference: ReferenceCondition = ReferenceCondition.CANTILEVER
-    curvature: Curvature = Curvature.SHARED
+    reference: ReferenceCondition = ReferenceCondition.PINNED
+    curvature: Curvature = Curvature.SEPARATE
     modes: int | None = None
     damping: Damping | None = None
     flexible: bool = True

@@ -66,7 +66,8 @@ class Geometry(Enum):
     """How the shape of a beam follows from its flexible coordinates.
 
     LINEAR
-        As in the paper: displacements linear in the coordinates. A bent beam does not get shorter.
+        As in the paper: displacements linear in the coordinates. A bent beam does not get shorter; where axial forces
+        are large the answer is wrong, by how much depends on the reference condition.
     SECOND_ORDER
         With the shortening by bending, kept through inertia, joints and their Jacobians: right where axial forces are
         large.
@@ -104,7 +105,7 @@ class Mechanism:
     modes : tuple of ActuationMode
         The modes to choose from by default; any other set of motors may be asked for.
     geometry : Geometry
-        Of its flexible beams.
+        Of its flexible beams; of second order by default, linear in the paper.
     description : str
 
     Raises
@@ -128,7 +129,7 @@ class Mechanism:
     linear_springs: tuple[LinearSpring, ...] = ()
     loads: tuple[Load, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
-    geometry: Geometry = Geometry.LINEAR
+    geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from math import pi
 
-from paraflex.mechanism.bodies import FlexibleBeam, LumpedMass, Material, Section
+from paraflex.fem import ReferenceCondition
+from paraflex.mechanism.bodies import Curvature, FlexibleBeam, LumpedMass, Material, Section
 from paraflex.mechanism.joints import Motor, PointRef, RevoluteJoint
-from paraflex.mechanism.mechanism import ActuationMode, Assembly, EndEffector, Mechanism
+from paraflex.mechanism.mechanism import ActuationMode, Assembly, EndEffector, Geometry, Mechanism
 
 # Table 1: signs of the motors tau1 (A1B1), tau2 (D1E1), tau5 (A2B2), tau6 (D2E2).
 TABLE_1 = ("+-+-", "-+-+", "+--+", "-++-", "+++-", "++-+", "+-++", "-+++", "++++")
@@ -30,7 +31,11 @@ def raparm_i(
     end_mass: float = 0.225,
     end_inertia: float = 2.5e-5,
 ) -> Mechanism:
-    """Build RAParM-I; the defaults are the reference set, identified from the paper's results.
+    """Build RAParM-I as the paper models it; the defaults are the reference set, identified from the paper's results.
+
+    Linear geometry, cantilever frames, shared curvature. A better model of the same manipulator is
+    `raparm_i().with_geometry("second-order").with_beams(reference=ReferenceCondition.PINNED,
+    curvature=Curvature.SEPARATE)`.
 
     Parameters
     ----------
@@ -56,7 +61,10 @@ def raparm_i(
             for p in points
         )
         length = max(points.values())
-        return FlexibleBeam(f"link{number}", length, section, material, points, elements, lumps)
+        return FlexibleBeam(
+            f"link{number}", length, section, material, points, elements, lumps,
+            reference=ReferenceCondition.CANTILEVER, curvature=Curvature.SHARED,
+        )  # fmt: skip
 
     bodies, joints, motors = [], [], []
     for side, first in ((1, 1), (2, 5)):
@@ -79,6 +87,7 @@ def raparm_i(
     joints.append(RevoluteJoint("C", PointRef("link4", "C"), PointRef("link8", "C")))
     return Mechanism(
         name="RAParM-I",
+        geometry=Geometry.LINEAR,
         ground={"A1": (-e, 0.0), "D1": (-e, 0.0), "A2": (e, 0.0), "D2": (e, 0.0)},
         bodies=tuple(bodies),
         joints=tuple(joints),

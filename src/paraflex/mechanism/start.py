@@ -14,7 +14,9 @@ from paraflex.mechanism.quantities import known
 
 @dataclass(frozen=True)
 class Deflection:
-    """How far a point of a beam is off its place in the body frame; None leaves it to the others.
+    """How far a point of a beam is off its place along the tangent at the first end; None leaves it to the others.
+
+    Of a body of given shapes, off its place in the body frame.
 
     Attributes
     ----------

@@ -21,6 +21,8 @@ _GIVEN = {
     "step": "--step",
     "constraints": "--constraints",
     "segments": "--segments",
+    "reference": "--reference",
+    "curvature": "--curvature",
 }
 
 
@@ -93,7 +95,7 @@ def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence
         words += ["--engine" if name in engines else "--model", name]
     time = data["time"].values
     words += ["--duration", str(time[-1]), "--samples", str(time.size)]
-    for name in ("tolerance", "method", "segments"):
+    for name in ("tolerance", "method", "segments", "reference", "curvature"):
         if run.get(name) is not None:
             words += [_GIVEN[name], str(run[name])]
     return shlex.join(words)

@@ -81,11 +81,12 @@ def joint_forces(
 
 
 def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Axial [m] and transverse [m] displacement and slope [rad] of a beam's last end in its body frame: (k, 3).
+    """Axial [m] and transverse [m] displacement and slope [rad] of a beam's last end: (k, 3).
 
+    From where it would be were the beam straight along its tangent at the first end, whatever its reference condition.
     Zero for a body without flexible coordinates. The axial displacement is the stretch, less the shortening by bending
-    where the geometry is of second order. Of a modal body, displacements along x and y and turn of its last point; NaN
-    where it has no two points apart.
+    where the geometry is of second order. Of a modal body, displacements along x and y and turn of its last point
+    against its first; NaN where it has no two points apart.
     """
     body = system.body(name)
     if body.nf == 0:
@@ -93,8 +94,12 @@ def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray
     ends = end_markers(system.index[name], body)
     if not ends:
         return np.full((q.shape[0], 3), np.nan)
-    u, last = q[:, body.flexible], ends[-1]
-    tip = u @ np.vstack([last.N, last.slope]).T
+    u, first, last = q[:, body.flexible], ends[0], ends[-1]
+    length = last.x0 - first.x0
+    apart = length + u @ (last.N - first.N).T
     if last.bending is not None:
-        tip[:, 0] -= 0.5 * np.sum(u * (u @ last.bending), axis=1)
-    return tip
+        apart[:, 0] -= 0.5 * np.sum(u * (u @ last.bending), axis=1)
+    root = u @ first.slope
+    cos, sin = np.cos(root), np.sin(root)
+    along = np.column_stack([cos * apart[:, 0] + sin * apart[:, 1], cos * apart[:, 1] - sin * apart[:, 0]])
+    return np.column_stack([along - length, u @ last.slope - root])

@@ -42,3 +42,11 @@ ClusterOption = Annotated[
 ]
 ReportOption = Annotated[bool, typer.Option("--report/--no-report", help="Write report.html, or leave it out.")]
 Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
+ReferenceOption = Annotated[
+    str | None,
+    typer.Option(metavar="pinned|cantilever|free", help="How frames are fixed to beams. Default: the model's."),
+]
+CurvatureOption = Annotated[
+    str | None,
+    typer.Option(metavar="separate|shared", help="Curvature of beams at lumped inertias. Default: the model's."),
+]

@@ -8,11 +8,13 @@ import typer
 
 from paraflex.cli.commands.options import (
     AssemblyOption,
+    CurvatureOption,
     DurationOption,
     Json,
     MechanismOption,
     MethodOption,
     PathOption,
+    ReferenceOption,
     ReportOption,
     SamplesOption,
 )
@@ -59,8 +61,10 @@ def run(
     ] = None,
     rigid: Annotated[bool, typer.Option("--rigid", help="Take all bodies as rigid.")] = False,
     geometry: Annotated[
-        str | None, typer.Option(metavar="linear|second-order", help="Shape of the beams. Default: the model's.")
+        str | None, typer.Option(metavar="second-order|linear", help="Shape of the beams. Default: the model's.")
     ] = None,
+    reference: ReferenceOption = None,
+    curvature: CurvatureOption = None,
     segments: Annotated[
         int | None,
         typer.Option(metavar="N", help="Cut beams into finite segments, so many the longest (the paper's: 8)."),
@@ -106,6 +110,8 @@ def run(
         integration=integration,
         rigid=rigid,
         geometry=geometry,
+        reference=reference,
+        curvature=curvature,
         segments=segments,
         ked=ked,
         balanced=balanced,
@@ -134,6 +140,8 @@ def verify(
     tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance of runs with error control.")] = None,
     method: MethodOption = None,
     segments: Annotated[int | None, typer.Option(metavar="N", help="Finite segments on the longest beam.")] = None,
+    reference: ReferenceOption = None,
+    curvature: CurvatureOption = None,
     duration: DurationOption = None,
     samples: SamplesOption = None,
     assembly: AssemblyOption = None,
@@ -161,6 +169,8 @@ def verify(
         fidelities=model or [],
         segments=segments,
         method=method,
+        reference=reference,
+        curvature=curvature,
         report=report,
     )
     raise typer.Exit(verify_command(request))

@@ -1,0 +1,152 @@
+"""Which method and tolerance are right by default? Work and accuracy of our methods over the library and hard cases.
+
+    python benchmarks/default_method.py [--only CASE ...] [--write]
+
+Every library mechanism with its own study, in second-order geometry, pinned frames and separate curvature where it has
+flexible beams; then what makes integration hard: dry friction, torques and loads that jump, singular positions on the
+way. Each is run by the ESDIRK methods at three tolerances and compared with a converged run.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
+from statistics import median
+from typing import Any
+
+from common import markdown, single_thread, write_json
+
+from paraflex import load
+from paraflex.dynamics import build_system, consistent_state, start_state
+from paraflex.errors import IntegrationError
+from paraflex.fem import ReferenceCondition
+from paraflex.files import Model
+from paraflex.mechanism import Curvature, FlexibleBeam, Geometry, JointFriction, Mechanism
+from paraflex.simulate import plan_tracking
+from paraflex.studies import Case, ComparisonOptions, compare_methods, motion_case, tracking_case
+
+METHODS = ("tr-bdf2", "esdirk3", "esdirk4", "esdirk5")
+TOLERANCES = (1e-4, 1e-5, 1e-6)
+TRACKED = ("raparm_i", "raparm_ii", "3rrr", "4rrr", "3prr", "five_bar", "slider_crank")
+FREE = ("pendulum", "four_bar", "andrews", "slider_crank_flexible", "spin_up", "chain:20", "four_bars:2", "four_bars:7")
+
+
+def right(mechanism: Mechanism) -> Mechanism:
+    """In the geometry and frames that are the defaults."""
+    if not any(isinstance(body, FlexibleBeam) and body.flexible for body in mechanism.bodies):
+        return mechanism
+    beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam)]
+    changed = [replace(beam, reference=ReferenceCondition.PINNED, curvature=Curvature.SEPARATE) for beam in beams]
+    return mechanism.with_bodies(changed).with_geometry(Geometry.SECOND_ORDER)
+
+
+def tracked(model: Model, mechanism: Mechanism, mode: str) -> Case:
+    """A mode of the model's own study."""
+    path = model.path()
+    name = model.study.path or next(iter(model.paths))
+    task = plan_tracking(
+        mechanism, path, duration=model.duration(name, path), samples=model.study.samples,
+        assembly=model.study.assembly, orientation=model.study.orientation,
+    )  # fmt: skip
+    return tracking_case(task, mode)
+
+
+def free(model: Model, mechanism: Mechanism) -> Case:
+    """The model's own motion."""
+    system, assembly = build_system(mechanism), mechanism.assembly(model.study.assembly)
+    start = consistent_state(system, assembly) if model.start is None else start_state(system, model.start, assembly)
+    return motion_case(
+        mechanism, model.study.duration or 3.0, samples=model.study.samples, torques=model.study.torques, start=start
+    )
+
+
+def cases() -> Iterator[tuple[str, Callable[[], Case]]]:
+    """All of them by name."""
+    for name in TRACKED:
+        model = load(name)
+        for mode in model.study.modes or [each.name for each in model.mechanism.modes]:
+            yield f"{name} {mode}", lambda model=model, mode=mode: tracked(model, right(model.mechanism), mode)
+    for name in FREE:
+        model = load(name)
+        yield name, lambda model=model: free(model, right(model.mechanism))
+    five = load("five_bar")
+    rubbing = replace(right(five.mechanism), frictions=(JointFriction("rub", "A1", limit=0.4, speed=0.3),))
+    yield "five_bar with friction", lambda: tracked(five, rubbing, "++")
+    sticking = replace(right(five.mechanism), frictions=(JointFriction("rub", "A1", limit=0.4, speed=0.01),))
+    yield "five_bar with sharp friction", lambda: tracked(five, sticking, "++")
+
+
+def measured(case: Case, limit: float) -> dict[str, Any]:
+    """What every method took at every tolerance, and how far off it is."""
+    comparison = compare_methods(
+        case, METHODS, options=ComparisonOptions(tolerances=TOLERANCES, limit=limit, repetitions=2)
+    )
+    assert comparison.reference is not None
+    return {
+        "coordinates": comparison.coordinates,
+        "uncertainty": comparison.reference.uncertainty,
+        "runs": [asdict(run) for run in comparison.measurements],
+    }
+
+
+def rows(found: dict[str, dict[str, Any]]) -> Iterator[list[str]]:
+    """A line a method and tolerance: failures, error over tolerance, time against TR-BDF2 at 1e-4 m, steps likewise."""
+    for method in METHODS:
+        for tolerance in TOLERANCES:
+            runs, base = [], []
+            for result in found.values():
+                runs += [r for r in result["runs"] if r["method"] == method and r["tolerance"] == tolerance]
+                base += [r for r in result["runs"] if r["method"] == METHODS[0] and r["tolerance"] == TOLERANCES[0]]
+            pairs = [(r, b) for r, b in zip(runs, base, strict=True) if r["status"] == b["status"] == "complete"]
+            errors = sorted(r["error"] / tolerance for r, _ in pairs)
+            yield [
+                f"{method}, {tolerance:g} m",
+                str(sum(r["status"] != "complete" for r in runs)),
+                f"{median(errors):.2f}",
+                f"{errors[-1]:.1f}",
+                f"{median(r['wall_time'] / b['wall_time'] for r, b in pairs):.2f}",
+                f"{max(r['wall_time'] / b['wall_time'] for r, b in pairs):.2f}",
+            ]
+
+
+HEADINGS = (
+    "Method, tolerance",
+    "failed",
+    "error / tolerance, median",
+    "largest",
+    "time / TR-BDF2's at 1e-4 m",
+    "largest",
+)
+
+
+def main() -> None:
+    """Run, print, write."""
+    single_thread()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", nargs="*", help="cases whose names begin so")
+    parser.add_argument("--limit", type=float, default=30.0, help="seconds at which a run is given up")
+    parser.add_argument("--write", metavar="FOLDER", help="where default_method.json goes")
+    given = parser.parse_args()
+    found: dict[str, dict[str, Any]] = {}
+    for name, make in cases():
+        if given.only and not name.startswith(tuple(given.only)):
+            continue
+        try:
+            found[name] = measured(make(), given.limit)
+        except IntegrationError as error:
+            print(f"{name}: {error}")
+            continue
+        for run in found[name]["runs"]:
+            figures = f"{run['error']:.1e} m, {run['wall_time']:.3f} s, {run['steps']} steps" if run["error"] else ""
+            print(
+                f"{name:28} {run['method']:8} {run['tolerance']:g}: {run['status']} {figures}{run['reason']}",
+                flush=True,
+            )
+    print(markdown(HEADINGS, rows(found)))
+    if given.write:
+        write_json("default_method", {"cases": found}, given.write)
+
+
+if __name__ == "__main__":
+    main()
