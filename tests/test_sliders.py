@@ -105,7 +105,12 @@ def test_forces_along_the_rails_move_the_rigid_platform_along_its_path(platform)
 def test_flexible_links_let_the_platform_lag(platform):
     data = tracking_dataset([simulate(platform, "+++", options=IntegrationOptions(tolerance=1e-5))])
     assert 1e-5 < data["tracking_rms"].item() < 1.3e-5
-    # A rail holds what is square to it only.
+    # A rail holds what is square to it; along it pushes its motor.
     force = data["joint_force"].sel(joint="rail1", mode="+++").values
-    assert np.max(np.abs(force[:, 0])) < 1e-9
+    rail = platform.mechanism.joint("rail1")
+    (motor,) = (motor.name for motor in platform.mechanism.motors if motor.joint == "rail1")
+    assert rail.direction == 0.0
+    np.testing.assert_allclose(force[:, 0], data["torque"].sel(motor=motor, mode="+++"), rtol=0, atol=1e-9)
     assert np.max(np.abs(force[:, 1])) > 1.0
+    normal = data["multiplier"].sel(row="rail1 normal", mode="+++").values
+    np.testing.assert_allclose(force[:, 1], -normal, rtol=0, atol=1e-12)
