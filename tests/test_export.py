@@ -105,7 +105,7 @@ def test_matlab_finds_time_first_and_names_that_it_allows(data, tmp_path):
     assert results["units"]["torque"] == "N m"
     assert results["meaning"]["work"].startswith("work of motors")
     assert results["attributes"]["mechanism"] == "RAParM-I"
-    assert results["attributes"]["schema"] == 2
+    assert results["attributes"]["schema"] == 3
     assert np.isnan(results["end_effector"][-1, :, 1]).all()
     # As MATLAB sees it: a column of time, a column of cells, text.
     raw = loadmat(file)["results"][0, 0]

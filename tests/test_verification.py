@@ -96,7 +96,7 @@ def test_kineto_elastodynamics_holds_the_motors_and_misses(figures):
 def test_the_dataset_has_all_models_and_survives_a_file(verification, tmp_path):
     data = verification.dataset()
     assert list(data["model"].values) == list(MODELS)
-    sizes = {"model": 7, "mode": 1, "time": 51, "axis": 2, "body": 8, "motor": 4, "joint": 11, "point": 18}
+    sizes = {"model": 7, "mode": 1, "time": 51, "axis": 2, "body": 8, "motor": 4, "joint": 11, "row": 22, "point": 18}
     assert data.sizes == sizes | {"station": 8 * 17}
     assert data.attrs["reference"] == "second-order"
     assert [str(method).split()[0].strip(",") for method in data["method"].values] == [

@@ -16,6 +16,7 @@ from paraflex.dynamics import (
     System,
     build_system,
     closure_of,
+    missed_turns,
     mobility,
     reach,
 )
@@ -87,13 +88,13 @@ def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]
     }
     if chosen is None or chosen.state is None:
         facts |= {"degrees_of_freedom": facts["gruebler_count"], "redundant_constraints": []}
-        return facts | {"complaints": _complaints(starts, None, None)}
+        return facts | {"complaints": _complaints(system, starts, None, None)}
     state = chosen.state
     free = mobility(rigid, state)
     drives = reach(rigid, state, free.freedoms)
     facts |= _mobility_facts(free) | {"drives": _reach_facts(drives)}
     facts["frequencies"] = frequencies(model, system, rigid, state, chosen.assembly, request)
-    return facts | {"complaints": _complaints(starts, free, drives)}
+    return facts | {"complaints": _complaints(system, starts, free, drives)}
 
 
 def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
@@ -163,7 +164,7 @@ def _reach_facts(drives: Reach) -> dict[str, Any]:
     }
 
 
-def _complaints(starts: Sequence[Closure], free: Mobility | None, drives: Reach | None) -> list[str]:
+def _complaints(system: System, starts: Sequence[Closure], free: Mobility | None, drives: Reach | None) -> list[str]:
     """What is not sound, a sentence each."""
     said = [f'assembly "{start.assembly}": {start.problem}' for start in starts if not start.closes]
     if not starts:
@@ -178,7 +179,16 @@ def _complaints(starts: Sequence[Closure], free: Mobility | None, drives: Reach 
         said += [
             f'mode "{name}" reaches {drives.modes[name]} of {drives.freedoms} degrees of freedom' for name in short
         ]
-    return said
+    return [*said, *_stiffened(system)]
+
+
+def _stiffened(system: System) -> list[str]:
+    """Bodies whose modes kept cannot carry the moments that come in."""
+    return [
+        f"body.{one.point.body}: {one.modes} modes miss {100.0 * one.part:.0f} % of its turn under a moment at "
+        f"{one.point.point}, which {one.cause} brings in: it is too stiff there; leave modes out, or keep more"
+        for one in missed_turns(system)
+    ]
 
 
 def _number(value: float) -> float | None:

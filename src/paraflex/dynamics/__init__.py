@@ -8,6 +8,7 @@ from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.numbers import blocks_of, numbers_of, same_layout, with_numbers
 from paraflex.dynamics.packing import records
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
+from paraflex.dynamics.reduction import MissedTurn, missed_turns
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
 from paraflex.dynamics.singularity import SingularityMeasure
 from paraflex.dynamics.soundness import Closure, Mobility, Redundancy, closure_of, mobility, undeformed
@@ -29,6 +30,7 @@ __all__ = [
     "InputSignals",
     "JointCoordinate",
     "Marker",
+    "MissedTurn",
     "Mobility",
     "Reach",
     "Redundancy",
@@ -46,6 +48,7 @@ __all__ = [
     "end_markers",
     "joint_coordinate",
     "material_angle",
+    "missed_turns",
     "mobility",
     "moment_signals",
     "momentum",

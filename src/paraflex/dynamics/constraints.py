@@ -30,6 +30,8 @@ class Constraint:
     Attributes
     ----------
     name : str
+    joint : str
+        The joint that it is of or acts in.
     kind : int
         Of its ports: POINT, ANGLE or AXIS.
     a, b : PointRef
@@ -50,6 +52,7 @@ class Constraint:
     """
 
     name: str
+    joint: str
     kind: int
     a: PointRef
     b: PointRef
@@ -68,12 +71,12 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
     name, a, b = joint.name, joint.a, joint.b
     parts = []
     if isinstance(joint, PointJoint):
-        parts.append(Constraint(name, POINT, a, b, (f"{name} x", f"{name} y")))
+        parts.append(Constraint(name, name, POINT, a, b, (f"{name} x", f"{name} y")))
     if isinstance(joint, AxisJoint):
         normal, carrier = joint.direction + 0.5 * np.pi, "track" if isinstance(joint, SlidingJoint) else "material"
-        parts.append(Constraint(name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier))
+        parts.append(Constraint(name, name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier))
     if isinstance(joint, PrismaticJoint | WeldJoint):
-        parts.append(Constraint(name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
+        parts.append(Constraint(name, name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
     return parts
 
 
@@ -86,8 +89,8 @@ def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
     if isinstance(joint, AxisJoint):
         keywords |= axis_of(joint)
-        return Constraint(name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
-    return Constraint(name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
+        return Constraint(name, joint.name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
+    return Constraint(name, joint.name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:

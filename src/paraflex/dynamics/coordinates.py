@@ -40,8 +40,8 @@ class BodyCoordinates:
         Its points in its own coordinates, to which `integrals.D` leads.
     points : MassPoints or None
         In modal coordinates, of a flexible beam of second-order geometry.
-    damping : (nf,) array
-        Of the modes [1/s].
+    damping : (nf, nf) array
+        Damping matrix [1/s]: see `dynamics.damping`.
     """
 
     name: str
@@ -50,7 +50,7 @@ class BodyCoordinates:
     modes: ModalBasis
     shape: BodyShape
     points: MassPoints | None = None
-    damping: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    damping: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def mesh(self) -> BeamMesh | None:
@@ -125,7 +125,7 @@ class Marker:
 
 
 def body_coordinates(body: Body, offset: int, geometry: Geometry, like: ModalBasis | None = None) -> BodyCoordinates:
-    """Coordinates of a body that start at an offset in q.
+    """Coordinates of a body that start at an offset in q, undamped.
 
     Parameters
     ----------
@@ -160,9 +160,7 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry, like: ModalBas
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
         points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
-    damping = getattr(body, "damping", None)
-    coefficients = np.zeros(integrals.nf) if damping is None else damping.coefficients(modes.omega)
-    return BodyCoordinates(body.name, offset, integrals, modes, shape, points, coefficients)
+    return BodyCoordinates(body.name, offset, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
 
 
 def make_marker(

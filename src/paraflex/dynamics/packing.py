@@ -72,6 +72,7 @@ def pack_system(
         track_coefficients=coefficients,
         rows=records(ROW, _with_envelope(packer.rows, packer.ports)),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
+        damping=np.concatenate([_coupled_damping(body).ravel() for body in bodies]),
         I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
         G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
         shape=np.concatenate([np.zeros((3, 0)), *(np.vstack([m.N, m.slope]) for m in markers)], axis=1),
@@ -205,7 +206,18 @@ def _load_record(load: Load) -> dict[str, float]:
 
 def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
     s = body.integrals
-    return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2, body.damping])
+    return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2, np.diag(body.damping)])
+
+
+def _is_full(body: BodyCoordinates) -> bool:
+    """Whether the iteration matrix of a body is dense."""
+    return body.points is not None or _coupled_damping(body).size > 0
+
+
+def _coupled_damping(body: BodyCoordinates) -> NDArray[np.float64]:
+    """Damping matrix of a body without its diagonal, rows padded; no rows where nothing is left."""
+    rest = body.damping - np.diag(np.diag(body.damping))
+    return _padded(rest) if np.any(rest) else np.zeros((0, padded(body.nf)))
 
 
 def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -230,7 +242,7 @@ def _products(body: BodyCoordinates) -> NDArray[np.float64]:
 
 
 def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> NDArray[np.float64] | None:
-    if all(body.points is None for body in bodies):
+    if not any(_is_full(body) for body in bodies):
         return None
     return np.concatenate([np.zeros(0), *(_padded(m.bending).ravel() for m in markers if m.bending is not None)])
 
@@ -302,12 +314,13 @@ def records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
 def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
     values = []
     flex = square = port = effort = block = mass = dense = inverse = first = products = jac = 0
-    places = spans = inertias = 0
+    places = spans = inertias = damping = 0
     for body, body_ports, body_efforts, matrix in zip(bodies, ports, efforts, columns, strict=True):
         s = body.integrals
         parts = sum(port["parts"] for port in body_ports)
         # Three lanes more for the rigid coordinates.
         lanes, size, stride = padded(parts + 3), 3 + body.nf, padded(body.nf)
+        coupled, full = _coupled_damping(body).size, _is_full(body)
         masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
         values.append(
             {
@@ -323,6 +336,7 @@ def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
                 "width": matrix.shape[1],
                 "products": products,
                 "stride": stride,
+                "damping": damping if coupled else -1,
                 "block": block,
                 "parts": parts,
                 "lanes": lanes,
@@ -334,6 +348,7 @@ def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
                 "places": places,
                 "spans": spans,
                 "inertias": inertias,
+                "full": int(full),
                 "dense": dense,
                 "inverse": inverse,
                 "m": s.m,
@@ -348,14 +363,15 @@ def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
         effort += len(body_efforts)
         first += matrix.size
         products += 2 * body.nf * stride
+        damping += coupled
         block += parts * lanes
         jac += size * lanes
         mass += masses
         places += body.nf * 3 * padded(masses)
         spans += slopes * padded(masses)
         inertias += 3 * padded(masses)
-        dense += size**2 if slopes else 0
-        inverse += size * padded(size) if slopes else 0
+        dense += size**2 if full else 0
+        inverse += size * padded(size) if full else 0
     return records(BODY, values)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics.constraints import row_order
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
+from paraflex.dynamics.damping import damping_matrix
 from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
@@ -116,6 +117,7 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
         bodies.append(coordinates)
         offset += 3 + coordinates.nf
     index = {body.name: i for i, body in enumerate(bodies)}
-    order = row_order(mechanism, index)
-    packed, rows = pack_system(mechanism, tuple(bodies), index, order)
-    return System(mechanism=mechanism, bodies=tuple(bodies), packed=packed, rows=rows)
+    undamped = tuple(bodies)
+    bodies = tuple(replace(body, damping=damping_matrix(mechanism, undamped, index, body.name)) for body in undamped)
+    packed, rows = pack_system(mechanism, bodies, index, row_order(mechanism, index))
+    return System(mechanism=mechanism, bodies=bodies, packed=packed, rows=rows)

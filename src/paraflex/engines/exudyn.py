@@ -441,6 +441,8 @@ def _record(
         points=np.stack(points, axis=1),
         # Exudyn's multipliers stand on the left of the equations, with the constraint p_b - p_a.
         joint_force=-samples.multipliers[:, model.rows],
+        joint_moment=np.full((len(samples.t), len(mechanism.joints)), np.nan),
+        multiplier=np.full((len(samples.t), task.system.m), np.nan),
         kinetic_energy=kinetic,
         strain_energy=strain,
         work=work,

@@ -7,6 +7,7 @@ from paraflex.files.schema import AssumedModesTable, DampingTable, ModalTable
 from paraflex.mechanism import (
     AssumedModesBeam,
     Damping,
+    LossFactor,
     LumpedMass,
     Material,
     ModalBody,
@@ -72,20 +73,25 @@ def damping(table: DampingTable | None, name: str) -> Damping | None:
     Raises
     ------
     InputError
-        Both kinds at once.
+        Two kinds at once, or a loss factor without its frequency.
     """
     if table is None:
         return None
-    if "ratios" not in table.model_fields_set:
+    given = table.model_fields_set
+    if given <= {"mass", "stiffness"}:
         return RayleighDamping(table.mass, table.stiffness)
-    if table.model_fields_set != {"ratios"}:
-        raise InputError(
-            "ratios and Rayleigh's coefficients exclude each other",
-            field=f"body.{name}.damping",
-            value=sorted(table.model_fields_set),
-            remedy="give ratios alone, or mass and stiffness",
-        )
-    return ModalDamping(tuple(table.ratios))
+    if given == {"ratios"}:
+        return ModalDamping(tuple(table.ratios))
+    if given == {"loss_factor", "frequency"}:
+        return LossFactor(table.loss_factor, table.frequency)
+    raise InputError(
+        "a loss factor goes with the frequency that it is meant for"
+        if given < {"loss_factor", "frequency"}
+        else "ratios, a loss factor and Rayleigh's coefficients exclude one another",
+        field=f"body.{name}.damping",
+        value=sorted(given),
+        remedy="give ratios alone, or loss_factor and frequency, or mass and stiffness",
+    )
 
 
 def _functions(sines: int, polynomials: list[list[float]], field: str) -> tuple[ShapeFunction, ...]:

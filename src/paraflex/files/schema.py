@@ -95,11 +95,18 @@ class LumpTable(_Table):
 
 
 class DampingTable(_Table):
-    """Structural damping of a beam: in proportion to mass and stiffness, or by a ratio for each mode."""
+    """Structural damping of a body: by ratios, by a loss factor, or in proportion to mass and stiffness."""
 
-    mass: Number = Field(default=0.0, description="the part in proportion to mass in 1/s")
+    ratios: list[Number] = Field(
+        default=[],
+        description="the damping ratio of each mode of the body as its joints hold it; the last serves the rest",
+    )
+    loss_factor: Number = Field(
+        default=0.0, description="twice the damping ratio of a vibration at the frequency, in proportion to stiffness"
+    )
+    frequency: Number = Field(default=0.0, description="the frequency in Hz that the loss factor is meant for")
+    mass: Number = Field(default=0.0, description="the part in proportion to mass in 1/s, of the body as it is held")
     stiffness: Number = Field(default=0.0, description="the part in proportion to stiffness in s")
-    ratios: list[Number] = Field(default=[], description="the damping ratio of each mode; the last serves the rest")
 
 
 ReferenceName = Literal["pinned", "cantilever", "free"]

@@ -1,4 +1,4 @@
-"""Bodies of second-order geometry: sums over mass points, and dense iteration matrices.
+"""Bodies of second-order geometry: sums over mass points. Dense iteration matrices, of these and of coupled damping.
 
 A mass point stands at s = x0 + N u - 1/2 e_x f, f = sum_j W_j (N2'_j u)^2 over the Gauss points j that it reaches, and
 its forces on (r, phi, u) are m p'', m (R E s).p'', m (ds/du)^T R^T p'' with the p'' of any point. The mass matrix is
@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, OMEGA2
+from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, MPF, OMEGA2, S2X, S2Y
 from paraflex.kernel.sums import column_sums, row_product
 from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, padded, store, summed, zeros
 
@@ -257,27 +257,52 @@ def subtract_geometric(p, i, geometric, scale, u, x):
 
 
 @routine
-def factor_bent(p, i, b, q, ws, dense):
+def linear_mass(p, i, ws):
+    """Mass matrix of body i of linear geometry into ws.mass, by what `factor.factor_body` noted."""
+    body = p.bodies[i]
+    n, k, width, at = body.nf, body.flex, 3 + body.nf, body.dense
+    sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
+    for j in range(width * width):
+        ws.mass[at + j] = 0.0
+    ws.mass[at] = ws.mass[at + width + 1] = body.m
+    ws.mass[at + 2], ws.mass[at + width + 2], ws.mass[at + 2 * width + 2] = -sy, sx, inertia
+    for j in range(n):
+        ws.mass[at + 3 + j], ws.mass[at + width + 3 + j] = p.modal[S2X, k + j], p.modal[S2Y, k + j]
+        ws.mass[at + 2 * width + 3 + j] = ws.flex[MPF, k + j]
+        ws.mass[at + (3 + j) * (width + 1)] = 1.0
+    for r in range(3):
+        for d in range(r + 1, width):
+            ws.mass[at + d * width + r] = ws.mass[at + r * width + d]
+
+
+@routine
+def factor_dense_body(p, i, b, q, ws, dense):
     """Mass matrix of body i and Cholesky factor of M + g D + b (K + K_g), g^2 = b; without K_g if that is not definite.
 
-    Diagonals of the factor hold reciprocals. Returns whether the body is of second-order geometry; `dense` is
-    ws.dense, None where no body is.
+    Diagonals of the factor hold reciprocals. Returns whether the body's matrix is dense; `dense` is ws.dense, None
+    where no body's is.
     """
     if dense is None:
         return False
     body = p.bodies[i]
-    if body.slopes == 0:
+    if body.full == 0:
         return False
     n, width, at = body.nf, 3 + body.nf, body.dense
     g = sqrt(b)
-    bent_mass(p, i, q, ws, ws.scratch.points)
+    if body.slopes > 0:
+        bent_mass(p, i, q, ws, ws.scratch.points)
+    else:
+        linear_mass(p, i, ws)
     for attempt in range(2):
         for j in range(width * width):
             ws.dense[at + j] = ws.mass[at + j]
         for l in range(n):
             r = at + (3 + l) * width + 3
             ws.dense[r + l] += b * p.modal[OMEGA2, body.flex + l] + g * p.modal[DAMPING, body.flex + l]
-            if attempt == 0:
+            if body.damping >= 0:
+                for d in range(l + 1):
+                    ws.dense[r + d] += g * p.damping[body.damping + l * body.stride + d]
+            if attempt == 0 and body.slopes > 0:
                 for d in range(l + 1):
                     ws.dense[r + d] += b * ws.geometric[body.square + l * n + d]
         definite = True
@@ -299,7 +324,7 @@ def factor_bent(p, i, b, q, ws, dense):
 
 
 @routine
-def solve_bent(p, i, dense, source, target, at, pitch):
+def solve_dense(p, i, dense, source, target, at, pitch):
     """(M + b (K + K_g))^-1 times eight columns of a matrix with rows `pitch` apart, from `at` on."""
     width, first = 3 + p.bodies[i].nf, p.bodies[i].dense
     for r in range(width):
@@ -315,30 +340,30 @@ def solve_bent(p, i, dense, source, target, at, pitch):
 
 
 @routine
-def respond_bent(p, i, ws, dense, inverse):
+def respond_dense(p, i, ws, dense, inverse):
     """Response of body i to its constraint rows into ws.response, and the inverse of its iteration matrix.
 
-    `dense` and `inverse` are those of ws, None for linear geometry.
+    `dense` and `inverse` are those of ws, None where no body's matrix is dense.
     """
     if inverse is None:
         return
     body = p.bodies[i]
     for block in range(0, body.lanes, LANES):
-        solve_bent(p, i, dense, ws.jac, ws.response, body.jac + block, body.lanes)
+        solve_dense(p, i, dense, ws.jac, ws.response, body.jac + block, body.lanes)
     width = 3 + body.nf
     pitch = padded(width)
     for r in range(width):
         for l in range(pitch):
             inverse[body.inverse + r * pitch + l] = 1.0 if r == l else 0.0
     for block in range(0, pitch, LANES):
-        solve_bent(p, i, dense, inverse, inverse, body.inverse + block, pitch)
+        solve_dense(p, i, dense, inverse, inverse, body.inverse + block, pitch)
 
 
 @inlined
 def inverse_times(p, i, inverse, y, x):
     """(M + b (K + K_g))^-1 x of body i in place, in its body frame; y is scratch.
 
-    `inverse` is ws.inverse, None for linear geometry.
+    `inverse` is ws.inverse, None where no body's matrix is dense.
     """
     if inverse is None:
         return

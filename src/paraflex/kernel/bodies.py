@@ -1,7 +1,7 @@
-"""Terms of one body: M q'' + h + K u, kinetic and strain energy (formulation of Eqs. 13-36 in closed form).
+"""Terms of one body: M q'' + h + D u' + K u, kinetic and strain energy (formulation of Eqs. 13-36 in closed form).
 
-Flexible coordinates are mass-normalised modes, so M_ff = 1, K = diag(omega^2) and damping is
-diagonal.
+Flexible coordinates are mass-normalised modes of the body in its frame, so M_ff = 1 and K = diag(omega^2). Damping is
+diagonal where the body's joints hold it as its frame does.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.joints import apply_lines, apply_loads
 from paraflex.kernel.packed import DAMPING, OMEGA2, S2X, S2Y
 from paraflex.kernel.sums import GJ_SUM, I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums, clear_shares, hand_on
+from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 
 @inlined
@@ -68,6 +69,25 @@ def begin_body(p, i, q, v, a, f, scratch, points):
         bent_equations(p, i, q, v, a, f, points)
     else:
         linear_terms(p, i, q, v, a, f, scratch)
+    add_coupled_damping(p, i, v, f, scratch)
+
+
+@inlined
+def add_coupled_damping(p, i, v, f, scratch):
+    """Add D u' of body i to f, without the diagonal of D, which `linear_terms` and `bent_equations` take."""
+    body = p.bodies[i]
+    if body.damping < 0:
+        return
+    e = body.offset + 3
+    for block in range(0, body.stride, LANES):
+        total, at = zeros(), body.damping + block
+        for j in range(body.nf):
+            # The matrix is symmetric.
+            total = add_scaled(total, load(p.damping, at), v[e + j])
+            at += body.stride
+        store(scratch.G2_v, block, total)
+    for j in range(body.nf):
+        f[e + j] += scratch.G2_v[j]
 
 
 @kernel

@@ -1,8 +1,9 @@
 """The iteration matrix of one body at a time: its factor, and its response to its constraint rows.
 
-It is an arrow: diag(1 + b omega^2) bordered by three rigid rows, so factoring it costs O(nf). In the body's own frame
-only s, M_phiphi and M_phif depend on its coordinates, through its deformation: bodies are factored in their frames, and
-`kernel.linear` turns them to where they stand anew at every step, which costs a sixth and keeps an old factor good.
+It is an arrow: diag(1 + g d + b omega^2) bordered by three rigid rows, so factoring it costs O(nf). In the body's own
+frame only s, M_phiphi and M_phif depend on its coordinates, through its deformation: bodies are factored in their
+frames, and `kernel.linear` turns them to where they stand anew at every step, which costs a sixth and keeps an old
+factor good. Of second-order geometry, and where damping couples the modes, the matrix is dense: see `kernel.bending`.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from math import sqrt
 
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import add_track, turn_axes
-from paraflex.kernel.bending import factor_bent, respond_bent
+from paraflex.kernel.bending import factor_dense_body, respond_dense
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import marker_shape, marker_shortening, shorten
 from paraflex.kernel.packed import ANGLE, DAMPING, DINV, GJ, MPF, NX, NY, OMEGA2, S2X, S2Y, SLOPE
@@ -24,7 +25,7 @@ SMALLEST_B = 1e-18
 
 @inlined
 def factor_body(p, i, b, q, ws):
-    """Factor M + g D + b K of body i at q, g^2 = b: the arrow with its 3 x 3 rigid block."""
+    """Factor M + g D + b K of body i at q, D diagonal, g^2 = b: the arrow with its 3 x 3 rigid block."""
     body = p.bodies[i]
     n, k = body.nf, body.flex
     fr, scratch = ws.frame[i], ws.scratch
@@ -164,11 +165,11 @@ def factor_bodies(p, b, q, ws):
     ws.step[0] = max(b, SMALLEST_B)
     turn_axes(p, q, ws.axes)
     for i in range(p.bodies.size):
-        if factor_bent(p, i, b, q, ws, ws.dense):
-            body_jacobian(p, i, q, ws)
-            respond_bent(p, i, ws, ws.dense, ws.inverse)
-        else:
+        if p.bodies[i].slopes == 0:
             factor_body(p, i, b, q, ws)
-            body_jacobian(p, i, q, ws)
+        body_jacobian(p, i, q, ws)
+        if factor_dense_body(p, i, b, q, ws, ws.dense):
+            respond_dense(p, i, ws, ws.dense, ws.inverse)
+        else:
             respond(p, i, ws)
         body_block(p, i, ws)

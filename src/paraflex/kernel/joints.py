@@ -196,6 +196,9 @@ def modal_damping_power(p, v):
         for j in range(body.nf):
             rate = v[body.offset + 3 + j]
             power += p.modal[DAMPING, body.flex + j] * rate * rate
+            if body.damping >= 0:
+                for l in range(body.nf):
+                    power += p.damping[body.damping + j * body.stride + l] * v[body.offset + 3 + l] * rate
     return power
 
 

@@ -271,14 +271,14 @@ def solve_all(p, ws, inverse, x, mu):
         to_body_frame(p, i, ws, x)
         lanes_times(p, i, ws.response, x, ws.scratch)
         add_lanes(p, i, ws, 1.0, 1.0, 1.0, mu)
-        if body.slopes == 0:
+        if body.full == 0:
             x[o], x[o + 1], x[o + 2] = solve_rigid(ws.frame[i], lanes[rigid], lanes[rigid + 1], lanes[rigid + 2])
     solve_schur(p, ws, mu)
     for i in range(p.bodies.size):
         body = p.bodies[i]
         o = body.offset
         reactions(p, i, ws, mu)
-        if body.slopes == 0:
+        if body.full == 0:
             for r in range(3):
                 lanes[body.parts + r] = x[o + r]
             for r in range(3):

@@ -43,6 +43,7 @@ BODY = np.dtype(
         ("width", np.int64),
         ("products", np.int64),  # first entry of its nf x 2 stride matrix in `products`
         ("stride", np.int64),
+        ("damping", np.int64),  # first entry of its nf x stride matrix in `damping`, -1 where damping is diagonal
         ("block", np.int64),  # first entry of its parts x lanes block J M^-1 J^T in Workspace.blocks
         ("parts", np.int64),  # rows of its ports' Jacobians
         ("lanes", np.int64),  # columns of `Workspace.jac` and `Workspace.response`: these rows and three more, padded
@@ -54,6 +55,8 @@ BODY = np.dtype(
         ("places", np.int64),  # first entry of its nf x 3 pitch matrix in `places`
         ("spans", np.int64),  # and of its slopes x pitch matrix in `spans`
         ("inertias", np.int64),  # and of its 3 x pitch matrix in `inertias`
+        # 1 where its iteration matrix is dense: of second-order geometry, or where damping couples its modes.
+        ("full", np.int64),
         ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace
         ("inverse", np.int64),  # and of that with rows padded
         ("m", np.float64),
@@ -178,14 +181,16 @@ class PackedSystem(NamedTuple):
     track_breaks: NDArray[np.float64]
     track_coefficients: NDArray[np.float64]
     rows: NDArray[np.void]
-    modal: NDArray[np.float64]  # (6, total nf): S2x, S2y, I1, G1 + Jf, omega^2, damping
+    modal: NDArray[np.float64]  # (6, total nf): S2x, S2y, I1, G1 + Jf, omega^2, diagonal of the damping matrix
+    damping: NDArray[np.float64]  # nf x stride of every body where that is not all: the rest of the damping matrix
     I2: NDArray[np.float64]  # nf x nf of every body, row by row
     G2: NDArray[np.float64]
     shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every marker
     # The same for vectors: what a body's coordinates give to its sums (see `kernel.sums`), and columns of G2 and I2.
     columns: NDArray[np.float64]
     products: NDArray[np.float64]
-    # Of second-order geometry; without it there is no `bending`, and kernels are compiled without all that needs it.
+    # Of second-order geometry; without it, and without dense iteration matrices, there is no `bending`, and kernels are
+    # compiled without all that needs it.
     bending: NDArray[np.float64] | None  # nf x stride of every marker that bending moves: f = u . bending u
     masses: NDArray[np.void]
     mass_shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every mass point
@@ -261,7 +266,7 @@ class Workspace(NamedTuple):
     response: NDArray[np.float64]
     blocks: NDArray[np.float64]  # J M^-1 J^T of every body, in its frame
     schur: NDArray[np.float64]  # envelope of the Schur complement, then its Cholesky factor
-    # Of second-order geometry, else None:
+    # Where there is `PackedSystem.bending`, of bodies with a dense iteration matrix, else None:
     mass: NDArray[np.float64] | None  # M of every body, (3 + nf)^2
     dense: NDArray[np.float64] | None  # the factor of M + b (K + K_g)
     inverse: NDArray[np.float64] | None  # and its inverse, rows padded
@@ -272,9 +277,9 @@ def make_workspace(p: PackedSystem) -> Workspace:
     """Allocate the workspace of a system."""
     n = int(sum(3 + body["nf"] for body in p.bodies))
     m = p.rows.size
-    bent = [body for body in p.bodies if body["slopes"]]
-    dense = int(sum((3 + body["nf"]) ** 2 for body in bent))
-    inverse = int(sum((3 + body["nf"]) * padded(3 + body["nf"]) for body in bent))
+    full = [body for body in p.bodies if body["full"]]
+    dense = int(sum((3 + body["nf"]) ** 2 for body in full))
+    inverse = int(sum((3 + body["nf"]) * padded(3 + body["nf"]) for body in full))
     lanes = int(sum((3 + body["nf"]) * body["lanes"] for body in p.bodies))
     envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(p.rows)))
     compliance = apart(m)

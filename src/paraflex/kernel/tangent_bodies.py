@@ -194,3 +194,9 @@ def body_terms_tangent(p, i, q, v, a, d, points):
         bent_tangent(p, i, q, v, a, d, points)
     else:
         body_tangent(p, i, q, v, a, d)
+    body = p.bodies[i]
+    if body.damping >= 0:
+        e = body.offset + 3
+        for j in range(body.nf):
+            for l in range(body.nf):
+                d.f[e + j] += p.damping[body.damping + j * body.stride + l] * d.v[e + l]

@@ -13,7 +13,7 @@ from paraflex.mechanism.bodies import (
     given_shapes,
 )
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.damping import Damping, ModalDamping, RayleighDamping
+from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping, stiffness_proportional
 from paraflex.mechanism.joints import (
     GROUND,
     AngleLaw,
@@ -89,6 +89,7 @@ __all__ = [
     "JointFriction",
     "LinearSpring",
     "Load",
+    "LossFactor",
     "LumpedMass",
     "Material",
     "Mechanism",
@@ -134,4 +135,5 @@ __all__ = [
     "parse_mode",
     "proportional_segments",
     "raparm_i",
+    "stiffness_proportional",
 ]

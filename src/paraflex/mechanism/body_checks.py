@@ -9,7 +9,7 @@ from typing import TypeVar
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam, RigidBody
-from paraflex.mechanism.damping import Damping, ModalDamping, RayleighDamping
+from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping
 from paraflex.mechanism.modal import ModalBody
 from paraflex.mechanism.quantities import finite, not_negative, positive
 
@@ -58,6 +58,9 @@ def check_damping(damping: Damping | None, field: str) -> None:
     if isinstance(damping, RayleighDamping):
         not_negative(damping.mass, f"{field}.mass", "1/s")
         not_negative(damping.stiffness, f"{field}.stiffness", "s")
+    if isinstance(damping, LossFactor):
+        not_negative(damping.loss_factor, f"{field}.loss_factor", "a number, twice the damping ratio, say 0.01")
+        positive(damping.frequency, f"{field}.frequency", "Hz")
     if isinstance(damping, ModalDamping):
         if not damping.ratios:
             raise InputError("no damping ratio", field=f"{field}.ratios", value=[], remedy="give one, say [0.01]")

@@ -1,4 +1,4 @@
-"""Structural damping of a flexible body: in proportion to mass and stiffness, or by a ratio for each mode."""
+"""Structural damping of a flexible body: by ratios of its modes, by Rayleigh's coefficients, or by a loss factor."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class RayleighDamping:
-    """Damping in proportion to mass and stiffness: D = mass M_ff + stiffness K.
+    """Damping in proportion to mass and stiffness: D = mass M + stiffness K.
+
+    The part in proportion to mass is that of the body's vibration as its joints hold it (`ModalDamping`); the part in
+    proportion to stiffness depends on nothing but the deformation.
 
     Attributes
     ----------
@@ -24,13 +27,22 @@ class RayleighDamping:
     stiffness: float = 0.0
 
     def coefficients(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of mass-normalised modes of these angular frequencies [1/s]."""
+        """Of the body's mass-normalised modes of these angular frequencies, as its joints hold it [1/s]."""
         return self.mass + self.stiffness * omega**2
 
 
 @dataclass(frozen=True)
 class ModalDamping:
-    """Damping by a ratio for each mode of a body in its frame; the last serves all that follow."""
+    """Damping by a ratio for each mode of the body as its joints hold it, whatever its reference condition.
+
+    The modes are those of the body alone, ascending in frequency, with what its joints hold of it held still: see
+    `dynamics.damping`.
+
+    Attributes
+    ----------
+    ratios : tuple of float
+        Parts of critical damping; the last serves all modes that follow.
+    """
 
     ratios: tuple[float, ...]
 
@@ -40,4 +52,41 @@ class ModalDamping:
         return 2.0 * omega * np.array([self.ratios[min(k, last)] for k in range(omega.size)])
 
 
-Damping = RayleighDamping | ModalDamping
+@dataclass(frozen=True)
+class LossFactor:
+    """Damping of the material by its loss factor at one frequency: D = loss_factor / (2 pi frequency) K.
+
+    A vibration at that frequency has the damping ratio loss_factor / 2, one at another frequency more or less in
+    proportion to it: this is viscous damping, where a material's loss factor would be the same at all frequencies.
+
+    Attributes
+    ----------
+    loss_factor : float
+        Energy lost in a cycle over 2 pi times the largest strain energy in it.
+    frequency : float
+        Of the vibration that it is meant for [Hz].
+    """
+
+    loss_factor: float
+    frequency: float
+
+    @property
+    def stiffness(self) -> float:
+        """Coefficient of stiffness-proportional damping [s]."""
+        return self.loss_factor / (2.0 * np.pi * self.frequency)
+
+    def coefficients(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of the body's mass-normalised modes of these angular frequencies [1/s]."""
+        return self.stiffness * omega**2
+
+
+Damping = RayleighDamping | ModalDamping | LossFactor
+
+
+def stiffness_proportional(damping: Damping) -> float | None:
+    """The coefficient beta of D = beta K [s], or None where damping is not in proportion to stiffness alone."""
+    if isinstance(damping, LossFactor):
+        return damping.stiffness
+    if isinstance(damping, RayleighDamping) and damping.mass == 0.0:
+        return damping.stiffness
+    return None

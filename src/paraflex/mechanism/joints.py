@@ -1,4 +1,10 @@
-"""Joints between named points, prescribed joint angles, and motors at joints."""
+"""Joints between named points, prescribed joint angles, and motors at joints.
+
+The two bodies of a joint have an order. Its coordinate is that of body b against body a, angles positive anticlockwise,
+and results tell what body a does to body b: the force at point b in the ground frame and the moment about point b,
+positive anticlockwise (`results.joint_loads`). A motor's positive torque or force acts on body b so that the coordinate
+grows.
+"""
 
 from __future__ import annotations
 

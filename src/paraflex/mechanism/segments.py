@@ -10,7 +10,7 @@ from math import ceil
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import SpanProperties
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
-from paraflex.mechanism.damping import RayleighDamping
+from paraflex.mechanism.damping import stiffness_proportional
 from paraflex.mechanism.joints import PointRef, RevoluteJoint
 from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import Assembly, Mechanism
@@ -162,13 +162,14 @@ def _stiffness_damping(beam: FlexibleBeam) -> float:
     """Coefficient of stiffness-proportional damping [s]: all that hinges can have."""
     if beam.damping is None:
         return 0.0
-    if isinstance(beam.damping, RayleighDamping) and beam.damping.mass == 0.0:
-        return beam.damping.stiffness
+    coefficient = stiffness_proportional(beam.damping)
+    if coefficient is not None:
+        return coefficient
     raise InputError(
         "finite segments can be damped in proportion to stiffness only",
         field=f"body.{beam.name}.damping",
         value=beam.damping,
-        remedy="give damping = { stiffness = ... }, or none",
+        remedy="give damping = { stiffness = ... }, a loss factor, or none",
     )
 
 

@@ -34,10 +34,12 @@ UNITS = {
     "tip_transverse": ("transverse tip displacement", "m"),
     "tip_slope": ("tip slope", "rad"),
     "point_position": ("position of a named point", "m"),
-    "joint_force": ("force of the joint on its second body, ground frame", "N"),
+    "joint_force": ("force of a joint's first body on its second, ground frame", "N"),
+    "joint_moment": ("moment of a joint's first body on its second", "N m"),
+    "multiplier": ("multiplier of a constraint row; torque or force of a spring, damper or friction", "N, N m"),
     "kinetic_energy": ("kinetic energy", "J"),
-    "strain_energy": ("strain energy", "J"),
-    "work": ("work of motors, prescribed motion, weight and loads, less what dampers take", "J"),
+    "strain_energy": ("strain energy of links and springs", "J"),
+    "work": ("work of motors, prescribed motion, weight and loads, less what dampers and friction take", "J"),
     "actuation_condition": ("condition number of the actuation matrix", "1"),
     "shape": ("drawn points of the bodies, deformed", "m"),
     "shape_base": ("drawn points of the bodies, stiff between the joints that hold them", "m"),
@@ -64,6 +66,34 @@ UNITS = {
     "event_time": ("when it was stopped", "s"),
 }
 
+# What units do not say: on which body, in which frame, positive which way.
+_COMMENTS = {
+    "joint_force": (
+        "at the joint's point of the second body, in the ground frame: of the constraints and of motors, springs, "
+        "dampers, friction and prescribed motion along the joint; the opposite acts on the first body"
+    ),
+    "joint_moment": (
+        "about the joint's point of the second body, positive anticlockwise: of the constraints and of motors, "
+        "springs, dampers, friction and prescribed motion that turn the joint; the opposite acts on the first body"
+    ),
+    "multiplier": (
+        "stands on the left of the equations of motion: minus it acts on the joint's second body, in the ground frame, "
+        "anticlockwise, or along the joint's axis or normal; of least norm where constraints depend on one another"
+    ),
+    "torque": "on the joint's second body: positive turns it anticlockwise or moves it along the axis",
+    "applied_torque": "as `torque` of a run along a path",
+    "angle": "of the body frame's x axis against the ground's, anticlockwise",
+    "tip_transverse": "along y of the body frame, which is its x axis turned anticlockwise",
+    "tip_slope": "anticlockwise",
+}
+
+
+def describe(data: xr.Dataset, name: str, label: str, unit: str) -> None:
+    """Meaning, unit and conventions of a variable into its attributes."""
+    data[name].attrs = {"long_name": label, "units": unit}
+    if name in _COMMENTS:
+        data[name].attrs["comment"] = _COMMENTS[name]
+
 
 def tracking_dataset(
     runs: Sequence[TrackingRun | Record],
@@ -86,8 +116,8 @@ def tracking_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions mode, time, axis, body, motor, joint, point, station, spring, end; units in the attributes of every
-        variable. `shape` and what else drawings are made from is float32.
+        Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end; units and signs in the
+        attributes of every variable. `shape` and what else drawings are made from is float32.
     """
     if not runs:
         raise InputError("no run to keep", field="runs", remedy="simulate at least one mode")
@@ -123,6 +153,7 @@ def tracking_dataset(
             "body": [body.name for body in mechanism.bodies],
             "motor": [motor.name for motor in mechanism.motors],
             "joint": [joint.name for joint in mechanism.joints],
+            "row": list(task.system.rows),
             "point": points,
             **drawing_coordinates(mechanism),
         },
@@ -133,9 +164,9 @@ def tracking_dataset(
     out["residual_vibration"] = residual_vibration(out, task.path.duration)
     for name in out.variables:
         label, unit = UNITS.get(str(name).removesuffix("_desired"), (None, None))
-        if label is not None:
+        if label is not None and unit is not None:
             twin = "desired " if str(name).endswith("_desired") else ""
-            out[name].attrs = {"long_name": twin + label, "units": unit}
+            describe(out, str(name), twin + label, unit)
     units = ", ".join(sorted(set(mechanism.motor_units()), reverse=True)) or "N m"
     for name in ("torque", "peak_torque", "rms_torque"):
         out[name].attrs["units"] = units
@@ -169,6 +200,8 @@ def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.floating]
         "tip_slope": (("body",), full(one.tip[:, :, 2])),
         "point_position": (("point", "axis"), full(one.points)),
         "joint_force": (("joint", "axis"), full(one.joint_force)),
+        "joint_moment": (("joint",), full(one.joint_moment)),
+        "multiplier": (("row",), full(one.multiplier)),
         "kinetic_energy": ((), full(one.kinetic_energy)),
         "strain_energy": ((), full(one.strain_energy)),
         "work": ((), full(one.work)),

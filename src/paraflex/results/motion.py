@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import Marker, System, axis_angle, end_markers
-from paraflex.mechanism import AxisJoint, PointRef
+from paraflex.dynamics import Marker, System, end_markers
+from paraflex.mechanism import PointRef
 
 
 class PointMotion(NamedTuple):
@@ -56,28 +55,6 @@ def marker_motion(
         v[:, body.position] + turned(w * quarter(local) + rate),
         a[:, body.position] + turned(dw * quarter(local) - w**2 * local + 2.0 * w * quarter(rate) + second),
     )
-
-
-def joint_forces(
-    system: System, names: Sequence[str], q: NDArray[np.float64], multipliers: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Forces (k, joints, 2) of joints by name on their second bodies in the ground frame [N].
-
-    Those of a prismatic joint or slot are normal to its axis; those of a sliding joint are told by their part normal to
-    the beam's unbent axis.
-    """
-    row = {label: i for i, label in enumerate(system.rows)}
-    forces = np.zeros((len(q), len(names), 2))
-    for i, name in enumerate(names):
-        joint = system.mechanism.joint(name)
-        # Phi is of b less of a, and Phi_q^T lambda stands on the left of the equations: -lambda acts on b.
-        if isinstance(joint, AxisJoint):
-            along = axis_angle(system, joint, q)
-            normal = np.column_stack([-np.sin(along), np.cos(along)])
-            forces[:, i] = -multipliers[:, row[f"{name} normal"], None] * normal
-        else:
-            forces[:, i] = -multipliers[:, [row[f"{name} x"], row[f"{name} y"]]]
-    return forces
 
 
 def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:

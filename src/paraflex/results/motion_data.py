@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
-from paraflex.results.dataset import UNITS, end_effector_point
+from paraflex.results.dataset import UNITS, describe, end_effector_point
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
-from paraflex.results.motion import joint_forces, point_motion, tip_deflection
+from paraflex.results.joint_loads import joint_loads
+from paraflex.results.motion import point_motion, tip_deflection
 from paraflex.results.record import FIGURES
 from paraflex.results.storage import SCHEMA
 from paraflex.results.summary import finite_or_none
@@ -23,7 +24,6 @@ from paraflex.results.summary import finite_or_none
 _OWN_UNITS = {
     "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
     "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
-    "multiplier": ("multiplier of a constraint row, or torque of a spring or damper", "N, N m"),
     "point_velocity": ("velocity of a named point", "m/s"),
     "applied_torque": ("constant motor torque", "N m"),
 }
@@ -47,8 +47,8 @@ def motion_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end; units in the attributes
-        of every variable.
+        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end; units and signs in
+        the attributes of every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v, a = solution.q, solution.v, solution.a
@@ -57,6 +57,8 @@ def motion_dataset(
     motions = [point_motion(system, point, q, v, a) for point in points]
     angles = [body.angle for body in system.bodies]
     tips = np.stack([tip_deflection(system, body.name, q) for body in system.bodies], axis=1)
+    torques = np.tile(np.array(list(run.torques.values())), (len(q), 1))
+    loads = joint_loads(system, joints, q, solution.multipliers, torques)
     values: dict[str, tuple[tuple[str, ...], NDArray[np.float64]]] = {
         "coordinate_value": (("coordinate",), q),
         "coordinate_rate": (("coordinate",), v),
@@ -68,7 +70,8 @@ def motion_dataset(
         "tip_slope": (("body",), tips[:, :, 2]),
         "point_position": (("point", "axis"), _stacked([motion.position for motion in motions], len(q))),
         "point_velocity": (("point", "axis"), _stacked([motion.velocity for motion in motions], len(q))),
-        "joint_force": (("joint", "axis"), joint_forces(system, joints, q, solution.multipliers)),
+        "joint_force": (("joint", "axis"), loads.force),
+        "joint_moment": (("joint",), loads.moment),
         "multiplier": (("row",), solution.multipliers),
         "kinetic_energy": ((), solution.kinetic_energy),
         "strain_energy": ((), solution.strain_energy),
@@ -96,7 +99,7 @@ def motion_dataset(
     units = UNITS | _OWN_UNITS
     for name in out.variables:
         if name in units:
-            out[name].attrs = {"long_name": units[str(name)][0], "units": units[str(name)][1]}
+            describe(out, str(name), *units[str(name)])
     options = options or IntegrationOptions()
     out.attrs = {
         "mechanism": mechanism.name,

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from paraflex.dynamics import Marker, System, end_markers, material_angle
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, drawing, system_drawing
-from paraflex.results.motion import PointMotion, joint_forces, marker_motion, point_motion, tip_deflection
+from paraflex.results.joint_loads import joint_loads
+from paraflex.results.motion import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.results.outlines import outline_motion, outlines, segment_motion
 from paraflex.simulate import TrackingRun, TrackingTask
 
@@ -64,7 +65,11 @@ class Record:
     points : (k, points, 2) array
         Positions [m].
     joint_force : (k, joints, 2) array
-        On the joint's second body, in the ground frame [N].
+        All that a joint's first body does to its second: at the joint's point of that, in the ground frame [N].
+    joint_moment : (k, joints) array
+        And about that point, positive anticlockwise [N m].
+    multiplier : (k, rows) array
+        Of the rows of the task's system; NaN of those that the model does not have. Minus it acts on the second body.
     kinetic_energy, strain_energy, work : (k,) arrays
         [J]
     drawing : Drawing
@@ -87,6 +92,8 @@ class Record:
     tip: NDArray[np.float64]
     points: NDArray[np.float64]
     joint_force: NDArray[np.float64]
+    joint_moment: NDArray[np.float64]
+    multiplier: NDArray[np.float64]
     kinetic_energy: NDArray[np.float64]
     strain_energy: NDArray[np.float64]
     work: NDArray[np.float64]
@@ -111,11 +118,14 @@ def record(run: TrackingRun) -> Record:
         for body, names in zip(whole.mechanism.bodies, parts, strict=True)
         for point in body.points
     ]
+    torque = run.torques.evaluate(task.motion.t) if run.holding is None else run.holding
+    joints = [joint.name for joint in whole.mechanism.joints]
+    loads = joint_loads(system, joints, q, solution.multipliers[:k], torque[:k])
     return Record(
         task=whole,
         method=run.method,
         mode=run.mode.name,
-        torque=run.torques.evaluate(task.motion.t) if run.holding is None else run.holding,
+        torque=torque,
         condition=run.condition,
         end_effector=point_motion(system, effector.point, q, v, a),
         angle=q[:, first],
@@ -125,13 +135,26 @@ def record(run: TrackingRun) -> Record:
         chord_rate=np.stack([rate for _, rate in chords], axis=1),
         tip=np.stack([_tip(system, names, q) for names in parts], axis=1),
         points=np.stack(points, axis=1) if points else np.zeros((q.shape[0], 0, 2)),
-        joint_force=joint_forces(system, [joint.name for joint in whole.mechanism.joints], q, solution.multipliers[:k]),
+        joint_force=loads.force,
+        joint_moment=loads.moment,
+        multiplier=_multipliers(system, whole.system, solution.multipliers[:k]),
         kinetic_energy=solution.kinetic_energy[:k],
         strain_energy=solution.strain_energy[:k],
         work=solution.work[:k],
         drawing=_drawing(task, parts, q),
         figures={name: getattr(solution, name) for name in FIGURES},
     )
+
+
+def _multipliers(system: System, whole: System, multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Multipliers by the rows of the whole mechanism; NaN of those that it does not share with what it was cut into."""
+    if system is whole:
+        return multipliers
+    out = np.full((len(multipliers), whole.m), np.nan)
+    for i, row in enumerate(whole.rows):
+        if row in system.rows:
+            out[:, i] = multipliers[:, system.rows.index(row)]
+    return out
 
 
 def _parts(task: TrackingTask) -> list[list[str]]:

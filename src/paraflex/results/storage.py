@@ -9,7 +9,8 @@ import xarray as xr
 from paraflex.errors import InputError, OutputError, suggestion
 
 # Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from.
-SCHEMA = 2
+# 3: joint forces are whole (before, of joints that slide their normal part), joint moments, multipliers of all runs.
+SCHEMA = 3
 # What commands call the file in their folder, and where a sweep keeps its runs.
 FILES = ("results.nc", "verify.nc")
 _TRAJECTORIES = "trajectories"

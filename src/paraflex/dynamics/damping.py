@@ -1,0 +1,190 @@
+"""The damping matrix of a flexible body: that of its modes as its joints hold it, in the coordinates of its frame.
+
+Damping ratios belong to a vibration, and how a body vibrates is a matter of how it is held, not of the frame that its
+deformation is described in. Its points are held as its joints hold them, the bodies on their other sides at rest:
+
+- a revolute joint holds the point, a weld the slope there too, and so does a prescribed angle;
+- a rail (prismatic joint) holds the slope and what is normal to the rail, with a prescribed travel all;
+- a pin in another body's slot or on another beam is held across the body, and in both directions if prescribed;
+- only the first of several points held in both directions is held along the line to the others: joints are not so far
+  apart by force that a bar could not stretch;
+- nothing is held by what slides along the body itself, by motors, springs or dampers, or by a joint to bodies that
+  reach the ground through this body alone: what hangs on it.
+
+With the mass-normalised modes psi_k of the body so held, at rest and undeformed, their frequencies omega_k and damping
+coefficients d_k,
+
+    D = sum_k (d_k / omega_k^4) (K psi_k) (K psi_k)^T + c K_rest,   c = d_1 / omega_1^2,
+
+K_rest being the stiffness that no psi_k has a share in: that of the static shapes which its joints force upon a body
+that is held by more than it needs to be. K psi_k is a force, to which rigid motion is nothing: D is the same matrix of
+the deformation in every frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
+from paraflex.fem.eigen import eigenpairs
+from paraflex.mechanism import (
+    GROUND,
+    AxisJoint,
+    Damping,
+    Joint,
+    Mechanism,
+    PointRef,
+    PrismaticJoint,
+    RigidBody,
+    WeldJoint,
+    stiffness_proportional,
+)
+
+# Conditions of which less than this part is left once the others hold follow from them.
+_DEPENDENT = 1e-9
+# An entry of the damping matrix less than this part of what its two modes lose is rounding.
+_ROUNDING = 1e-9
+
+
+def damping_matrix(
+    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
+) -> NDArray[np.float64]:
+    """Damping matrix of a body in its modal coordinates (nf, nf) [1/s], exactly diagonal where it is so to rounding.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    bodies : tuple of BodyCoordinates
+    index : dict
+        Number of each body by name.
+    name : str
+    """
+    body, described = bodies[index[name]], mechanism.body(name)
+    if isinstance(described, RigidBody) or described.damping is None or body.nf == 0:
+        return np.zeros((body.nf, body.nf))
+    squares = body.modes.omega**2
+    beta = stiffness_proportional(described.damping)
+    if beta is not None:
+        return np.diag(beta * squares)
+    held = np.array(list(_conditions(mechanism, bodies, index, name))).reshape(-1, 3 + body.nf)
+    return _without_rounding(_by_modes(described.damping, squares, *_held_modes(body, held)))
+
+
+def _by_modes(damping: Damping, squares: NDArray, omega: NDArray, modes: NDArray) -> NDArray:
+    """D of modes (nf, k) with these frequencies, in coordinates with stiffness diag(squares)."""
+    lost = damping.coefficients(omega) / omega**2
+    forces = squares[:, None] * modes / omega
+    rest = lost[0] if lost.size else 0.0
+    return (forces * (lost - rest)) @ forces.T + np.diag(rest * squares)
+
+
+def _without_rounding(matrix: NDArray) -> NDArray:
+    """The matrix symmetric, with zeros for off-diagonal entries that are rounding."""
+    sizes = np.sqrt(np.abs(np.real(np.diag(matrix))))
+    small = np.abs(np.real(matrix)) <= _ROUNDING * np.outer(sizes, sizes)
+    np.fill_diagonal(small, False)
+    return np.where(small, 0.0, 0.5 * (matrix + matrix.T))
+
+
+def _held_modes(body: BodyCoordinates, held: NDArray) -> tuple[NDArray, NDArray]:
+    """Frequencies (k,) and flexible part (nf, k) of the mass-normalised elastic modes of a body held by conditions.
+
+    `held` has a row a condition on its coordinates (r, phi, u), which are zero together.
+    """
+    s, nf = body.integrals, body.nf
+    mass = np.eye(3 + nf, dtype=np.result_type(s.S2, held))
+    mass[:2, :2] *= s.m
+    mass[2, 2] = s.I0 + s.J
+    mass[:2, 2] = mass[2, :2] = -s.S1[1], s.S1[0]
+    mass[:2, 3:], mass[2, 3:] = s.S2, s.G1 + s.Jf
+    mass[3:, :2], mass[3:, 2] = s.S2.T, s.G1 + s.Jf
+    stiffness = np.diag(np.concatenate([np.zeros(3), body.modes.omega**2]))
+    sizes = 1.0 / np.sqrt(np.real(np.diag(mass)))
+    free, rigid = _null_space(held * sizes)
+    basis = sizes[:, None] * free
+    values, vectors = eigenpairs(basis.T @ stiffness @ basis, basis.T @ mass @ basis)
+    return np.sqrt(values[rigid:]), (basis @ vectors[:, rigid:])[3:]
+
+
+def _null_space(rows: NDArray) -> tuple[NDArray, int]:
+    """Columns that span the null space of conditions on (r, phi, u), and how many rigid motions are in it."""
+    n = rows.shape[1]
+    if not rows.size:
+        return np.eye(n), 3
+    rows = rows / np.linalg.norm(np.real(rows), axis=1)[:, None]
+    factors: Any = scipy.linalg.qr(np.real(rows).T, mode="r", pivoting=True)
+    upper, order = factors
+    rank = int(np.sum(np.abs(np.diag(upper)) > _DEPENDENT))
+    rows = rows[order[:rank]]
+    free = scipy.linalg.null_space(np.real(rows), rcond=_DEPENDENT)
+    # Of a complex step the imaginary part follows the conditions.
+    free = free - rows.T @ np.linalg.solve(rows @ rows.T, rows @ free)
+    return free, 3 - int(np.linalg.matrix_rank(np.real(rows[:, :3]), tol=_DEPENDENT))
+
+
+def _conditions(
+    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
+) -> Iterator[NDArray]:
+    """Rows on (r, phi, u) of the undeformed body that its joints hold at zero: see the module."""
+    pinned: list[Marker] = []
+    across: list[Marker] = []
+    driven = {prescribed.joint for prescribed in mechanism.prescribed}
+    for joint in mechanism.joints:
+        for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
+            if here.body != name or not _leads_to_ground(mechanism, there.body, name):
+                continue
+            marker = make_marker(mechanism, bodies, index, here)
+            if isinstance(joint, PrismaticJoint | WeldJoint) or (
+                joint.name in driven and not isinstance(joint, AxisJoint)
+            ):
+                yield _slope(marker)
+            if not isinstance(joint, AxisJoint) or (joint.name in driven and not _along_itself(joint, here)):
+                pinned.append(marker)
+            elif isinstance(joint, PrismaticJoint):
+                angle = joint.direction if here is joint.a else joint.direction - joint.angle
+                yield np.array([-np.sin(angle), np.cos(angle)]) @ _place(marker)
+            elif not _along_itself(joint, here):
+                across.append(marker)
+    pinned.sort(key=lambda marker: np.real(marker.x0).tolist())
+    if pinned:
+        yield from _place(pinned[0])
+    origin = pinned[0].x0 if pinned else None
+    for marker in (*pinned[1:], *across):
+        line = np.array([1.0, 0.0]) if origin is None else marker.x0 - origin
+        if np.any(np.real(line)):
+            yield np.array([-line[1], line[0]]) @ _place(marker)
+
+
+def _along_itself(joint: Joint, here: PointRef) -> bool:
+    """Whether a joint slides along the body of this point."""
+    return isinstance(joint, AxisJoint) and not isinstance(joint, PrismaticJoint) and here is joint.a
+
+
+def _place(marker: Marker) -> NDArray:
+    """Derivative of a marker's place in the undeformed body by (r, phi, u), (2, 3 + nf)."""
+    x, y = marker.x0
+    return np.hstack([np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]), marker.N])
+
+
+def _slope(marker: Marker) -> NDArray:
+    return np.concatenate([[0.0, 0.0, 1.0], marker.slope])
+
+
+def _leads_to_ground(mechanism: Mechanism, start: str, without: str) -> bool:
+    """Whether joints lead from a body to the ground past another one."""
+    seen, waiting = {start, without}, [start]
+    while waiting:
+        here = waiting.pop()
+        if here == GROUND:
+            return True
+        for joint in mechanism.joints:
+            for a, b in ((joint.a.body, joint.b.body), (joint.b.body, joint.a.body)):
+                if a == here and b not in seen:
+                    seen.add(b)
+                    waiting.append(b)
+    return False

@@ -1,0 +1,97 @@
+"""What modal reduction takes from a body: how it turns under the moments that its joints bring in.
+
+Modes of a body in its frame are free of moments where the frame does not clamp it: those of the pinned frame at both
+ends. A series of them converges to the turn of an end under a moment with the first power of 1/modes only, where the
+deflection under forces converges with its third, and a beam clamped by a weld is too stiff by as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from paraflex.dynamics.coordinates import BodyCoordinates
+from paraflex.dynamics.system import System
+from paraflex.mechanism import (
+    AppliedTorque,
+    AxisJoint,
+    Mechanism,
+    PointRef,
+    PrismaticJoint,
+    RigidBody,
+    WeldJoint,
+)
+
+# A smaller part of a turn is not worth a word.
+_MISSED = 0.05
+
+
+class MissedTurn(NamedTuple):
+    """A point of a reduced body at which it turns too little.
+
+    Attributes
+    ----------
+    point : PointRef
+    cause : str
+        What brings a moment in there.
+    modes : int
+        How many the body keeps.
+    part : float
+        Of the static turn against the body frame under a moment there, what the modes kept do not tell.
+    """
+
+    point: PointRef
+    cause: str
+    modes: int
+    part: float
+
+
+def missed_turns(system: System) -> list[MissedTurn]:
+    """Where reduced bodies turn by five per cent too little under a moment that comes in there, body by body."""
+    found: dict[PointRef, MissedTurn] = {}
+    for point, cause in _moments(system.mechanism):
+        described = system.mechanism.body(point.body)
+        body = system.body(point.body)
+        if isinstance(described, RigidBody) or not body.nf or body.nf == body.shape.integrals.nf or point in found:
+            continue
+        part = _missed(body, system, point)
+        if part > _MISSED:
+            found[point] = MissedTurn(point, cause, body.nf, part)
+    return sorted(found.values(), key=lambda one: system.index[one.point.body])
+
+
+def _missed(body: BodyCoordinates, system: System, point: PointRef) -> float:
+    whole = body.shape.integrals
+    if body.mesh is None:
+        own = body.shape.points[point.point].slope
+    else:
+        own = body.mesh.shape_at_node(body.mesh.points[point.point])[1]
+    slope = own @ whole.D
+    turn = float(slope @ np.linalg.solve(whole.K, slope))
+    kept = float(np.sum((system.marker(point).slope / body.modes.omega) ** 2))
+    return 1.0 - kept / turn if turn > 0.0 else 0.0
+
+
+def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
+    """Points of bodies at which joints or loads bring in moments, and what does so."""
+    turning = [(f"the prescribed motion {one.name}", one.joint) for one in mechanism.prescribed]
+    turning += [(f"the motor {one.name}", one.joint) for one in mechanism.motors]
+    turning += [(f"the spring {one.name}", one.joint) for one in mechanism.springs]
+    turning += [(f"the damper {one.name}", one.joint) for one in mechanism.dampers]
+    turning += [(f"the friction {one.name}", one.joint) for one in mechanism.frictions]
+    causes = [
+        (f"the {'weld' if isinstance(joint, WeldJoint) else 'rail'} {joint.name}", joint)
+        for joint in mechanism.joints
+        if isinstance(joint, WeldJoint | PrismaticJoint)
+    ]
+    pins = [(cause, mechanism.joint(name)) for cause, name in turning]
+    causes += [(cause, joint) for cause, joint in pins if not isinstance(joint, AxisJoint)]
+    for cause, joint in causes:
+        for point in (joint.a, joint.b):
+            if not point.on_ground:
+                yield point, cause
+    for load in mechanism.loads:
+        if isinstance(load, AppliedTorque):
+            yield load.point, f"the load {load.name}"

@@ -1,0 +1,108 @@
+"""What the bodies of a joint do to one another: all of it, whatever in the joint does it.
+
+Constraints have Phi of body b less that of body a and stand on the left of the equations, M q'' + ... + Phi_q^T lambda:
+-lambda acts on body b. So do the multipliers of prescribed motions, springs, dampers and friction; a motor's torque or
+force acts on b as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System, axis_angle
+from paraflex.dynamics.constraints import Constraint, row_order
+from paraflex.dynamics.coordinates import transverse_pieces
+from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.kernel.packed import ANGLE, POINT
+from paraflex.mechanism import AxisJoint, Joint
+
+Array = NDArray[np.float64]
+
+
+class JointLoads(NamedTuple):
+    """What the first body of each joint does to its second.
+
+    Attributes
+    ----------
+    force : (k, joints, 2) array
+        At the joint's point of the second body, in the ground frame [N].
+    moment : (k, joints) array
+        About that point, positive anticlockwise [N m].
+    """
+
+    force: Array
+    moment: Array
+
+
+def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> JointLoads:
+    """Forces and moments in joints by name: of what holds the joint, of its motors, springs, dampers and friction.
+
+    The second body does the opposite to the first at the same place. Springs and dampers between points (linear
+    springs) are not in a joint and do not count.
+
+    Parameters
+    ----------
+    system : System
+    names : sequence of str
+    q : (k, n) array
+    multipliers : (k, m) array
+    torques : (k, motors) array
+        Torque or force of every motor.
+    """
+    mechanism, place = system.mechanism, {name: i for i, name in enumerate(names)}
+    force, moment = np.zeros((len(q), len(names), 2)), np.zeros((len(q), len(names)))
+    row = 0
+    for constraint in row_order(mechanism, system.index):
+        i, lam = place.get(constraint.joint), multipliers[:, row : row + len(constraint.labels)]
+        row += len(constraint.labels)
+        if i is None:
+            continue
+        if constraint.kind == POINT:
+            force[:, i] -= lam
+        elif constraint.kind == ANGLE:
+            moment[:, i] -= lam[:, 0]
+        else:
+            force[:, i] -= lam * _direction(system, constraint, q)
+    for motor, torque in zip(mechanism.motors, torques.T, strict=True):
+        i, joint = place.get(motor.joint), mechanism.joint(motor.joint)
+        if i is None:
+            continue
+        if isinstance(joint, AxisJoint):
+            force[:, i] += torque[:, None] * _unit(axis_angle(system, joint, q))
+        else:
+            moment[:, i] += torque
+    return JointLoads(force, moment)
+
+
+def _direction(system: System, constraint: Constraint, q: Array) -> Array:
+    """Derivative (k, 2) of a row along an axis by the place of point b."""
+    joint = system.mechanism.joint(constraint.joint)
+    assert isinstance(joint, AxisJoint)
+    along = axis_angle(system, joint, q)
+    direction = _unit(along + constraint.direction - joint.direction)
+    if constraint.carrier == "track":
+        # Square to the beam where the point stands, bent as it is.
+        direction -= _track_slope(system, joint, q)[:, None] * _unit(along)
+    return direction
+
+
+def _track_slope(system: System, joint: Joint, q: Array) -> Array:
+    """Slope (k,) of the beam that a point slides on, against its frame, where the point stands."""
+    body = system.body(joint.a.body)
+    assert body.mesh is not None
+    nodes, pieces = body.mesh.nodes, transverse_pieces(body)
+    away = marker_place(system, system.marker(joint.b), q)[0] - q[:, body.position]
+    x = np.sum(away * _unit(q[:, body.angle]), axis=1)
+    piece = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, len(pieces) - 1)
+    z = x - nodes[piece]
+    powers = np.arange(1, pieces.shape[1])
+    shapes = np.einsum("kp,kpj->kj", powers * z[:, None] ** (powers - 1), pieces[piece][:, 1:])
+    return np.sum(shapes * q[:, body.flexible], axis=1)
+
+
+def _unit(angle: Array) -> Array:
+    return np.column_stack([np.cos(angle), np.sin(angle)])

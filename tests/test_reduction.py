@@ -1,0 +1,114 @@
+"""Beams reduced to few modes under the moments that joints bring in: who is told, and how far off they are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from paraflex.cli.inspect import describe
+from paraflex.dynamics import build_system, missed_turns
+from paraflex.fem import ReferenceCondition
+from paraflex.files import load
+from paraflex.mechanism import PointRef, Section
+from test_damping import STEEL, beam, held, on_a_roller, unit_frequency, vibrations
+
+PINNED, CANTILEVER, FREE = ReferenceCondition.PINNED, ReferenceCondition.CANTILEVER, ReferenceCondition.FREE
+
+
+def clamped(reference, modes):
+    return held(beam(reference, None, modes=modes, elements=8), ("weld", "free"))
+
+
+@pytest.mark.parametrize("modes", [1, 2, 4, 8])
+def test_modes_of_the_pinned_frame_miss_the_turn_of_a_clamped_end(modes):
+    (missed,) = missed_turns(build_system(clamped(PINNED, modes)))
+    assert (str(missed.point), missed.cause, missed.modes) == ("beam.A", "the weld A", modes)
+    # Of a beam on two pins: L / 3EI in all, 2 L / (n pi)^2 EI from its mode n.
+    exact = 1.0 - 6.0 / np.pi**2 * np.sum(1.0 / np.arange(1, modes + 1) ** 2)
+    assert missed.part == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("reference", "modes", "off"),
+    [
+        (PINNED, 1, 0.48),
+        (PINNED, 2, 0.20),
+        (PINNED, 4, 0.10),
+        (PINNED, 8, 0.050),
+        (FREE, 2, 0.35),
+        (CANTILEVER, 1, 0.0),
+    ],
+)
+def test_a_clamped_beam_is_too_stiff_by_what_they_miss(reference, modes, off):
+    frequencies, _ = vibrations(clamped(reference, modes))
+    assert frequencies[0] / (1.8751041**2 * unit_frequency()) - 1.0 == pytest.approx(off, rel=0.03, abs=1e-5)
+    assert bool(missed_turns(build_system(clamped(reference, modes)))) == (off > 0.0)
+
+
+def bending(mechanism, force=0.0, moment=0.0):
+    """Static transverse displacement and slope of the beam's end B under a force and a moment there."""
+    system = build_system(mechanism)
+    body, end = system.body("beam"), system.marker(PointRef("beam", "B"))
+    row, turn = np.zeros(system.n), np.zeros(system.n)
+    row[[1, 2]], row[body.flexible] = (1.0, end.x0[0]), end.N[1]
+    turn[2], turn[body.flexible] = 1.0, end.slope
+    stiffness = np.concatenate([np.zeros(3), body.modes.omega**2])
+    sizes = 1.0 / np.sqrt(1.0 + stiffness)
+    free = sizes[:, None] * scipy.linalg.null_space(system.jacobian(np.zeros(system.n)) * sizes, rcond=1e-10)
+    x = free @ np.linalg.solve(free.T @ np.diag(stiffness) @ free, free.T @ (force * row + moment * turn))
+    return row @ x, turn @ x
+
+
+def errors_of_reduction(reference, modes):
+    """The columns of the table in theory.md."""
+    one_end = clamped(reference, modes)
+    pins = on_a_roller(held(beam(reference, None, modes=modes, elements=8), ("pin", "pin")))
+    flexural = STEEL.youngs_modulus * Section.rectangle(width=0.02, thickness=0.004).second_moment
+    return (
+        vibrations(one_end)[0][0] / (1.8751041**2 * unit_frequency()) - 1.0,
+        bending(one_end, force=1.0)[0] / (0.5**3 / (3.0 * flexural)) - 1.0,
+        bending(one_end, moment=1.0)[0] / (0.5**2 / (2.0 * flexural)) - 1.0,
+        bending(pins, moment=1.0)[1] / (0.5 / (3.0 * flexural)) - 1.0,
+        vibrations(pins)[0][0] / (np.pi**2 * unit_frequency()) - 1.0,
+    )
+
+
+def documented():
+    """Rows of the table in theory.md: frame, modes and the errors as they are written."""
+    page = (Path(__file__).parents[1] / "docs" / "theory.md").read_text(encoding="utf-8")
+    lines = page.split("| frame | modes |")[1].split("\n\n")[0].splitlines()[2:]
+    frame = ""
+    for line in lines:
+        name, modes, *errors = (cell.strip() for cell in line.strip("|").split("|"))
+        frame = name or frame
+        yield pytest.param(ReferenceCondition(frame), int(modes), errors, id=f"{frame} {modes}")
+
+
+@pytest.mark.parametrize(("reference", "modes", "errors"), list(documented()))
+def test_the_table_in_theory_md(reference, modes, errors):
+    for found, written in zip(errors_of_reduction(reference, modes), errors, strict=True):
+        digits = written.removesuffix(" %")
+        # Half a unit of the last digit; a plain 0 is less than 0.001 %.
+        unit = 0.001 if digits == "0" else 10.0 ** -len(digits.partition(".")[2])
+        assert 100.0 * found == pytest.approx(float(digits), abs=0.51 * unit)
+
+
+def test_pins_and_whole_beams_are_not_complained_of():
+    assert not missed_turns(build_system(held(beam(PINNED, None, modes=1), ("pin", "pin"))))
+    assert not missed_turns(build_system(held(beam(PINNED, None), ("weld", "drive"))))
+
+
+def test_info_complains_of_a_beam_that_is_too_stiff_under_its_motor():
+    model = load("spin_up")
+    reduced = model.mechanism.with_beams(reference=PINNED, modes=2)
+    (complaint,) = describe(replace(model, mechanism=reduced))["complaints"]
+    assert complaint.startswith("body.beam: 2 modes miss 24 % of its turn under a moment at root, which the prescribed")
+    assert "leave modes out" in complaint
+    assert (
+        describe(replace(model, mechanism=model.mechanism.with_beams(reference=CANTILEVER, modes=2)))["complaints"]
+        == []
+    )
