@@ -18,6 +18,7 @@ from numba.core.registry import cpu_target
 
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
 from paraflex.dynamics.state import check_accelerations
+from paraflex.errors import as_enum
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.kernel.march import march
@@ -28,22 +29,22 @@ from paraflex.simulate import plan_tracking
 NOTICE = "Compiling the kernels: once after an installation, about half a minute."
 
 
-def are_compiled(geometry: Geometry = Geometry.LINEAR) -> bool:
+def are_compiled(geometry: Geometry | str = Geometry.LINEAR) -> bool:
     """Whether the kernels for beams of this geometry stand in the cache on disk."""
-    return _stamp(geometry).exists()
+    return _stamp(as_enum(Geometry, geometry, "geometry")).exists()
 
 
-def compile_kernels(geometry: Geometry = Geometry.LINEAR, announce: Callable[[str], None] = print) -> None:
+def compile_kernels(geometry: Geometry | str = Geometry.LINEAR, announce: Callable[[str], None] = print) -> None:
     """Compile the kernels for beams of a geometry unless that has been done.
 
     Parameters
     ----------
-    geometry : Geometry
+    geometry : Geometry or str
         Kernels for linear geometry are compiled without all that second-order geometry needs.
     announce : callable
         Told that it takes a while, where it does.
     """
-    _compile([geometry], announce)
+    _compile([as_enum(Geometry, geometry, "geometry")], announce)
 
 
 def compile_all_kernels(announce: Callable[[str], None] = print) -> None:
