@@ -35,7 +35,8 @@ class IntegrationOptions:
         Those of the method that are not to be at their defaults.
     step : float, optional
         A fixed step [s]; by default steps are chosen by their errors. Where something given is not smooth steps end,
-        and each stretch between is divided evenly into steps no longer than this.
+        and each stretch between is divided evenly into steps no longer than this. One in which Newton's iteration does
+        not converge is done in parts; `Solution.rejected` counts these.
     constraints : Treatment or str, optional
         What keeps them: "baumgarte", "projection" (of position and velocity after each step) or "ggl" (stabilised
         index 2, Gear, Gupta and Leimkuhler); the method's own by default.
