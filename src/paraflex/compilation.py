@@ -11,13 +11,14 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-import llvmlite.binding
-import numba
 import numpy as np
+from numba.core.registry import cpu_target
 
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
 from paraflex.dynamics.state import check_accelerations
+from paraflex.errors import as_enum
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.kernel.march import march
@@ -28,22 +29,22 @@ from paraflex.simulate import plan_tracking
 NOTICE = "Compiling the kernels: once after an installation, about half a minute."
 
 
-def are_compiled(geometry: Geometry = Geometry.LINEAR) -> bool:
-    """Whether the kernels for beams of this geometry, as their source is now, stand in the cache on disk."""
-    return _stamp(geometry).exists()
+def are_compiled(geometry: Geometry | str = Geometry.LINEAR) -> bool:
+    """Whether the kernels for beams of this geometry stand in the cache on disk."""
+    return _stamp(as_enum(Geometry, geometry, "geometry")).exists()
 
 
-def compile_kernels(geometry: Geometry = Geometry.LINEAR, announce: Callable[[str], None] = print) -> None:
+def compile_kernels(geometry: Geometry | str = Geometry.LINEAR, announce: Callable[[str], None] = print) -> None:
     """Compile the kernels for beams of a geometry unless that has been done.
 
     Parameters
     ----------
-    geometry : Geometry
+    geometry : Geometry or str
         Kernels for linear geometry are compiled without all that second-order geometry needs.
     announce : callable
         Told that it takes a while, where it does.
     """
-    _compile([geometry], announce)
+    _compile([as_enum(Geometry, geometry, "geometry")], announce)
 
 
 def compile_all_kernels(announce: Callable[[str], None] = print) -> None:
@@ -62,7 +63,6 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None]) -> Non
     if not missing:
         return
     announce(NOTICE)
-    _drop_outdated()
     command = [sys.executable, "-m", "paraflex.compilation"]
     processes = [subprocess.Popen([*command, *share], stdout=subprocess.DEVNULL) for share in _shares(missing)]
     try:
@@ -85,42 +85,11 @@ def _shares(geometries: list[Geometry]) -> list[list[str]]:
     return [parts[0], parts[1][:-1]]
 
 
-def _drop_outdated() -> None:
-    """Empty the cache of kernels that were compiled from other sources.
-
-    Numba looks at the file of a cached kernel, not at those of the kernels it calls: one edited, all go.
-    """
-    sources = _folder() / f"sources-{_digest(*_sources())}"
-    if sources.exists():
-        return
-    for pattern in ("*.nb?", "compiled-*", "sources-*"):
-        for entry in _folder().glob(pattern):
-            entry.unlink(missing_ok=True)
-    sources.touch()
-
-
-def _folder() -> Path:
-    """Where Numba keeps the machine code: beside the sources, or elsewhere if it may not write there."""
-    return Path(march.cache_path)
-
-
 def _stamp(geometry: Geometry) -> Path:
-    """A file that says: compiled from these sources, by this compiler, for this processor.
-
-    A cache folder in a user's home may be shared by machines, and file times of another release may be older.
-    """
-    here = (sys.version, numba.__version__, llvmlite.binding.get_host_cpu_name())
-    return _folder() / f"compiled-{geometry.value}-{_digest(*_sources(), *(text.encode() for text in here))}"
-
-
-def _sources() -> list[bytes]:
-    """Texts of all kernels."""
-    folder = Path(march.py_func.__code__.co_filename).parent
-    return [source.read_bytes() for source in sorted(folder.glob("*.py"))]
-
-
-def _digest(*texts: bytes) -> str:
-    return hashlib.sha256(b"".join(hashlib.sha256(text).digest() for text in texts)).hexdigest()[:16]
+    """A file among the machine code that says: made by this Python for this processor, as a folder may be shared."""
+    target: Any = cpu_target.target_context
+    here = repr((sys.version, target.codegen().magic_tuple()))
+    return Path(march.cache_path) / f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"
 
 
 def _free_beam(geometry: Geometry) -> NativeRun:

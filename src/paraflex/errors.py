@@ -7,10 +7,14 @@ carries what was computed until then.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any
+from enum import Enum
+from typing import Any, TypeVar
+
+E = TypeVar("E", bound=Enum)
 
 __all__ = [
     "ActuationError",
@@ -25,6 +29,7 @@ __all__ = [
     "SingularActuationError",
     "StiffnessWarning",
     "UnreachablePathError",
+    "as_enum",
     "suggestion",
 ]
 
@@ -74,10 +79,26 @@ class OutputError(InputError):
     """A place where results cannot be written."""
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
+def as_enum(kind: type[E], value: E | str, field: str) -> E:
+    """A member of an enumeration from itself or from its value.
+
+    Raises
+    ------
+    InputError
+        Anything else, under the field's name.
+    """
+    try:
+        return kind(value)
+    except ValueError:
+        what = re.sub("(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
+        remedy = suggestion(value, [member.value for member in kind])
+        raise InputError(f"unknown {what}", field=field, value=value, remedy=remedy) from None
+
+
+def suggestion(name: object, known: Iterable[str]) -> str:
     """A remedy for an unknown name: the nearest known one, or all of them."""
     known = list(known)
-    near = get_close_matches(name, known, n=1)
+    near = get_close_matches(str(name), known, n=1)
     if near:
         return f'did you mean "{near[0]}"?'
     return f"choose from {', '.join(known)}" if known else "there is none to choose from"

@@ -12,6 +12,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.errors import as_enum
 from paraflex.fem.eigen import eigenpairs
 from paraflex.fem.element import AXIAL, CURVATURE, SLOPE, TRANSVERSE
 from paraflex.fem.mesh import BeamMesh
@@ -37,14 +38,14 @@ class ReferenceCondition(Enum):
 
 
 def reference_basis(
-    mesh: BeamMesh, condition: ReferenceCondition, mass: NDArray[np.float64], stiffness: NDArray[np.float64]
+    mesh: BeamMesh, condition: ReferenceCondition | str, mass: NDArray[np.float64], stiffness: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Transformation D from independent flexible coordinates to nodal coordinates (Eq. 7).
 
     Parameters
     ----------
     mesh : BeamMesh
-    condition : ReferenceCondition
+    condition : ReferenceCondition or str
     mass, stiffness : (n_nodal, n_nodal) arrays
         Of the beam with its lumps before any condition; only FREE needs them.
 
@@ -53,6 +54,7 @@ def reference_basis(
     (n_nodal, nf) array
         nf is 4 a element, and one more for each separate curvature.
     """
+    condition = as_enum(ReferenceCondition, condition, "reference")
     kept = np.ones(mesh.n_nodal, dtype=bool)
     kept[mesh.column(-1, CURVATURE)] = mesh.n_elements in mesh.separate
     if condition is ReferenceCondition.CANTILEVER:

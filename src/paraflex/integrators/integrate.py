@@ -26,6 +26,10 @@ from paraflex.kernel.run_state import ERROR_TEST, FINISHED, NO_CONVERGENCE, NOT_
 _SLICE = 200
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
+_NOT_IN_PARTS = (
+    "Newton's iteration does not converge in a fixed step, nor in parts of it; "
+    "take a shorter step, or leave it out and choose a tolerance"
+)
 _CAUSES = {
     NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
     NOT_FINITE: "the solution is no longer finite",
@@ -102,7 +106,7 @@ def integrate(
     solution = _solution(run, options, time.perf_counter() - began, status, message, crossing)
     if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution
-    cause = bent or drift or (f"no end after {options.max_steps} steps" if code == PAUSED else _CAUSES[code])
+    cause = bent or drift or _cause(code, options)
     now = run.now()
     # Near a singular position it may be Newton or the error test that gives up first.
     lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and not (bent or drift) else []
@@ -119,6 +123,12 @@ def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     if family in (Family.ESDIRK, Family.NEWMARK):
         return native.prepare(problem, options)
     return outside.prepare(problem, options)
+
+
+def _cause(code: int, options: IntegrationOptions) -> str:
+    if code == PAUSED:
+        return f"no end after {options.max_steps} steps"
+    return _NOT_IN_PARTS if code == NO_CONVERGENCE and options.step is not None else _CAUSES[code]
 
 
 def _solution(

@@ -180,7 +180,7 @@ def find_method(name: str) -> Method:
     InputError
         There is none of that name; the known ones are listed.
     """
-    if name in METHODS:
+    if isinstance(name, str) and name in METHODS:
         return METHODS[name]
     near = suggestion(name, METHODS)
     known = f"choose from {', '.join(METHODS)}"

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, as_enum
 from paraflex.integrators.events import Event
 from paraflex.integrators.methods import DEFAULT_METHOD, Method, Treatment, check_parameters, find_method
 
@@ -35,8 +35,9 @@ class IntegrationOptions:
         Those of the method that are not to be at their defaults.
     step : float, optional
         A fixed step [s]; by default steps are chosen by their errors. Where something given is not smooth steps end,
-        and each stretch between is divided evenly into steps no longer than this.
-    constraints : str, optional
+        and each stretch between is divided evenly into steps no longer than this. One in which Newton's iteration does
+        not converge is done in parts; `Solution.rejected` counts these.
+    constraints : Treatment or str, optional
         What keeps them: "baumgarte", "projection" (of position and velocity after each step) or "ggl" (stabilised
         index 2, Gear, Gupta and Leimkuhler); the method's own by default.
     alpha, beta : float
@@ -63,7 +64,7 @@ class IntegrationOptions:
     method: str = DEFAULT_METHOD
     parameters: Mapping[str, float] = field(default_factory=dict)
     step: float | None = None
-    constraints: str | None = None
+    constraints: Treatment | str | None = None
     automatic_gains: bool = False
     events: tuple[Event, ...] = ()
 
@@ -114,14 +115,10 @@ class IntegrationOptions:
             raise InputError(problem, field="step", value=self.step, remedy=remedy)
 
     def _check_constraints(self) -> None:
+        if self.constraints is not None:
+            object.__setattr__(self, "constraints", as_enum(Treatment, self.constraints, "constraints").value)
         known = [treatment.value for treatment in self.description.treatments]
         if self.constraints is not None and self.constraints not in known:
-            every = [treatment.value for treatment in Treatment]
-            if self.constraints not in every:
-                raise InputError(
-                    "unknown treatment of constraints", field="constraints", value=self.constraints,
-                    remedy=suggestion(self.constraints, every),
-                )  # fmt: skip
             raise InputError(
                 f"not with {self.method}", field="constraints", value=self.constraints,
                 remedy=f"choose from {', '.join(known)}, or another method",

@@ -12,9 +12,9 @@ from types import FunctionType
 from typing import Any
 
 from numba import njit, types
-from numba.core.caching import FunctionCache
 from numba.extending import typeof_impl
 
+from paraflex.kernel.disk_cache import KernelCache
 from paraflex.kernel.machine_code import QuickCode, SeparateCode
 
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
@@ -33,7 +33,7 @@ _INNER: dict[str, Any] = {"no_cpython_wrapper": True}
 
 
 class _Cache:
-    """Where a kernel is kept on disk: Numba's, but looked for when it is first asked for.
+    """Where a kernel is kept on disk, looked for when it is first asked for.
 
     What is found there is loaded without all that Numba declares for compiling, which takes longer than loading.
     """
@@ -43,7 +43,7 @@ class _Cache:
 
     @cached_property
     def _on_disk(self) -> Any:
-        return FunctionCache(self._function)
+        return KernelCache(self._function)
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """What has been compiled for a signature, or None."""

@@ -115,12 +115,17 @@ def dissipated_power(p, q, v, lam, rates):
 
 @kernel
 def note_friction(p, q, v, rates, compliance):
-    """Inverse slopes of friction at the rates in v, for the iteration matrix; `rates` is scratch (m,)."""
+    """Inverse slopes of friction at the rates in v, for the iteration matrix; whether there is any.
+
+    `rates` is scratch (m,).
+    """
+    some = False
     if not joint_rates(p, q, v, rates):
-        return
+        return some
     for r in range(p.rows.size):
         row = p.rows[r]
         if row.kind == FRICTION:
             # d tanh(x) / dx = 1 / cosh^2 x; beyond x = 20 it is below rounding.
             c = cosh(min(abs(rates[r]) / (row.compliance * row.limit), 20.0))
-            compliance[r] = row.compliance / max(1.0 / (c * c), FLATTEST)
+            compliance[r], some = row.compliance / max(1.0 / (c * c), FLATTEST), True
+    return some

@@ -25,6 +25,8 @@ from paraflex.kernel.run_state import (
     FINISHED,
     LAST_ERROR,
     LAST_STEP,
+    PART,
+    PART_END,
     PAUSED,
     PHI_MAX,
     PROJECTION,
@@ -48,6 +50,8 @@ BY_ERROR, BY_LAST_ERROR, SMALLEST_ERROR = 0.7, 0.4, 1e-3
 KEEP_ABOVE, KEEP_BELOW = 0.92, 1.2
 # The smallest step, as a fraction of the time span.
 MIN_STEP = 1e-12
+# A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
+SMALLEST_PART = 1e-4
 
 
 @inlined
@@ -146,6 +150,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     copy(m.v, m.stage_d[0])
     copy(a, m.algorithmic[0])
     m.clock[LAST_STEP], m.clock[LAST_ERROR] = 0.0, 1.0
+    m.clock[PART_END] = t
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques, ws)
     kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)
     strain += spring_energy(p, lam) + line_energy(p, m.q, m.v)[0]
@@ -219,12 +224,15 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
             m.counts[STOP] += 1
         if m.counts[STOP] == stops.size:
             return FINISHED
-        left = stops[m.counts[STOP]] - t
+        end, longest = stops[m.counts[STOP]], controls.fixed_step
+        if t < m.clock[PART_END]:
+            end, longest = m.clock[PART_END], m.clock[PART]
+        left = end - t
         h = min(m.clock[STEP], controls.max_step)
         landing = False
         if controls.fixed_step > 0.0:
             # Stretches between stops are divided evenly.
-            h = left / max(1.0, ceil(left / controls.fixed_step - 1e-6))
+            h = left / max(1.0, ceil(left / longest - 1e-6))
             # But for rounding the same step: its factor still serves.
             if abs(h - m.clock[STEP]) <= 1e-9 * h:
                 h = m.clock[STEP]
@@ -237,7 +245,7 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
         if cause == PAUSED and error <= 1.0:
             after_failure = m.counts[FAILURES] > 0
             accept(p, signals, tableau, controls, t, h, m, ws, out)
-            m.clock[TIME] = stops[m.counts[STOP]] if landing else t + h
+            m.clock[TIME] = end if landing else t + h
             if controls.fixed_step > 0.0:
                 continue
             error = max(error, SMALLEST_ERROR) / SAFETY**tableau.order
@@ -251,13 +259,19 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
             continue
         m.counts[REJECTED] += 1
         if controls.fixed_step > 0.0:
-            return cause
+            if h <= SMALLEST_PART * controls.fixed_step:
+                return cause
+            if t >= m.clock[PART_END]:
+                m.clock[PART_END] = end if landing else t + h
+            m.clock[PART] = MIN_FACTOR * h
         if m.counts[FAILURES] == 1:
             # The first stage is the last step's last, with the error its longer step could bear: not so a shorter one.
             first_stage(p, signals, t, controls, m, ws)
             if tableau.newmark.size > 0:
                 restart_algorithmic(tableau.newmark, m)
         m.counts[FAILURES] += 1
+        if controls.fixed_step > 0.0:
+            continue
         if cause == PAUSED:
             cause = ERROR_TEST
             m.clock[STEP] = h * max(MIN_FACTOR, SAFETY * (1.0 / error) ** exponent)

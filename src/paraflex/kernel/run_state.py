@@ -16,6 +16,8 @@ MOST_PASSAGES = 1000
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # March.clock
 TIME, STEP, WORK, FACTOR_B, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(12)
+# and of a fixed step in which Newton's iteration did not converge: when it ends, and how long its parts are.
+PART_END, PART = range(15, 17)
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
 # and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
@@ -112,7 +114,7 @@ def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGA
     """Allocate the state of a run with n coordinates and m constraint rows."""
     stage_v = apart((stages, n))
     return March(
-        clock=apart(12),
+        clock=apart(17),
         counts=apart(12, np.int64),
         q=apart(n),
         v=apart(n),

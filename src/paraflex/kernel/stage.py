@@ -36,7 +36,8 @@ from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.sums import hand_on
 
 MAX_ITERATIONS = 8
-CONVERGED, DIVERGED = 0, 1
+# SLOW: it still contracts after so many iterations.
+CONVERGED, DIVERGED, SLOW = 0, 1, 3
 # The slowest contraction worth going on with, assumed of a new factor until one is measured.
 WORST_RATE = 0.5
 # After a guess that was right but for a direction that the norm hardly sees, the second change may be larger than the
@@ -137,7 +138,7 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
             place(qs, vs, g, b, a, shift, ws)
             return CONVERGED, iteration, min(rate, WORST_RATE)
         previous = change
-    return DIVERGED, MAX_ITERATIONS, rate
+    return SLOW, MAX_ITERATIONS, rate
 
 
 @inlined

@@ -30,6 +30,7 @@ from paraflex.kernel.run_state import (
     ITERATIONS,
     NO_CONVERGENCE,
     NOT_FINITE,
+    PART_END,
     PASSAGES,
     PAUSED,
     POSITION,
@@ -38,13 +39,16 @@ from paraflex.kernel.run_state import (
     REUSED,
 )
 from paraflex.kernel.signals import evaluate_signal
-from paraflex.kernel.stage import CONVERGED, WORST_RATE, solve_stage
+from paraflex.kernel.stage import CONVERGED, SLOW, WORST_RATE, solve_stage
 
 # A new factor costs about as much as this many iterations: it pays once the old one has cost so many more.
 # Of second-order geometry it costs more.
 FACTOR_COST, BENT_FACTOR_COST = 2, 3
 # So many steps get a new factor each after one that cost that much at once.
 IMPATIENCE = 20
+# So many times a stage is gone on with: with slopes of friction where it has come to, or because it contracts and the
+# step is fixed.
+ROUNDS = 6
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
 
@@ -184,20 +188,21 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     fresh = m.clock[FACTOR_B] != b
     if fresh:
         renew_factor(p, b, m, ws)
-    note_friction(p, m.q, m.v, ws.mu, ws.compliance)
+    rubs = note_friction(p, m.q, m.v, ws.mu, ws.compliance)
     # Rows that depend on others here keep their multipliers: so a singular position is passed.
     if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
         note_passage(t, h, m)
     tolerance = controls.newton_fraction * controls.rate * h
     before = m.counts[ITERATIONS]
-    i = 1
+    i, rounds = 1, 0
     while i < stages:
         if not one_stage:
             x, g, b = stage_start(tableau, i, t, h, m)
         m.stage_t[1, i] = t + tableau.c[i] * h
-        predict(i, x, h, m)
-        copy(m.stage_lam[i - 1], m.stage_lam[i])
-        fill(m.shift, 0.0)
+        if rounds == 0:
+            predict(i, x, h, m)
+            copy(m.stage_lam[i - 1], m.stage_lam[i])
+            fill(m.shift, 0.0)
         status, iterations, rate = solve_stage(
             p, signals, x, g, b, weights, m.qs, m.vs, m.stage_a[1, i], m.stage_lam[i], m.shift,
             m.torques, tolerance, controls.newton_memory, m.clock[RATE], ws,
@@ -205,15 +210,22 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
         m.counts[ITERATIONS] += iterations
         m.clock[RATE] = rate
         if status != CONVERGED:
-            if fresh:
+            goes_on = rubs or (status == SLOW and controls.fixed_step > 0.0)
+            if fresh and (rounds == ROUNDS or not goes_on):
                 return NO_CONVERGENCE, 0.0
+            rounds = rounds + 1 if goes_on else 0
             # An old factor may be to blame: once more with a new one before the step is cut.
-            renew_factor(p, b, m, ws)
+            if not fresh:
+                renew_factor(p, b, m, ws)
+                fresh = True
+            if rubs:
+                note_friction(p, m.q, ws.v, ws.mu, ws.compliance)
             orient(p, m.q, ws, controls.dependent_part)
-            fresh = True
             continue
+        rounds = 0
         if one_stage:
-            newmark_end(p, signals, tableau.newmark, controls.fixed_step == 0.0, t, h, m, ws)
+            varying = controls.fixed_step == 0.0 or t < m.clock[PART_END]
+            newmark_end(p, signals, tableau.newmark, varying, t, h, m, ws)
         copy(ws.q, m.stage_q[i])
         copy(ws.v, m.stage_v[i])
         if m.shift.size > 0:

@@ -49,7 +49,6 @@ from paraflex.mechanism.mechanism import (
     Mechanism,
     mode_of_motors,
     mode_of_signs,
-    parse_geometry,
     parse_mode,
 )
 from paraflex.mechanism.modal import ModalBody, ModalPoint
@@ -131,7 +130,6 @@ __all__ = [
     "loops",
     "mode_of_motors",
     "mode_of_signs",
-    "parse_geometry",
     "parse_mode",
     "proportional_segments",
     "raparm_i",

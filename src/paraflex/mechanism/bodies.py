@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import TypeVar
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, as_enum
 from paraflex.fem import (
     AssumedShapes,
     BeamMesh,
@@ -121,10 +121,10 @@ class FlexibleBeam:
     elements : int or tuple of int
         Elements per span between neighbouring points and ends.
     lumps : tuple of LumpedMass
-    reference : ReferenceCondition
+    reference : ReferenceCondition or str
         How the floating frame is fixed to the beam. Pinned by default: deflections count from the chord, and stay small
         where those from a tangent do not. The paper's is the cantilever.
-    curvature : Curvature
+    curvature : Curvature or str
         At nodes with a lumped moment of inertia, and at the tip. Separate by default; the paper's is shared. Where
         sections of different bending stiffness meet there is always one on either side.
     modes : int, optional
@@ -147,6 +147,10 @@ class FlexibleBeam:
     modes: int | None = None
     damping: Damping | None = None
     flexible: bool = True
+
+    def __post_init__(self) -> None:
+        for name, kind in (("reference", ReferenceCondition), ("curvature", Curvature)):
+            object.__setattr__(self, name, as_enum(kind, getattr(self, name), f"body.{self.name}.{name}"))
 
     @cached_property
     def mesh(self) -> BeamMesh:

@@ -54,7 +54,11 @@ def check_body(body: Body) -> None:
 
 
 def check_damping(damping: Damping | None, field: str) -> None:
-    """Coefficients are not negative."""
+    """Damping is of a known kind, its coefficients are not negative."""
+    if damping is not None and not isinstance(damping, Damping):
+        raise InputError(
+            "not a damping", field=field, value=damping, remedy="give RayleighDamping or ModalDamping, or leave it out"
+        )
     if isinstance(damping, RayleighDamping):
         not_negative(damping.mass, f"{field}.mass", "1/s")
         not_negative(damping.stiffness, f"{field}.stiffness", "s")

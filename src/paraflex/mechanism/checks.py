@@ -157,21 +157,14 @@ def check_connected(mechanism: Mechanism) -> None:
 
 
 def check_task(mechanism: Mechanism) -> None:
-    """The end-effector is a point of a body and its task coordinates are x, y or angle, each once."""
+    """The end-effector is a point of a body."""
     if mechanism.end_effector is None:
         return
-    point, coordinates = mechanism.end_effector.point, mechanism.end_effector.coordinates
+    point = mechanism.end_effector.point
     _known_point(mechanism, point, "end_effector.point")
     if point.on_ground:
         raise InputError(
             "the end-effector does not move", field="end_effector.point", value=str(point), remedy="name a body's point"
-        )
-    if not coordinates or len(set(coordinates)) != len(coordinates) or set(coordinates) - {"x", "y", "angle"}:
-        raise InputError(
-            "not a set of task coordinates",
-            field="end_effector.coordinates",
-            value=list(coordinates),
-            remedy='choose from "x", "y", "angle", each once',
         )
 
 

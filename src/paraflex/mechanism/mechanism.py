@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, as_enum
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
@@ -28,10 +28,22 @@ _SIGNS = str.maketrans({"⊕": "+", "⊖": "-", "−": "-", "–": "-"})
 
 @dataclass(frozen=True)
 class EndEffector:
-    """The point whose motion is prescribed, and which of its coordinates are the task."""
+    """The point whose motion is prescribed, and which of its coordinates are the task: "x", "y", "angle", each once."""
 
     point: PointRef
     coordinates: tuple[str, ...] = ("x", "y")
+
+    def __post_init__(self) -> None:
+        given = self.coordinates
+        listed = not isinstance(given, str) and all(name in TASK_COORDINATES for name in given)
+        if not (listed and given and len(set(given)) == len(given)):
+            raise InputError(
+                "not a set of task coordinates",
+                field="end_effector.coordinates",
+                value=given,
+                remedy='choose from "x", "y", "angle", each once',
+            )
+        object.__setattr__(self, "coordinates", tuple(given))
 
 
 @dataclass(frozen=True)
@@ -104,8 +116,8 @@ class Mechanism:
         The first is the default.
     modes : tuple of ActuationMode
         The modes to choose from by default; any other set of motors may be asked for.
-    geometry : Geometry
-        Of its flexible beams; of second order by default, linear in the paper.
+    geometry : Geometry or str
+        Of its flexible beams: "second-order" by default, "linear" in the paper.
     description : str
 
     Raises
@@ -133,6 +145,7 @@ class Mechanism:
     description: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
 
     def _repr_html_(self) -> str:
@@ -205,8 +218,8 @@ class Mechanism:
         self,
         *,
         elements: int | None = None,
-        reference: ReferenceCondition | None = None,
-        curvature: Curvature | None = None,
+        reference: ReferenceCondition | str | None = None,
+        curvature: Curvature | str | None = None,
         modes: int | None = None,
     ) -> Mechanism:
         """The mechanism with another mesh, reference condition, element variant or reduction on every flexible beam.
@@ -215,16 +228,18 @@ class Mechanism:
         ----------
         elements : int, optional
             Elements per span, the same for all.
-        reference : ReferenceCondition, optional
-        curvature : Curvature, optional
+        reference : ReferenceCondition or str, optional
+        curvature : Curvature or str, optional
         modes : int, optional
             Modes of lowest frequency kept of each, and of each other flexible body.
 
         Raises
         ------
         InputError
-            Another mesh, condition or curvature for a flexible body of given shapes.
+            Another mesh, condition or curvature for a flexible body of given shapes, or an unknown one.
         """
+        reference = None if reference is None else as_enum(ReferenceCondition, reference, "reference")
+        curvature = None if curvature is None else as_enum(Curvature, curvature, "curvature")
         asked = {"elements": elements, "reference": reference, "curvature": curvature}
         for what in [name for name, value in asked.items() if value is not None]:
             self._refuse_given_shapes(what)
@@ -274,24 +289,7 @@ class Mechanism:
         InputError
             Neither of the two.
         """
-        return replace(self, geometry=parse_geometry(geometry))
-
-
-def parse_geometry(geometry: Geometry | str) -> Geometry:
-    """A geometry by its name, "linear" or "second-order".
-
-    Raises
-    ------
-    InputError
-        Neither of the two.
-    """
-    try:
-        return Geometry(geometry)
-    except ValueError:
-        names = [known.value for known in Geometry]
-        raise InputError(
-            "unknown geometry", field="geometry", value=geometry, remedy=suggestion(str(geometry), names)
-        ) from None
+        return replace(self, geometry=as_enum(Geometry, geometry, "geometry"))
 
 
 def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:

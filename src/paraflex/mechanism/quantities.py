@@ -10,7 +10,7 @@ from paraflex.errors import InputError, suggestion
 
 def known(name: str, names: Collection[str], field: str, kind: str) -> None:
     """Raise an `InputError`, with the nearest, unless a name is one of those there are."""
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 

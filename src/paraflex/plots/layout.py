@@ -19,7 +19,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError, suggestion
+from paraflex.mechanism.quantities import known
 from paraflex.plots.labels import axis_label
 from paraflex.plots.style import STYLE
 
@@ -58,8 +58,8 @@ def column_width(style: str | None) -> Iterator[None]:
     InputError
         None of these.
     """
-    if style is not None and style not in COLUMNS:
-        raise InputError("unknown style", field="style", value=style, remedy=suggestion(style, COLUMNS))
+    if style is not None:
+        known(style, COLUMNS, "style", "style")
     before = _width.set(None if style is None else COLUMNS[style])
     try:
         yield

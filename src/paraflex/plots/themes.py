@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from paraflex.errors import InputError, suggestion
+from paraflex.mechanism.quantities import known
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,5 @@ def theme(name: str) -> Theme:
     InputError
         There are none of that name.
     """
-    if name not in THEMES:
-        raise InputError("no such theme", field="theme", value=name, remedy=suggestion(name, THEMES))
+    known(name, THEMES, "theme", "theme")
     return THEMES[name]

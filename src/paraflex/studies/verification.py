@@ -13,8 +13,9 @@ from paraflex.elastodynamics import simulate_ked
 from paraflex.engines import ENGINES, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
-from paraflex.errors import InputError, IntegrationError, NumericalError, suggestion
+from paraflex.errors import InputError, IntegrationError, NumericalError, as_enum, suggestion
 from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions
+from paraflex.integrators.methods import find_method
 from paraflex.mechanism import (
     ActuationMode,
     Geometry,
@@ -61,6 +62,9 @@ class VerificationOptions:
     segments: int = 8
     method: str = DEFAULT_METHOD
 
+    def __post_init__(self) -> None:
+        find_method(self.method)
+
 
 @dataclass(frozen=True)
 class ModelRuns:
@@ -77,9 +81,9 @@ class ModelRuns:
     records: Mapping[Refinement, Record]
     failure: str = ""
 
-    def finished(self, level: Refinement) -> Record | None:
+    def finished(self, level: Refinement | str) -> Record | None:
         """A run that got to its end."""
-        run = self.records.get(level)
+        run = self.records.get(as_enum(Refinement, level, "level"))
         return run if run is not None and run.figures["status"] == "complete" else None
 
     @property

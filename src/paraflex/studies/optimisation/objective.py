@@ -9,6 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.mechanism.quantities import known
+
 Array = NDArray[np.float64]
 WORST, MEAN = "worst", "mean"
 
@@ -41,6 +43,9 @@ class Objective:
     over: str = WORST
     relative: bool = True
     limits: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        known(self.over, (WORST, MEAN), "objective.over", "way to take all runs together")
 
     @property
     def columns(self) -> tuple[str, ...]:

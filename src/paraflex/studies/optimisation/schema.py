@@ -11,6 +11,7 @@ from paraflex.studies.sweeps.schema import SweepTable, VaryTable
 
 Yes = Annotated[bool, Field(strict=True)]
 MethodName = Literal["slsqp", "trust-constr", "l-bfgs-b", "nelder-mead", "differential-evolution", "optuna"]
+GradientsName = Literal["differences", "exact"]
 
 
 class _Table(BaseModel):
@@ -63,7 +64,7 @@ class SearchTable(_Table):
     samples: Count = Field(default=0, description="Sobol samples looked at first; the search starts from the best")
     seed: Count = Field(default=0, description="a whole number from 0 on")
     tolerance: Number | None = Field(default=None, description="the relative change at which it ends")
-    gradients: Literal["differences", "exact"] = Field(default="differences", description='"differences" or "exact"')
+    gradients: GradientsName = Field(default="differences", description='"differences" or "exact"')
     difference: Number = Field(default=1e-3, description="the step of differences, as a share of a parameter's range")
 
 

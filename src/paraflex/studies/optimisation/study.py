@@ -5,15 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
 from paraflex.files.read import read_toml, validate
+from paraflex.mechanism import quantities
 from paraflex.studies.optimisation.objective import Objective, Target
-from paraflex.studies.optimisation.schema import ObjectiveTable, ParameterTable, SearchTable, StudyTable, TargetTable
+from paraflex.studies.optimisation.schema import (
+    GradientsName,
+    MethodName,
+    ObjectiveTable,
+    ParameterTable,
+    SearchTable,
+    StudyTable,
+    TargetTable,
+)
 from paraflex.studies.sweeps.metrics import METRICS
 from paraflex.studies.sweeps.overlay import Place, number_at
 from paraflex.studies.sweeps.samples import RANDOM, Varied
@@ -50,6 +59,11 @@ class Search:
     tolerance: float | None = None
     gradients: str = "differences"
     difference: float = 1e-3
+
+    def __post_init__(self) -> None:
+        if self.method is not None:
+            quantities.known(self.method, get_args(MethodName), "search.method", "method")
+        quantities.known(self.gradients, get_args(GradientsName), "search.gradients", "kind of derivatives")
 
 
 @dataclass(frozen=True)

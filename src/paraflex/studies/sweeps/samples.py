@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.mechanism.quantities import known
 
 # More designs than this are a slip: their table alone would fill the memory.
 _MOST = 10_000_000
-GRID, LIST, RANDOM, SOBOL = "grid", "list", "random", "sobol"
+KINDS = GRID, LIST, RANDOM, SOBOL = "grid", "list", "random", "sobol"
 
 
 @dataclass(frozen=True)
@@ -123,8 +124,9 @@ def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: i
     Raises
     ------
     InputError
-        No number, too many designs, lists of different lengths.
+        No such sampling, no number, too many designs, lists of different lengths.
     """
+    known(kind, KINDS, "sampling.kind", "sampling")
     _check_number(parameters, kind, number, seed)
     if not parameters:
         return np.zeros((1, 0))

@@ -1,0 +1,103 @@
+"""Kernels on disk: what was compiled from other sources, or by another compiler, is never loaded."""
+
+import gc
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import paraflex
+from paraflex.kernel import disk_cache
+from paraflex.kernel.compiling import Kernel
+
+# The row of a prescribed angle: a kernel of constraints.py calls one of joints.py, which writes a torque of one there.
+JACOBIAN = """
+import numpy as np
+import paraflex as pf
+from paraflex.dynamics import build_system
+from paraflex.kernel.constraints import fill_jacobian
+system = build_system(pf.load("four_bar").mechanism.rigid())
+print(fill_jacobian.cache_path)
+print(system.jacobian(np.zeros(system.n))[2].max())
+print(len(fill_jacobian.from_python.stats.cache_hits))
+"""
+
+# A state of its own for another release of one of them.
+RELEASE = """
+import sys
+import llvmlite, numba, numpy
+if sys.argv[1:]:
+    setattr(sys.modules[sys.argv[1]], "__version__", "99.0")
+from paraflex.kernel.disk_cache import FOLDER
+print(FOLDER)
+"""
+
+
+def python(*arguments, **environment):
+    command = [sys.executable, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env={**os.environ, **environment})
+    return done.stdout.strip().splitlines()
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the package, as it is installed: without compiled kernels."""
+    return shutil.copytree(
+        Path(paraflex.__file__).parent, tmp_path / "paraflex", ignore=shutil.ignore_patterns("__pycache__")
+    )
+
+
+def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(copy):
+    joints, here = copy / "kernel" / "joints.py", {"PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": ""}
+    text, times = joints.read_text(), joints.stat()
+    folder, entry, hits = python("-c", JACOBIAN, **here)
+    assert (entry, hits) == ("1.0", "0")
+    assert python("-c", JACOBIAN, **here) == [folder, "1.0", "1"]
+    halved = text.replace("f[body.offset + 2] += torque", "f[body.offset + 2] += 0.5 * torque")
+    assert halved != text
+    joints.write_text(halved)
+    # As an installation may leave them.
+    os.utime(joints, ns=(times.st_atime_ns, times.st_mtime_ns))
+    other, entry, hits = python("-c", JACOBIAN, **here)
+    assert (entry, hits) == ("0.5", "0")
+    assert other != folder
+    # The state before is still there: a branch that is looked at for a while compiles nothing twice.
+    joints.write_text(text)
+    assert python("-c", JACOBIAN, **here) == [folder, "1.0", "1"]
+
+
+def test_every_kernel_is_kept_in_the_folder_of_this_state():
+    import paraflex.dynamics.linearise
+    import paraflex.kernel.ode
+    import paraflex.simulate  # noqa: F401
+
+    kernels = [each for each in gc.get_objects() if isinstance(each, Kernel)]
+    assert len(kernels) > 30
+    folders = {each._cache.cache_path for kernel in kernels for each in (kernel.from_python, kernel.inner)}
+    assert {Path(folder).name for folder in folders} == {disk_cache.FOLDER}
+
+
+def test_other_releases_of_the_compiler_have_kernels_of_their_own():
+    found = [python("-c", RELEASE, *given)[0] for given in ([], ["numba"], ["llvmlite"], ["numpy"])]
+    assert found[0] == disk_cache.FOLDER
+    assert len(set(found)) == 4
+
+
+def test_outdated_kernels_are_removed(tmp_path):
+    # Folders of other states, oldest first, and a file of somebody else's.
+    others = [tmp_path / f"paraflex-kernels-{k}" for k in range(5)]
+    for k, folder in enumerate(others):
+        folder.mkdir()
+        (folder / "march.nbi").touch()
+        os.utime(folder, (k, k))
+    (tmp_path / "theirs.nbi").touch()
+    folder = disk_cache.make_folder(tmp_path)
+    kept = {folder, tmp_path / "theirs.nbi", *others[6 - disk_cache.KEPT :]}
+    assert set(tmp_path.iterdir()) == kept
+    # Made already: nothing goes.
+    others[0].mkdir()
+    assert disk_cache.make_folder(tmp_path) == folder
+    assert others[0].exists()
