@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from typing import Any
 
 from common import table, write_json
@@ -22,7 +23,8 @@ import paraflex as pf
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.errors import IntegrationError
 from paraflex.integrators import IntegrationOptions
-from paraflex.simulate import TrackingTask
+from paraflex.results.record import Record
+from paraflex.simulate import TrackingRun, TrackingTask
 
 PATHS = ("square", "line", "circle")
 # Of the paper's study; the paths themselves take 0.53, 0.13 and 0.24 s.
@@ -35,7 +37,7 @@ TABLE_3 = {"+-+-": 0.0575, "-+-+": 0.0075, "+--+": 0.0118, "+++-": 3.3624e-4, "+
 
 def run_models(task: TrackingTask, mode: str, *, exudyn: bool) -> dict[str, dict[str, float] | None]:
     """Tracking errors by model [m]; None where a model does not reach the end."""
-    runs = {
+    runs: dict[str, Callable[[], TrackingRun | Record]] = {
         "second_order": lambda: SECOND_ORDER.task(task).simulate(mode, options=OPTIONS),
         "linear": lambda: PAPER.task(task).simulate(mode, options=OPTIONS),
     }
