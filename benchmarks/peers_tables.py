@@ -61,20 +61,33 @@ def readme_table(results: Sequence[Row], duration: float) -> str:
 
     like = [best("paraflex", "second.order", fixed=fixed) for fixed in (True, False)]
     linear = [best("paraflex", "linear", fixed=fixed) for fixed in (True, False)]
+    engines = {
+        title: min(seconds for name, seconds in times.items() if name.startswith(engine))
+        for engine, title in zip(
+            ENGINES, ("Exudyn, exact beams (ANCF cables)", "MuJoCo, 56 rigid segments"), strict=True
+        )
+    }
+
+    def pair(values: Sequence[float], form: str) -> str:
+        return " / ".join(form.format(value) for value in values)
 
     def ratios(seconds: float, ours: Sequence[float]) -> str:
-        return ", ".join(f"{seconds / one:.0f}" for one in ours)
+        return f"{pair([seconds / one for one in ours], '{:.0f}')} times"
 
     rows = [
-        ("paraflex, second order, fixed steps", like[0], f"{duration / like[0]:.1f} times real time", ""),
-        ("paraflex, second order, error control", like[1], f"{duration / like[1]:.1f} times real time", ""),
+        ("paraflex, second order: fixed steps / error control", pair(like, "{:.3f} s"), "", ""),
+        *(
+            (name, f"{seconds:.3f} s", ratios(seconds, like), ratios(seconds, linear))
+            for name, seconds in engines.items()
+        ),
+        ("paraflex, the paper's linear beams: fixed steps / error control", pair(linear, "{:.3f} s"), "", ""),
     ]
-    for engine, title in zip(ENGINES, ("Exudyn, exact beams (ANCF cables)", "MuJoCo, 56 rigid segments"), strict=True):
-        seconds = min(time for name, time in times.items() if name.startswith(engine))
-        rows.append((title, seconds, f"{ratios(seconds, like)} times ours", f"{ratios(seconds, linear)} times"))
-    rows += [
-        ("paraflex, the paper's linear beams, fixed steps", linear[0], "", ""),
-        ("paraflex, the paper's linear beams, error control", linear[1], "", ""),
+    real = pair([duration / seconds for seconds in like], "{:.1f}")
+    lines = [
+        "| | Time | of second order | of the linear beams |",
+        "|---|---:|---:|---:|",
+        *(f"| {' | '.join(cells)} |" for cells in rows),
+        "",
+        f"Second order is {real} times as fast as real time.",
     ]
-    lines = ["| | Time | Beside second order | Beside linear beams |", "|---|---:|---|---|"]
-    return "\n".join([*lines, *(f"| {a} | {seconds:.3f} s | {b} | {c} |" for a, seconds, b, c in rows)])
+    return "\n".join(lines)

@@ -21,18 +21,18 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
             raise PluginError(f"{page.file.src_uri}: no table {found[1]!r}; there are {', '.join(TABLES)}")
         file, made = TABLES[found[1]]
         data = json.loads((MEASURED / f"{file}.json").read_text(encoding="utf-8"))
-        return f"{_conditions(data)}\n\n{made(data)}"
+        return f"{_conditions(data, timed=file in TIMED)}\n\n{made(data)}"
 
     # cost-model.md has a section of this form that its script writes.
     return re.sub(r"<!-- measured: (?!begin|end)(\w+) -->", table, markdown)
 
 
-def _conditions(data: dict[str, Any]) -> str:
+def _conditions(data: dict[str, Any], *, timed: bool) -> str:
+    """Command, day and versions; where times were measured, the machine and its load as well."""
     machine, versions = data["machine"], data["versions"]
-    return (
-        f"`{data['command']}`, {data['date']}: {machine['processor']}, {machine['processors']} processors, load "
-        f"{data['load'][0]:.1f}; Numba {versions['numba']}, Exudyn {versions['exudyn']}, MuJoCo {versions['mujoco']}."
-    )
+    where = f"{machine['processor']}, {machine['processors']} processors, load {data['load'][0]:.1f}; " if timed else ""
+    engines = f"Numba {versions['numba']}, Exudyn {versions['exudyn']}, MuJoCo {versions['mujoco']}"
+    return f"`{data['command']}`, {data['date']}: {where}{engines}."
 
 
 def peers(data: dict[str, Any]) -> str:
@@ -115,7 +115,7 @@ def table_3(data: dict[str, Any]) -> str:
     for mode, paper in data["table_3"].items():
         linear, second, exact = (square[mode][model]["run"] for model in ("linear", "second_order", "exact"))
         parameters, theory = _percent(linear / paper - 1.0), _percent(linear / exact - 1.0)
-        rows.append((mode, f"{paper:.3g}", f"{linear:.3e}", parameters, theory, f"{second:.3e}", f"{exact:.3e}"))
+        rows.append((mode, f"{paper:.2e}", f"{linear:.2e}", parameters, theory, f"{second:.2e}", f"{exact:.2e}"))
     ours = ("The paper's theory here", "from Table 3: parameters", "from exact beams: theory")
     return _table(("Mode", "Table 3", *ours, "Second order", "Exact beams"), rows)
 
@@ -147,12 +147,13 @@ def model_convergence(data: dict[str, Any]) -> str:
 
 
 def _millimetres(length: float) -> str:
-    return f"{1e3 * length:.3g}"
+    return f"{1e3 * length:#.3g}".rstrip(".")
 
 
 def _percent(part: float) -> str:
     digits = 2 if abs(part) < 0.0095 else 1 if abs(part) < 0.095 else 0
-    return f"{100.0 * part:+.{digits}f} %"
+    # Adding zero takes the sign from a zero.
+    return f"{round(100.0 * part, digits) + 0.0:+.{digits}f} %"
 
 
 def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
@@ -160,6 +161,8 @@ def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)
 
 
+# Files of times; the others hold lengths, which do not depend on the machine.
+TIMED = ("peers", "batch", "startup")
 # What a page may ask for: the file of the measurements, and what makes the table of it.
 TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
     "peers": ("peers", peers),
