@@ -72,7 +72,7 @@ def readme_table(results: Sequence[Row], duration: float) -> str:
         return " / ".join(form.format(value) for value in values)
 
     def ratios(seconds: float, ours: Sequence[float]) -> str:
-        return f"{pair([seconds / one for one in ours], '{:.0f}')} times"
+        return f"{pair([seconds / one for one in ours], '{:.0f}')} times as long"
 
     rows = [
         ("paraflex, second order: fixed steps / error control", pair(like, "{:.3f} s"), "", ""),
@@ -84,7 +84,7 @@ def readme_table(results: Sequence[Row], duration: float) -> str:
     ]
     real = pair([duration / seconds for seconds in like], "{:.1f}")
     lines = [
-        "| | Time | of second order | of the linear beams |",
+        "| | Time | Beside second order | Beside the linear beams |",
         "|---|---:|---:|---:|",
         *(f"| {' | '.join(cells)} |" for cells in rows),
         "",

@@ -133,6 +133,27 @@ def model_agreement(data: dict[str, Any]) -> str:
     return _table(("Mode", "Exact beams", *(name[:1].upper() + name[1:] for name in names)), rows)
 
 
+def library_agreement(data: dict[str, Any]) -> str:
+    """Tracking errors of other mechanisms [m], how far from exact beams, and largest distances."""
+    names = list(data["rows"][0]["models"])
+    rows = []
+    for row in data["rows"]:
+        exact = row["exact"]["run"]
+        errors = [row["models"][name]["run"] for name in names]
+        apart = row["models"]["second order, pinned"]["apart"]
+        rows.append(
+            (
+                f"{row['mechanism']}, {row['mode']}",
+                f"{exact:.3e}",
+                *(f"{error:.3e}, {_percent(error / exact - 1.0)}" for error in errors),
+                f"{_millimetres(row['strays'])} mm",
+                f"{1e6 * apart:.1f} µm",
+            )
+        )
+    headings = (name[:1].upper() + name[1:] for name in names)
+    return _table(("Mode", "Exact beams", *headings, "Strays by", "Apart"), rows)
+
+
 def model_convergence(data: dict[str, Any]) -> str:
     """How far a finer step and a finer mesh move the path: the largest of all modes."""
     rows = []
@@ -171,5 +192,6 @@ TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
     "paths_and_modes": ("paths_and_modes", paths_and_modes),
     "table_3": ("paths_and_modes", table_3),
     "model_agreement": ("model_agreement", model_agreement),
+    "library_agreement": ("library_agreement", library_agreement),
     "model_convergence": ("model_agreement", model_convergence),
 }
