@@ -5,7 +5,8 @@
 Young's modulus of every link varies by a fifth from design to design, so that torques stay and motions differ. Each
 engine runs a design from the mechanism on: planning, building the model, integrating ++++ for 0.7 s, at settings that
 `peers.py` finds; the largest deviation from the design's own converged path, over some designs, is told beside the time
-and has to be within the target. paraflex runs all designs; the others a sample of them, whose time is multiplied.
+and has to be within the target. paraflex runs all designs; the others a sample of them, whose time is multiplied. Like
+with like are second order and the other engines; the paper's linear beams stand beside.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any
 import numpy as np
 from common import single_thread, table, write_json
 from engines import ExudynSetting, MuJoCoSetting, distance, run_exudyn, run_mujoco, tracking_problem
+from models import PAPER, SECOND_ORDER
 from numpy.typing import NDArray
 from peers import MODE, TARGET, Tolerance, plan, run_paraflex
 
@@ -34,9 +36,12 @@ DESIGNS, SAMPLE, CHECKED, SPREAD = 1000, 16, 3, 0.2
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
+OURS = {model.name: model for model in (SECOND_ORDER, PAPER)}
+
+
 @dataclass(frozen=True)
 class Way:
-    """An engine with its setting and a converged one."""
+    """An engine, or a model of paraflex's beams, with its setting and a converged one."""
 
     engine: str
     setting: Any
@@ -45,16 +50,18 @@ class Way:
     @property
     def name(self) -> str:
         """In the table."""
-        return f"{self.engine}: {self.setting}"
+        ours = "paraflex, " if self.engine in OURS else ""
+        return f"{ours}{self.engine}: {self.setting}"
 
 
 WAYS = (
-    Way("paraflex, linear", Tolerance("esdirk5", 1e-3, 1.2e-3), Tolerance("esdirk5", 1e-7)),
-    Way("paraflex, linear", Tolerance("esdirk5", 2e-4), Tolerance("esdirk5", 1e-7)),
-    Way("paraflex, linear", Tolerance("tr-bdf2", 6e-5), Tolerance("esdirk5", 1e-7)),
-    Way("paraflex, second-order", Tolerance("esdirk5", 1e-4), Tolerance("esdirk5", 1e-7)),
+    Way(SECOND_ORDER.name, Tolerance("esdirk5", 1e-3, 1.2e-3), Tolerance("esdirk5", 1e-7)),
+    Way(SECOND_ORDER.name, Tolerance("esdirk5", 1e-4), Tolerance("esdirk5", 1e-7)),
     Way("Exudyn", ExudynSetting(14, 0.9), ExudynSetting(60)),
     Way("MuJoCo", MuJoCoSetting(19), MuJoCoSetting(40)),
+    Way(PAPER.name, Tolerance("esdirk5", 1e-3, 1.2e-3), Tolerance("esdirk5", 1e-7)),
+    Way(PAPER.name, Tolerance("esdirk5", 2e-4), Tolerance("esdirk5", 1e-7)),
+    Way(PAPER.name, Tolerance("tr-bdf2", 6e-5), Tolerance("esdirk5", 1e-7)),
 )
 
 
@@ -85,8 +92,7 @@ def _runner(engine: str) -> Callable[[TrackingTask, Any], NDArray[np.float64]]:
         return lambda task, setting: (
             run_mujoco(tracking_problem(task.in_segments(proportional_segments(task.mechanism, 8)), MODE), setting).path
         )
-    geometry = Geometry(engine.partition(", ")[2])
-    return lambda task, setting: run_paraflex(task, geometry, setting).path
+    return lambda task, setting: run_paraflex(task, OURS[engine], setting).path
 
 
 def _run(order: tuple[Way, int]) -> int:
@@ -134,7 +140,7 @@ def main() -> None:
     found = []
     with multiprocessing.get_context("spawn").Pool(given.processes, _start_worker) as pool:
         for way in WAYS:
-            run = given.designs if way.engine.startswith("paraflex") else min(given.sample, given.designs)
+            run = given.designs if way.engine in OURS else min(given.sample, given.designs)
             found.append(measure(way, given.designs, run, CHECKED, pool, given.processes))
             print(f"{way.name}: {found[-1]['seconds_of_all']:.0f} s", flush=True)
     fastest = min(row["seconds_of_all"] for row in found if row["deviation"] <= given.target)

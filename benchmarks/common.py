@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -14,6 +15,9 @@ from typing import Any, TypeVar
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite", "exudyn", "mujoco")
+
+# What the documentation shows; other results go to `benchmarks/results`.
+MEASURED = Path(__file__).parent / "measured"
 
 Setting = TypeVar("Setting")
 
@@ -120,7 +124,17 @@ def markdown(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def write_json(name: str, values: dict[str, Any], folder: str | None = None) -> Path:
+def write_page(text: str, page: Path) -> None:
+    """Replace what stands on a page between the two marks for what was measured."""
+    begin, end = "<!-- measured: begin -->", "<!-- measured: end -->"
+    before = page.read_text(encoding="utf-8")
+    pattern = re.compile(f"{re.escape(begin)}.*{re.escape(end)}", re.DOTALL)
+    if not pattern.search(before):
+        raise ValueError(f"{page} has no part between {begin} and {end}")
+    page.write_text(pattern.sub(lambda _: f"{begin}\n\n{text}\n\n{end}", before), encoding="utf-8")
+
+
+def write_json(name: str, values: dict[str, Any], folder: str | Path | None = None) -> Path:
     """Measurements with their conditions, as FOLDER/NAME.json; `benchmarks/results` by default."""
     where = Path(folder) if folder is not None else Path(__file__).parent / "results"
     where.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-import re
 import statistics
 import time
 from collections.abc import Sequence
@@ -23,7 +22,7 @@ from typing import Any
 
 import iteration
 import numpy as np
-from common import conditions, growth, markdown, single_thread, write_json
+from common import conditions, growth, markdown, single_thread, write_json, write_page
 from numpy.typing import NDArray
 from scaling import MOVING, fastest
 
@@ -36,7 +35,6 @@ from paraflex.simulate import TrackingTask
 
 MODE, TOLERANCE = "++++", 1e-4
 PAGE = Path(__file__).parents[1] / "docs" / "cost-model.md"
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 ROWS, CHAINS, MODES = (2, 5, 10, 20, 50, 100), (5, 10, 20, 50, 100, 200), (1, 2, 3, 4, None)
 TOLERANCES, DURATIONS = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5), (0.2, 0.35, 0.7, 1.4)
 STUDY, CORES = 1_000_000, (1, 128, 1024, 10_240)
@@ -290,15 +288,6 @@ def _study_table(designs: Sequence[dict[str, Any]]) -> str:
     return markdown(["geometry", "planning [s]", "run [s]", "design alone [s]", busy, *cores], rows)
 
 
-def write_page(text: str, page: Path = PAGE) -> None:
-    """Replace what stands between the marks."""
-    before = page.read_text(encoding="utf-8")
-    pattern = re.compile(f"{re.escape(BEGIN)}.*{re.escape(END)}", re.DOTALL)
-    if not pattern.search(before):
-        raise ValueError(f"{page} has no part between {BEGIN} and {END}")
-    page.write_text(pattern.sub(lambda _: f"{BEGIN}\n\n{text}\n\n{END}", before), encoding="utf-8")
-
-
 def measure(*, quick: bool) -> dict[str, Any]:
     """Everything; quickly with fewer and smaller cases."""
     task = plan()
@@ -329,7 +318,7 @@ def main() -> None:
     text = tables(found, fitted, conditions())
     print(text)
     if given.write:
-        write_page(text)
+        write_page(text, PAGE)
     write_json("cost_model", {**found, "fits": {name: asdict(fit) for name, fit in fitted.items()}}, given.out)
 
 

@@ -1,17 +1,20 @@
 """RAParM-I against Exudyn, MuJoCo and SciPy: same torques and start, each at its fastest setting that is close enough.
 
-    python benchmarks/peers.py [--target METRES] [--duration S] [--repeats N] [--out DIR]
+    python benchmarks/peers.py [--skip-scipy] [--write] [--target METRES] [--duration S] [--repeats N] [--out DIR]
 
-Mode ++++ on the square, reference set, all 104 coordinates, 0.7 s, one thread each, kernels warm. Close enough is an
-end-effector nowhere further than the target from the path that the same model takes with much finer steps: models
-differ (the linear shape, second order, exact beams, rigid segments), and none is charged for being another. Settings
-are searched from coarse to fine; what counts is the median wall time of several runs of the first that is within the
-target together with the next finer one. Integration alone is timed, making and assembling the model is told beside it.
+Mode ++++ on the square, reference set, 0.7 s, one thread each, kernels warm. Close enough is an end-effector nowhere
+further than the target from the path that the same model takes with much finer steps. Like is compared with like:
+Exudyn's exact beams and MuJoCo's segments have what our second-order geometry has (pinned reference, separate
+curvature, 114 coordinates). The paper's linear beams (cantilever reference, shared curvature, 104 coordinates) leave
+the geometric stiffness out; they stand beside, under their own name. Settings are searched from coarse to fine; what
+counts is the median wall time of several runs of the first that is within the target together with the next finer
+one. Integration alone is timed, making and assembling the model is told beside it.
 
 Ours are tried with error control and with fixed steps, as all others have. Exudyn is tried with full and modified
 Newton, dense and sparse matrices and several numerical dampings; its torques are set by a function of Python before
 each step, whose time is taken off in a column of its own. MuJoCo is tried with each of its integrators. What each chose
-is timed in turns, so that all see the same moods of the machine. Takes minutes.
+is timed in turns, so that all see the same moods of the machine. With --write the figures go to benchmarks/measured,
+from where the documentation takes them, and into README.md between its two marks. Takes minutes.
 """
 
 from __future__ import annotations
@@ -24,10 +27,11 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import Trial, coarsest_within, single_thread, table, write_json
+from common import MEASURED, Trial, coarsest_within, single_thread, write_json, write_page
 from engines import (
     ExudynSetting,
     MuJoCoSetting,
@@ -37,7 +41,9 @@ from engines import (
     run_mujoco,
     tracking_problem,
 )
+from models import PAPER, SECOND_ORDER, BeamModel
 from numpy.typing import NDArray
+from peers_tables import leads, print_results, readme_table
 
 import paraflex as pf
 from paraflex.compilation import compile_kernels
@@ -48,8 +54,7 @@ from paraflex.simulate import TrackingTask
 from paraflex.studies import tracking_case
 
 MODE, TARGET, DURATION, REPEATS = "++++", 1.2e-5, 0.7, 5
-# Leads to reach over Exudyn and MuJoCo, and times [s] of TR-BDF2 and of the best method.
-LEADS, GOALS = {"Exudyn": 10.0, "MuJoCo": 40.0}, {"TR-BDF2": 0.10, "the best method": 0.05}
+README = Path(__file__).parents[1] / "README.md"
 TOLERANCES = tuple(1e-3 * 10.0 ** (-k / 10.0) for k in range(36))
 # Fixed steps [s], coarse to fine, and what Newton's tolerance is then derived from [m].
 STEPS = tuple(3e-3 * 0.93**k for k in range(55))
@@ -174,32 +179,32 @@ class Tolerance:
         return f"{self.method}, {self.tolerance:.2g} m" if self.step is None else f"{self.method}, {self.step:.2g} s"
 
 
-def run_paraflex(task: TrackingTask, geometry: Geometry, setting: Tolerance) -> Run:
+def run_paraflex(task: TrackingTask, model: BeamModel, setting: Tolerance) -> Run:
     """Our own run; set-up is that of the system from the mechanism."""
     began = time.perf_counter()
-    case = tracking_case(task.remodelled(task.mechanism.with_geometry(geometry)), MODE)
+    case = tracking_case(model.task(task), MODE)
     setup = time.perf_counter() - began
     solution = case.solve(IntegrationOptions(**asdict(setting)), None)
     return Run(case.places(solution)[:, 0], solution.wall_time, setup, steps=solution.steps)
 
 
 def our_choices(task: TrackingTask, target: float, *, with_scipy: bool = True) -> Iterator[Choice]:
-    """Both geometries, and SciPy's Radau on the ordinary differential equations of the linear one."""
-    for geometry in Geometry:
+    """Second order, the paper's linear beams, and SciPy's Radau on the ordinary differential equations of those."""
+    for model in (SECOND_ORDER, PAPER):
 
-        def run(setting: Tolerance, geometry: Geometry = geometry) -> Run:
-            return run_paraflex(task, geometry, setting)
+        def run(setting: Tolerance, model: BeamModel = model) -> Run:
+            return run_paraflex(task, model, setting)
 
         fine = Tolerance("esdirk5", CONVERGED)
         path = run(fine).path
         converged = Converged(str(fine), path, distance(path, run(Tolerance("esdirk4", 5.0 * CONVERGED)).path))
         for method in ("tr-bdf2", "esdirk5"):
-            name = f"paraflex {method}, {geometry.value}"
+            name = f"paraflex {method}, {model.name}"
             controlled = [Tolerance(method, tolerance) for tolerance in TOLERANCES]
             fixed = [Tolerance(method, LEFT_TO_NEWTON[method], step) for step in STEPS]
             yield choose(name, controlled, run, converged, target)
             yield choose(f"{name}, fixed steps", fixed, run, converged, target)
-        if geometry is Geometry.LINEAR and with_scipy:
+        if model is PAPER and with_scipy:
             settings = [Tolerance("radau", tolerance) for tolerance in TOLERANCES[::2]]
             yield choose("SciPy Radau on the ODE, linear", settings, run, converged, target)
 
@@ -269,41 +274,17 @@ def plan(duration: float) -> TrackingTask:
     return pf.plan_tracking(model.mechanism, model.path("square"), duration=duration, samples=round(1e3 * duration) + 1)
 
 
-def leads(results: Sequence[Result]) -> dict[str, Any]:
-    """How many times faster paraflex's methods are than the best of every other engine, and whether goals are met."""
-    times = {result.name: result.seconds for result in results}
-    ours = {name: seconds for name, seconds in times.items() if name.startswith("paraflex")}
-    out: dict[str, Any] = {}
-    for engine, goal in LEADS.items():
-        theirs = [seconds for name, seconds in times.items() if name.startswith(engine)]
-        if theirs and ours:
-            out[engine] = {
-                "goal": goal,
-                "seconds": min(theirs),
-                "ratios": {name: min(theirs) / seconds for name, seconds in ours.items()},
-            }
-    return out
-
-
-def print_results(results: Sequence[Result]) -> None:
-    """The table."""
-    default = next((r.seconds for r in results if r.name == "paraflex tr-bdf2, linear"), math.nan)
-    rows = [
-        [r.name, r.setting, f"{r.deviation:.1e}", f"{r.seconds:.3f}", f"{r.without_python:.3f}",
-         f"{r.fastest:.3f}-{r.slowest:.3f}", f"{r.setup:.3f}", f"{r.seconds / default:.1f}"]
-        for r in results
-    ]  # fmt: skip
-    print(table(["", "setting", "off by [m]", "time [s]", "less Python", "from-to", "set-up", "ratio"], rows))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--target", type=float, default=TARGET, help="deviation from the converged path [m]")
     parser.add_argument("--duration", type=float, default=DURATION, help="[s]")
     parser.add_argument("--repeats", type=int, default=REPEATS)
     parser.add_argument("--skip-scipy", action="store_true", help="it takes as long as all others")
+    parser.add_argument("--write", action="store_true", help="into benchmarks/measured and README.md")
     parser.add_argument("--out", help="folder for peers.json")
     given = parser.parse_args()
+    if given.write and given.duration != DURATION:
+        parser.error(f"--write is for the whole study: --duration {DURATION}")
     single_thread()
     # Exudyn's build without checks.
     setattr(sys, "exudynFast", True)  # noqa: B010
@@ -319,22 +300,20 @@ def main() -> None:
         choices.append(choice)
         found = f"nothing tried is within {given.target:g} m" if choice.setting is None else choice.setting
         print(f"{choice.name}: {found}", flush=True)
-    results = timed(choices, given.repeats)
+    results = [asdict(result) for result in timed(choices, given.repeats)]
     print_results(results)
-    found = leads(results)
-    for engine, lead in found.items():
-        for name, ratio in lead["ratios"].items():
-            print(f"{name}: {ratio:.1f} times {engine} (goal of the linear model: {lead['goal']:.0f})")
     write_json(
         "peers",
         {
             "mode": MODE, "target": given.target, "duration": given.duration, "repeats": given.repeats,
-            "goals": {"seconds": GOALS, "leads": LEADS}, "leads": found,
-            "results": [asdict(result) for result in results],
+            "leads": leads(results),
+            "results": results,
             "not_close_enough": {choice.name: choice.tried for choice in choices if choice.setting is None},
         },
-        given.out,
+        MEASURED if given.write else given.out,
     )  # fmt: skip
+    if given.write:
+        write_page(readme_table(results, given.duration), README)
 
 
 if __name__ == "__main__":

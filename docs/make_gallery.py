@@ -66,7 +66,7 @@ STUDIES = {
 METHODS = ("tr-bdf2", "esdirk3", "esdirk4", "esdirk5", "newmark", "generalised-alpha")
 # What each kind of results is made by; {} is its folder.
 COMMANDS = {
-    "tracking": ["run", "--mechanism", "raparm_i", "--out", "{}"],
+    "tracking": ["run", "--mechanism", "raparm_i", "--geometry", "second-order", "--out", "{}"],
     "motion": ["run", "--mechanism", "four_bar", "--out", "{}"],
     "verification": ["verify", "--mechanism", "five_bar", "--out", "{}"],
     "methods": [

@@ -1,5 +1,6 @@
 """The benchmarks' own parts: what they measure is what they say; nothing is timed here."""
 
+import dataclasses
 import json
 import math
 import sys
@@ -24,8 +25,11 @@ import cost_model  # noqa: E402
 import engines  # noqa: E402
 import four_bars  # noqa: E402
 import iteration  # noqa: E402
+import models  # noqa: E402
 import operations  # noqa: E402
+import paths_and_modes  # noqa: E402
 import peers  # noqa: E402
+import peers_tables  # noqa: E402
 import startup  # noqa: E402
 
 
@@ -103,20 +107,23 @@ def test_choices_are_timed_and_told(task):
             raise RuntimeError("diverges")
         return engines.Run(np.full((2, 2), 0.1**setting), 1.0 / setting, 0.5, 0.1, setting)
 
-    choice = peers.choose("paraflex tr-bdf2, linear", [0, 1, 2, 3, 4], run, converged, 0.05)
+    choice = peers.choose("paraflex tr-bdf2, second order, pinned", [0, 1, 2, 3, 4], run, converged, 0.05)
     assert choice.setting == 2
     assert [trial.get("reason") for trial in choice.tried][:2] == ["diverges", None]
     other = peers.choose("Exudyn, x", [1, 2], run, converged, 0.05)
-    (ours, theirs) = peers.timed([choice, other], 3)
+    paper = peers.choose("paraflex tr-bdf2, linear, cantilever", [2, 4], run, converged, 0.05)
+    ours, theirs, linear = peers.timed([choice, other, paper], 3)
     assert ours.seconds == 0.5
     assert ours.without_python == 0.4
-    assert peers.leads([ours, theirs])["Exudyn"]["ratios"] == {ours.name: 1.0}
+    lead = peers_tables.leads([dataclasses.asdict(result) for result in (ours, theirs, linear)])["Exudyn"]
+    assert lead["like"] == {ours.name: 1.0}
+    assert lead["linear"] == {linear.name: 1.0}
     assert peers.choose("none", [1], run, converged, 1e-9).setting is None
 
 
 def test_our_run_is_the_study_itself(task):
-    solution = task.simulate("++++").solution
-    found = peers.run_paraflex(task, Geometry.LINEAR, peers.Tolerance("tr-bdf2", 1e-4))
+    solution = models.PAPER.task(task).simulate("++++", method="tr-bdf2").solution
+    found = peers.run_paraflex(task, models.PAPER, peers.Tolerance("tr-bdf2", 1e-4))
     assert found.steps == solution.steps
 
 
@@ -164,13 +171,24 @@ def test_fits_find_what_was_put_in():
 
 
 def test_only_what_is_between_the_marks_is_written(tmp_path):
+    begin, end = "<!-- measured: begin -->", "<!-- measured: end -->"
     page = tmp_path / "page.md"
-    page.write_text(f"before\n{cost_model.BEGIN}\nold\n{cost_model.END}\nafter\n")
-    cost_model.write_page("new \\1", page)
-    assert page.read_text() == f"before\n{cost_model.BEGIN}\n\nnew \\1\n\n{cost_model.END}\nafter\n"
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
+    common.write_page("new \\1", page)
+    assert page.read_text() == f"before\n{begin}\n\nnew \\1\n\n{end}\nafter\n"
     with pytest.raises(ValueError, match="no part"):
-        cost_model.write_page("new", BENCHMARKS / "common.py")
-    assert cost_model.BEGIN in cost_model.PAGE.read_text(encoding="utf-8")
+        common.write_page("new", BENCHMARKS / "batch.py")
+    for written in (cost_model.PAGE, peers.README):
+        assert begin in written.read_text(encoding="utf-8")
+
+
+def test_the_readme_shows_the_speed_that_was_measured():
+    measured = json.loads((common.MEASURED / "peers.json").read_text(encoding="utf-8"))
+    table = peers_tables.readme_table(measured["results"], measured["duration"])
+    assert table in peers.README.read_text(encoding="utf-8")
+    # Like with like comes first.
+    rows = [line for line in table.splitlines() if line.startswith("| paraflex")]
+    assert [("second order" in row, "linear" in row) for row in rows] == [(True, False), (False, True)]
 
 
 def test_measurements_keep_their_conditions(tmp_path):
@@ -182,3 +200,54 @@ def test_measurements_keep_their_conditions(tmp_path):
     start = startup.timed("python", ["-c", "pass"], 1)
     assert 0.0 < start.least == start.median
     assert start.processor > 0.0
+
+
+def measured(path, mode):
+    """What `paths_and_modes.py` found [m]."""
+    rows = json.loads((common.MEASURED / "paths_and_modes.json").read_text(encoding="utf-8"))["rows"]
+    return next(row for row in rows if (row["path"], row["mode"]) == (path, mode))
+
+
+@pytest.mark.parametrize("mode", ["+-+-", "++++"])
+def test_errors_of_paths_and_modes_are_those_of_the_models(mode):
+    """On the line +-+- is the better one, in the motion and over the whole run, by every model."""
+    model = pf.load("raparm_i")
+    task = pf.plan_tracking(model.mechanism, model.path("line"), duration=paths_and_modes.DURATION)
+    found = paths_and_modes.run_models(task, mode, exudyn=False)
+    known = measured("line", mode)
+    for name in ("second_order", "linear"):
+        assert found[name] == pytest.approx(known[name], rel=5e-3)
+        for part in ("motion", "run"):
+            assert measured("line", "+-+-")[name][part] < measured("line", "++++")[name][part]
+
+
+def test_second_order_meets_exact_beams_on_every_path_and_mode():
+    """As `paths_and_modes.py` measured them: within 0.5 %, where linear beams are off by more than ten times."""
+    rows = json.loads((common.MEASURED / "paths_and_modes.json").read_text(encoding="utf-8"))["rows"]
+    assert len(rows) == 27
+    for row in rows:
+        assert row["second_order"] == pytest.approx(row["exact"], rel=5e-3)
+    assert max(row["linear"]["run"] / row["exact"]["run"] for row in rows) > 10.0
+
+
+def test_errors_are_taken_until_the_motion_ends_and_over_the_whole_run():
+    model = pf.load("raparm_i")
+    task = pf.plan_tracking(model.mechanism, model.path("line"), duration=0.2, samples=41)
+    run = models.SECOND_ORDER.task(task).simulate("++++", method="esdirk5")
+    data = pf.tracking_dataset([run])
+    errors = models.tracking_errors(run, task.path.duration)
+    assert errors["run"] == pytest.approx(float(data["tracking_rms"][0]))
+    part = data.sel(time=slice(0.0, task.path.duration))
+    assert errors["motion"] == pytest.approx(float(pf.results.tracking_error(part)[0]))
+    assert errors["motion"] < errors["run"]
+
+
+def test_the_readme_shows_the_agreement_that_was_measured():
+    rows = json.loads((common.MEASURED / "model_agreement.json").read_text(encoding="utf-8"))["rows"]
+    shown = [line for line in peers.README.read_text(encoding="utf-8").splitlines() if line.startswith(("| +", "| -"))]
+    assert len(shown) == 3
+    for line in shown:
+        mode, *errors = (cell.strip() for cell in line.strip("|").split("|"))
+        found = next(row for row in rows if row["mode"] == mode)["models"]
+        names = ("second order, pinned", "exact beams", "56 segments", "56 segments, MuJoCo")
+        assert errors == [f"{found[name]['run']:.3e}".replace("e-0", "e-") for name in names]

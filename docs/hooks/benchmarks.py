@@ -1,4 +1,4 @@
-"""Tables of the benchmarks page, from the JSON that the scripts write: `benchmarks/measured` holds what is shown."""
+"""Tables of measurements, from the JSON that `benchmarks` write: `benchmarks/measured` holds what is shown."""
 
 from __future__ import annotations
 
@@ -19,27 +19,37 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     def table(found: re.Match[str]) -> str:
         if found[1] not in TABLES:
             raise PluginError(f"{page.file.src_uri}: no table {found[1]!r}; there are {', '.join(TABLES)}")
-        data = json.loads((MEASURED / f"{found[1]}.json").read_text(encoding="utf-8"))
-        return f"{_conditions(data)}\n\n{TABLES[found[1]](data)}"
+        file, made = TABLES[found[1]]
+        data = json.loads((MEASURED / f"{file}.json").read_text(encoding="utf-8"))
+        return f"{_conditions(data, timed=file in TIMED)}\n\n{made(data)}"
 
     # cost-model.md has a section of this form that its script writes.
     return re.sub(r"<!-- measured: (?!begin|end)(\w+) -->", table, markdown)
 
 
-def _conditions(data: dict[str, Any]) -> str:
+def _conditions(data: dict[str, Any], *, timed: bool) -> str:
+    """Command, day and versions; where times were measured, the machine and its load as well."""
     machine, versions = data["machine"], data["versions"]
-    return (
-        f"`{data['command']}`, {data['date']}: {machine['processor']}, {machine['processors']} processors, load "
-        f"{data['load'][0]:.1f}; Numba {versions['numba']}, Exudyn {versions['exudyn']}, MuJoCo {versions['mujoco']}."
-    )
+    where = f"{machine['processor']}, {machine['processors']} processors, load {data['load'][0]:.1f}; " if timed else ""
+    engines = f"Numba {versions['numba']}, Exudyn {versions['exudyn']}, MuJoCo {versions['mujoco']}"
+    return f"`{data['command']}`, {data['date']}: {where}{engines}."
 
 
 def peers(data: dict[str, Any]) -> str:
-    """One run by every engine, fastest first."""
+    """One run by every engine, fastest first: like with like, then linear beams apart."""
     results = sorted(data["results"], key=lambda result: result["seconds"])
-    best = results[0]["seconds"]
+    linear = [result for result in results if ", linear" in result["name"]]
+    like = [result for result in results if result not in linear]
+    return (
+        f"Second order beside exact beams and segments:\n\n{_times(like, data['duration'], like[0])}\n\n"
+        f"Linear beams, on the same scale:\n\n{_times(linear, data['duration'], like[0])}"
+    )
+
+
+def _times(results: list[dict[str, Any]], duration: float, first: dict[str, Any]) -> str:
+    headings = ("Engine", "Setting", "Off by [m]", "Time [s]", "fastest to slowest", "Real time", "Beside second order")
     return _table(
-        ("Engine", "Setting", "Off by [m]", "Time [s]", "fastest to slowest", "Real time", "Times the first"),
+        headings,
         [
             (
                 result["name"],
@@ -47,8 +57,8 @@ def peers(data: dict[str, Any]) -> str:
                 f"{result['deviation']:.1e}",
                 f"{result['seconds']:.3f}",
                 f"{result['fastest']:.3f} to {result['slowest']:.3f}",
-                f"{data['duration'] / result['seconds']:.1f} x",
-                f"{result['seconds'] / best:.1f}",
+                f"{duration / result['seconds']:.1f} x",
+                f"{result['seconds'] / first['seconds']:.1f}",
             )
             for result in results
         ],
@@ -77,9 +87,111 @@ def startup(data: dict[str, Any]) -> str:
     )
 
 
+def paths_and_modes(data: dict[str, Any]) -> str:
+    """Tracking errors of all paths and modes, during the motion and over the whole run [mm]."""
+    models = {"second_order": "Second order", "exact": "Exact beams", "linear": "The paper's linear beams"}
+    headings = [f"{title}, {part}" for title in models.values() for part in ("motion", "whole run")]
+
+    def cells(errors: dict[str, float] | None) -> tuple[str, ...]:
+        return ("fails", "fails") if errors is None else (_millimetres(errors["motion"]), _millimetres(errors["run"]))
+
+    return _table(
+        ("Path, its time", "Mode", *headings),
+        [
+            (
+                f"{row['path']}, {row['motion_end']:.2f} s",
+                row["mode"],
+                *(x for name in models for x in cells(row[name])),
+            )
+            for row in data["rows"]
+        ],
+    )
+
+
+def table_3(data: dict[str, Any]) -> str:
+    """The paper's Table 3 beside the same modes of ours, over the whole run [m]."""
+    square = {row["mode"]: row for row in data["rows"] if row["path"] == "square"}
+    rows = []
+    for mode, paper in data["table_3"].items():
+        linear, second, exact = (square[mode][model]["run"] for model in ("linear", "second_order", "exact"))
+        parameters, theory = _percent(linear / paper - 1.0), _percent(linear / exact - 1.0)
+        rows.append((mode, f"{paper:.2e}", f"{linear:.2e}", parameters, theory, f"{second:.2e}", f"{exact:.2e}"))
+    ours = ("The paper's theory here", "from Table 3: parameters", "from exact beams: theory")
+    return _table(("Mode", "Table 3", *ours, "Second order", "Exact beams"), rows)
+
+
+def model_agreement(data: dict[str, Any]) -> str:
+    """Tracking errors of every model [m], and how far from exact beams."""
+    names = [name for name in data["rows"][0]["models"] if name not in ("exact beams", "56 segments, MuJoCo")]
+    rows = []
+    for row in data["rows"]:
+        exact = row["models"]["exact beams"]["run"]
+        errors = [row["models"][name]["run"] for name in names]
+        rows.append(
+            (row["mode"], f"{exact:.4e}", *(f"{error:.3e}, {_percent(error / exact - 1.0)}" for error in errors))
+        )
+    return _table(("Mode", "Exact beams", *(name[:1].upper() + name[1:] for name in names)), rows)
+
+
+def library_agreement(data: dict[str, Any]) -> str:
+    """Tracking errors of other mechanisms [m], how far from exact beams, and largest distances."""
+    names = list(data["rows"][0]["models"])
+    rows = []
+    for row in data["rows"]:
+        exact = row["exact"]["run"]
+        errors = [row["models"][name]["run"] for name in names]
+        apart = row["models"]["second order, pinned"]["apart"]
+        rows.append(
+            (
+                f"{row['mechanism']}, {row['mode']}",
+                f"{exact:.3e}",
+                *(f"{error:.3e}, {_percent(error / exact - 1.0)}" for error in errors),
+                f"{_millimetres(row['strays'])} mm",
+                f"{1e6 * apart:.1f} µm",
+            )
+        )
+    headings = (name[:1].upper() + name[1:] for name in names)
+    return _table(("Mode", "Exact beams", *headings, "Strays by", "Apart"), rows)
+
+
+def model_convergence(data: dict[str, Any]) -> str:
+    """How far a finer step and a finer mesh move the path: the largest of all modes."""
+    rows = []
+    for name in data["rows"][0]["models"]:
+        moved = []
+        for change in ("step", "mesh"):
+            by_mode = {row["mode"]: row["models"][name]["changes"][change] for row in data["rows"]}
+            worst = max(by_mode, key=lambda mode: by_mode[mode] or 0.0)
+            moved.append("" if by_mode[worst] is None else f"{by_mode[worst]:.1e} m in {worst}")
+        rows.append((name, *moved))
+    return _table(("Model", "By the step", "By the mesh"), rows)
+
+
+def _millimetres(length: float) -> str:
+    return f"{1e3 * length:#.3g}".rstrip(".")
+
+
+def _percent(part: float) -> str:
+    digits = 2 if abs(part) < 0.0095 else 1 if abs(part) < 0.095 else 0
+    # Adding zero takes the sign from a zero.
+    return f"{round(100.0 * part, digits) + 0.0:+.{digits}f} %"
+
+
 def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     lines = [headings, tuple("---" for _ in headings), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)
 
 
-TABLES: dict[str, Callable[[dict[str, Any]], str]] = {"peers": peers, "batch": batch, "startup": startup}
+# Files of times; the others hold lengths, which do not depend on the machine.
+TIMED = ("peers", "batch", "startup")
+# What a page may ask for: the file of the measurements, and what makes the table of it.
+TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
+    "peers": ("peers", peers),
+    "batch": ("batch", batch),
+    "startup": ("startup", startup),
+    "paths_and_modes": ("paths_and_modes", paths_and_modes),
+    "table_3": ("paths_and_modes", table_3),
+    "model_agreement": ("model_agreement", model_agreement),
+    "library_agreement": ("library_agreement", library_agreement),
+    "model_convergence": ("model_agreement", model_convergence),
+}
