@@ -25,7 +25,7 @@ from paraflex.cli.request import (
     results_folder,
     write_json,
 )
-from paraflex.cli.tables import events, failures, plain_console, study_table
+from paraflex.cli.tables import failures, plain_console, print_study
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -75,7 +75,7 @@ def run_command(request: RunRequest) -> int:
         check_stops(task.mechanism, options, request.integration)
     parameters = _parameters(model, path_name, modes, task, how, request)
     try:
-        result = _simulate(console, task, modes, options, parameters, _method(request, options))
+        result = _simulate(console, task, modes, options, parameters, _method(request, options), model.study.error)
     except InputError as error:
         raise at_fault(error, model) from None
     if result.data is None:
@@ -86,8 +86,7 @@ def run_command(request: RunRequest) -> int:
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
-        plain_console().print(study_table(figures, task, _model_name(request, mechanism)))
-        events(plain_console(), figures)
+        print_study(plain_console(), figures, task, _model_name(request, mechanism))
         console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
     failures(console, result)
     if result.interrupted:
@@ -182,6 +181,8 @@ def _parameters(
             "segments": request.segments,
             "ked": request.ked,
             "balanced": request.balanced,
+            "after": task.after.value,
+            "error": model.study.error,
             "geometry": task.mechanism.geometry.value,
         }
         | how,
@@ -195,6 +196,7 @@ def _simulate(
     options: IntegrationOptions,
     parameters: dict,
     method: Simulator | None,
+    error: str,
 ) -> StudyResult:
     end = float(task.motion.t[-1])
     columns = (
@@ -209,7 +211,9 @@ def _simulate(
             progress.start_task(bars[name])
             progress.update(bars[name], completed=reached)
 
-        return run_study(task, modes, options=options, parameters=parameters, on_progress=report, method=method)
+        return run_study(
+            task, modes, options=options, parameters=parameters, on_progress=report, method=method, error=error
+        )
 
 
 def _write(result: StudyResult, folder: Path, *, report: bool) -> None:

@@ -21,6 +21,7 @@ _GIVEN = {
     "step": "--step",
     "constraints": "--constraints",
     "segments": "--segments",
+    "after": "--after",
 }
 
 

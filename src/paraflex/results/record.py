@@ -31,6 +31,8 @@ FIGURES = (
     "event",
     "event_time",
 )
+# What brakes took, where there were any.
+BRAKE_ENERGY = "brake_energy"
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ def record(run: TrackingRun) -> Record:
         task=whole,
         method=run.method,
         mode=run.mode.name,
-        torque=run.torques.evaluate(task.motion.t) if run.holding is None else run.holding,
+        torque=run.applied,
         condition=run.condition,
         end_effector=point_motion(system, effector.point, q, v, a),
         angle=q[:, first],
@@ -130,7 +132,7 @@ def record(run: TrackingRun) -> Record:
         strain_energy=solution.strain_energy[:k],
         work=solution.work[:k],
         drawing=_drawing(task, parts, q),
-        figures={name: getattr(solution, name) for name in FIGURES},
+        figures={name: getattr(solution, name) for name in (*FIGURES, BRAKE_ENERGY)},
     )
 
 
