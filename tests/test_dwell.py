@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy
 
-from paraflex.dynamics import State, brake, build_system, joint_coordinate
+from paraflex.dynamics import State, brake, build_system, joint_coordinate, momentum
 from paraflex.dynamics.sparse import sparse_mass
 from paraflex.errors import InputError, IntegrationError
 from paraflex.fem import ReferenceCondition
@@ -82,7 +82,7 @@ def rate_of_largest(values, times):
 @pytest.mark.parametrize("reference", [ReferenceCondition.CANTILEVER, ReferenceCondition.PINNED])
 @pytest.mark.parametrize("geometry", list(Geometry))
 def test_a_held_arm_swings_as_a_clamped_beam(reference, geometry):
-    """(1.8751 / L)^2 sqrt(EI / m'): of the beam clamped at its root; let go it would be 3.9266^2, four times as fast."""
+    """(1.8751 / L)^2 sqrt(EI / m'), of the beam clamped at its root; a free one has 3.9266^2: four times as fast."""
     task, run = swinging(arm(reference, geometry), "hold")
     solution = run.solution
     after = solution.t > task.path.duration
@@ -93,44 +93,40 @@ def test_a_held_arm_swings_as_a_clamped_beam(reference, geometry):
     assert rate_of_largest(tip, solution.t[after]) == pytest.approx(omega, rel=3e-3)
 
 
-def test_the_brake_holds_with_the_moment_at_the_root():
-    """Of the beam, clamped: EI w'' there, and what turns it about the root, from the accelerations of its parts."""
+def test_the_brake_holds_with_the_rate_of_angular_momentum():
+    """About the root, which stands still: from coordinates, velocities and accelerations alone."""
     task, run = swinging(arm(), "hold", method="esdirk5")
-    solution, system = run.solution, task.system
-    body = system.body("link")
-    after = solution.t > task.path.duration
+    solution, h = run.solution, 1e-6
     assert run.applied.shape == (solution.t.size, 1)
-    # Angular momentum about the fixed root: its derivative is the torque.
-    from paraflex.dynamics import momentum
-
-    turning = [momentum(system, State(t, q, v))[1] for t, q, v in zip(solution.t, solution.q, solution.v, strict=True)]
-    rate = np.gradient(np.array(turning)[after], solution.t[after])[5:-5]
-    torque = run.applied[after, 0][5:-5]
-    assert np.abs(torque).max() > 0.05
-    # Differences over a third of a millisecond see the first modes: what they miss is small.
-    assert np.sqrt(np.mean((rate - torque) ** 2)) < 0.1 * np.sqrt(np.mean(torque**2))
-    assert body.nf > 0
+    after = np.nonzero(solution.t > task.path.duration)[0][::50]
+    for k in after:
+        q, v, a = solution.q[k], solution.v[k], solution.a[k]
+        turning = [momentum(task.system, State(0.0, q + x * v + 0.5 * x**2 * a, v + x * a))[1] for x in (-h, h)]
+        assert run.applied[k, 0] == pytest.approx((turning[1] - turning[0]) / (2.0 * h), abs=1e-3)
+    # Between steps accelerations and multipliers are interpolated, each by itself.
+    assert np.abs(run.applied[after]).max() > 0.5
 
 
-def test_an_engagement_takes_what_is_left_of_the_nearest_motion():
-    """By the null space of the constraints instead of multipliers; velocities that locked joints allow are kept."""
-    task = plan_tracking(PAPER, SIDE, duration=1.2 * SIDE.duration, samples=13)
+@pytest.mark.parametrize("mechanism", [PAPER, PAPER.rigid()], ids=["flexible", "rigid"])
+def test_an_engagement_takes_what_is_left_of_the_nearest_motion(mechanism):
+    """By the null space of the constraints instead of multipliers."""
+    task = plan_tracking(mechanism, SIDE, samples=11)
     run = task.simulate("++++", options=IntegrationOptions(tolerance=1e-5))
-    k = 6
-    state = State(run.solution.t[k], run.solution.q[k], run.solution.v[k])
-    joints = ["A1", "D2"] if "D2" in [joint.joint for joint in PAPER.motors] else [m.joint for m in PAPER.motors][:2]
+    state = State(run.solution.t[5], run.solution.q[5], run.solution.v[5])
+    joints = ["A1", "A2"]
     braked = brake(task.system, state, joints)
     M = sparse_mass(task.system, state.q).toarray()
-    rows = np.vstack([
-        task.system.jacobian(state.q), *(joint_coordinate(task.system, name, state.q[None]).rows for name in joints)
-    ])  # fmt: skip
-    Z = scipy.linalg.null_space(rows)
+    rows = [joint_coordinate(task.system, name, state.q[None]).rows for name in joints]
+    Z = scipy.linalg.null_space(np.vstack([task.system.jacobian(state.q), *rows]))
     expected = Z @ np.linalg.solve(Z.T @ M @ Z, Z.T @ M @ state.v)
-    np.testing.assert_allclose(braked.state.v, expected, atol=1e-9 * np.abs(state.v).max())
+    # Joints that Baumgarte leaves a little open in velocity are closed by the same blow.
+    np.testing.assert_allclose(braked.state.v, expected, atol=1e-8 * np.abs(state.v).max())
     before, left = 0.5 * state.v @ M @ state.v, 0.5 * expected @ M @ expected
     assert braked.energy == pytest.approx(before - left, rel=1e-6)
-    assert braked.energy > 0.1 * before
-    assert brake(task.system, braked.state, joints).energy < 1e-20 * before
+    # Rigid links stop; flexible ones are stopped at their roots alone and go on.
+    assert braked.energy == pytest.approx(before, rel=1e-9) if mechanism is not PAPER else braked.energy < 0.01 * before
+    assert braked.energy > 1e-6 * before
+    assert brake(task.system, braked.state, joints).energy < 1e-15 * before
     np.testing.assert_array_equal(braked.state.q, state.q)
 
 
@@ -146,7 +142,8 @@ def test_held_motors_stand_still_and_energy_is_accounted_for(geometry, mode):
     assert solution.q.shape == free.solution.q.shape
     assert solution.multipliers.shape == free.solution.multipliers.shape
     after = solution.t > task.path.duration
-    np.testing.assert_allclose(solution.q[~after], free.solution.q[~after], atol=1e-6)
+    along = [tracking_dataset([run])["end_effector"].values[0, ~after] for run in (free, held)]
+    assert np.abs(along[0] - along[1]).max() < 2e-5
     for k, motor in enumerate(task.mechanism.motors):
         angle = joint_coordinate(task.system, motor.joint, solution.q).value[after]
         if motor.name in held.mode.motors:
@@ -155,16 +152,19 @@ def test_held_motors_stand_still_and_energy_is_accounted_for(geometry, mode):
         else:
             assert np.ptp(angle) > 1e-6
             assert np.all(held.applied[:, k] == 0.0)
-    assert np.all(free.applied[after] == 0.0)
+    assert np.abs(free.applied[after]).max() < 1e-12
     balance = solution.kinetic_energy + solution.strain_energy - solution.work
     assert solution.brake_energy > 1e-5
     # Motors stand still and work no more; the brakes' share is in the work.
     assert np.ptp(solution.work[after]) < 1e-12
-    assert np.ptp(balance) < min(0.05 * solution.brake_energy, 1.0)
+    first = int(np.argmax(after))
+    assert abs(balance[first] - balance[first - 1]) < 0.1 * solution.brake_energy
+    # The method damps some of the fast vibration that the blow leaves.
+    assert np.ptp(balance) < 0.3 * solution.brake_energy
     assert np.ptp(balance) <= 2.0 * solution.energy_balance_max + 1e-12
 
 
-@pytest.mark.parametrize("method", ["tr-bdf2", "esdirk4", "hht", "newmark", "radau", "generalised-alpha"])
+@pytest.mark.parametrize("method", ["tr-bdf2", "esdirk4", "hht-alpha", "newmark", "radau", "generalised-alpha"])
 def test_every_method_holds(method):
     task = plan_tracking(PAPER, SIDE, duration=1.5 * SIDE.duration, samples=31, after=After.HOLD)
     reference = task.simulate("++++", options=IntegrationOptions(method="esdirk5", tolerance=1e-7))
@@ -187,17 +187,18 @@ def test_the_rigid_mechanism_stands_still_when_its_motors_are_held():
     assert float(data["tracking_rms_after"][0]) < 1e-5
 
 
-def test_finite_segments_hold_as_the_beams_they_were_cut_from():
-    task = plan_tracking(PAPER, SIDE, duration=1.5 * SIDE.duration, samples=61, after="hold")
-    assert task.in_segments(4).after is After.HOLD
-    data = tracking_dataset([task.in_segments(4).simulate("++++", options=IntegrationOptions(tolerance=1e-4))])
-    whole = tracking_dataset([task.simulate("++++", options=IntegrationOptions(tolerance=1e-5))])
-    after = data["time"].values > task.path.duration
-    assert data["torque"].dims == whole["torque"].dims
-    assert np.abs(data["torque"].values[0, after]).max() == pytest.approx(
-        np.abs(whole["torque"].values[0, after]).max(), rel=0.3
-    )
-    assert float(data["brake_energy"][0]) == pytest.approx(float(whole["brake_energy"][0]), rel=0.1)
+def test_finite_segments_are_held_too():
+    """By the joints of the first segments; told as links."""
+    task = plan_tracking(PAPER, SIDE, duration=1.5 * SIDE.duration, samples=61, after="hold").in_segments(4)
+    run = task.simulate("++++", options=IntegrationOptions(method="esdirk5", tolerance=1e-7))
+    data, solution = tracking_dataset([run]), run.solution
+    after = solution.t > SIDE.duration
+    for motor in task.mechanism.motors:
+        assert np.ptp(joint_coordinate(task.system, motor.joint, solution.q).value[after]) < 1e-10
+    np.testing.assert_array_equal(data["torque"].values[0], run.applied)
+    assert list(data["body"].values) == [body.name for body in PAPER.bodies]
+    balance = solution.kinetic_energy + solution.strain_energy - solution.work
+    assert np.ptp(balance) < 0.05 * solution.brake_energy
 
 
 def test_a_slider_is_held_where_it_is():
@@ -243,14 +244,14 @@ def test_runs_stop_and_fail_in_the_dwell_with_what_was_computed():
     task = plan_tracking(PAPER, SIDE, duration=2.0 * SIDE.duration, samples=101, after="hold")
     whole = task.simulate("+-++", options=IntegrationOptions(tolerance=1e-4))
     after = whole.solution.t > SIDE.duration
-    passive = next(motor.joint for motor in PAPER.motors if motor.name not in whole.mode.motors)
-    angle = joint_coordinate(task.system, passive, whole.solution.q).value
-    # Beyond all that the motion has, before the largest of the dwell.
-    top = angle[after].max()
-    if top > angle[~after].max() + 1e-6:
-        bound = JointLimit(passive, high=0.5 * (top + angle[~after].max()))
-    else:
-        bound = JointLimit(passive, low=0.5 * (angle[after].min() + angle[~after].min()))
+    # The joint that goes furthest beyond all that it does in the motion.
+    beyond = {}
+    for joint in PAPER.joints:
+        angle = joint_coordinate(task.system, joint.name, whole.solution.q).value
+        low, high = angle[~after].min(), angle[~after].max()
+        beyond[JointLimit(joint.name, high=0.5 * (high + angle[after].max()))] = angle[after].max() - high
+        beyond[JointLimit(joint.name, low=0.5 * (low + angle[after].min()))] = low - angle[after].min()
+    bound = max(beyond, key=beyond.__getitem__)
     run = task.simulate("+-++", options=IntegrationOptions(tolerance=1e-4, events=(bound,)))
     assert run.solution.status == "stopped"
     assert SIDE.duration < run.solution.event_time < 2.0 * SIDE.duration
