@@ -106,6 +106,16 @@ def test_the_error_of_the_motion_does_not_grow_with_the_duration(paper_run):
     assert float(longer["tracking_rms_motion"]) == pytest.approx(float(shorter["tracking_rms_motion"]), rel=0.01)
 
 
+def test_the_dwell_reverses_a_ranking():
+    """In second-order geometry -+-+ is behind +--+ in the motion and drifts less after it."""
+    task = plan_tracking(PAPER.with_geometry(Geometry.SECOND_ORDER), SQUARE, duration=0.7)
+    options = IntegrationOptions(method="esdirk5", tolerance=1e-4)
+    data = tracking_dataset([task.simulate(mode, options=options) for mode in ("-+-+", "+--+")])
+    assert data["tracking_rms_motion"][0] > 1.1 * data["tracking_rms_motion"][1]
+    assert data["tracking_rms"][0] < 0.9 * data["tracking_rms"][1]
+    assert data["drift_speed"][0] < 0.5 * data["drift_speed"][1]
+
+
 def test_the_model_file_says_which_error_ranks_modes(paper_run):
     assert load("raparm_i").study.error == load("raparm_ii").study.error == "whole"
     assert load("five_bar").study.error == "motion"
