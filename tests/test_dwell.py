@@ -309,6 +309,10 @@ def test_the_model_file_and_the_command_line_say_so(tmp_path):
     done = paraflex(*asked, "--after", "brake", cwd=tmp_path)
     assert done.returncode == 2
     assert "--after: unknown choice (got 'brake')" in done.stderr
+    done = paraflex("run", "-m", "raparm_i", "--ked", "--after", "hold", cwd=tmp_path)
+    assert "--after: means nothing with --ked" in done.stderr
+    done = paraflex("run", "-m", "pendulum", "--after", "hold", cwd=tmp_path)
+    assert "--after: the model has no path to be held after" in done.stderr
 
 
 def test_a_study_keeps_what_its_task_says():

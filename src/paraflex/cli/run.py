@@ -135,10 +135,14 @@ def _check_fidelity(request: RunRequest) -> None:
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
     given = request.integration.given() | ({"--balanced": True} if request.balanced else {})
+    given |= {} if request.after is None else {"--after": request.after}
     for flag, value in given.items():
         if request.ked:
             raise InputError(
-                "means nothing with --ked", field=flag, value=value, remedy="its steps are fixed, its start undeformed"
+                "means nothing with --ked",
+                field=flag,
+                value=value,
+                remedy="its steps are fixed, its start undeformed, its motors held",
             )
 
 

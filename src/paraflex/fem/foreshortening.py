@@ -125,8 +125,8 @@ def slope_square_integrals(
     # Within a piece of an element slopes are polynomials.
     knots = np.union1d(mesh.nodes, x)
     halves = 0.5 * np.diff(knots)
-    rows = np.array([mesh.shape_at(a + h * (p + 1.0))[1] for a, h in zip(knots, halves, strict=False) for p in z])
-    slopes, ends = rows @ basis, np.searchsorted(knots, x)
+    places = knots[:-1, None] + halves[:, None] * (z + 1.0)
+    slopes, ends = mesh.shapes_at(places.ravel())[1] @ basis, np.searchsorted(knots, x)
 
     def integrals(u: NDArray[np.float64]) -> NDArray[np.float64]:
         squares = (u @ slopes.T) ** 2

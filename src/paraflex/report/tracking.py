@@ -115,6 +115,8 @@ def _after(data: xr.Dataset) -> list[tuple[str, str]]:
     """What the motors did after the motion, where runs went on after it."""
     if data["time"].values[-1] <= data.attrs.get("motion_end", np.inf) or "after" not in data.attrs:
         return []
+    if asked(data).get("ked"):
+        return [("after the motion", "motors held, as all the time")]
     return [("after the motion", "motors held by brakes" if data.attrs["after"] == "hold" else "motors free")]
 
 

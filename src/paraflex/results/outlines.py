@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -248,13 +248,10 @@ def _turned(position: Array, angle: Array, local: Array) -> Array:
 def _rows(system: System, body: BodyCoordinates, drawn: Outline) -> Array:
     """Displacements of the stations per modal coordinate (s, 2, nf)."""
     described = system.mechanism.body(drawn.body)
-    at: Callable[[float], tuple[Array, Array]] | None = None
     if isinstance(described, FlexibleBeam) and body.mesh is not None:
-        at = body.mesh.shape_at
-    elif isinstance(described, AssumedModesBeam):
-        at = described.shapes.shape_at
-    if at is not None:
-        return np.stack([at(x)[0] for x in drawn.places[:, 0]]) @ body.integrals.D
+        return body.mesh.shapes_at(drawn.places[:, 0])[0] @ body.integrals.D
+    if isinstance(described, AssumedModesBeam):
+        return np.stack([described.shapes.shape_at(x)[0] for x in drawn.places[:, 0]]) @ body.integrals.D
     if isinstance(described, RigidBody) or not body.shape.points:
         return np.zeros((len(drawn.places), 2, body.nf))
     return np.stack([point.N for point in body.shape.points.values()]) @ body.integrals.D
