@@ -298,7 +298,7 @@ def short(raparm, square):
 def test_a_dataset_tells_shapes_of_links_whatever_they_were_cut_into(short):
     run, segments = short
     data, other = pf.tracking_dataset([run]), pf.tracking_dataset([segments])
-    assert data.attrs["schema"] == 2
+    assert data.attrs["schema"] == 3
     assert data["shape"].dims == data["shape_base"].dims == ("mode", "time", "station", "axis")
     assert data["shape"].dtype == np.float32
     assert list(dict.fromkeys(data["station_body"].values)) == list(data["body"].values)
@@ -379,9 +379,9 @@ def test_what_is_no_result_is_named_for_what_it_is(tmp_path):
     refused(tmp_path / "weather.nc", "not of paraflex")
     shutil.copy(DATA / "schema1.nc", tmp_path / "later.nc")
     with netCDF4.Dataset(tmp_path / "later.nc", "a") as later:
-        later.schema = 3
+        later.schema = 4
         later.paraflex_version = "9.1.0"
-    refused(tmp_path / "later.nc", r"later version, paraflex 9\.1\.0 \(schema 3.*update paraflex")
+    refused(tmp_path / "later.nc", r"later version, paraflex 9\.1\.0 \(schema 4.*update paraflex")
 
 
 def test_the_folder_of_a_sweep_leads_to_its_runs(tmp_path):
