@@ -12,11 +12,11 @@ def main() -> dict[str, float]:
     options = pf.IntegrationOptions(method="esdirk5", tolerance=1e-5)
     data = pf.tracking_dataset([task.simulate(mode.name, options=options) for mode in robot.mechanism.modes])
     print(" mode   error   peak torque   worst condition")
-    for mode in data["tracking_rms"].sortby(data["tracking_rms"])["mode"].values:
+    for mode in data["tracking_rms_motion"].sortby(data["tracking_rms_motion"])["mode"].values:
         one = data.sel(mode=mode)
-        error, torque = 1e6 * float(one["tracking_rms"]), float(one["peak_torque"].max())
+        error, torque = 1e6 * float(one["tracking_rms_motion"]), float(one["peak_torque"].max())
         print(f" {mode}  {error:5.1f} um  {torque:6.2f} N m  {float(one['actuation_condition'].max()):8.1f}")
-    return {str(mode): float(data["tracking_rms"].sel(mode=mode)) for mode in data["mode"].values}
+    return {str(mode): float(data["tracking_rms_motion"].sel(mode=mode)) for mode in data["mode"].values}
 
 
 if __name__ == "__main__":

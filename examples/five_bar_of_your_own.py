@@ -61,7 +61,7 @@ def main() -> dict[str, float]:
     task = pf.plan_tracking(mechanism, circle, duration=0.5)
     run = task.simulate("++", options=pf.IntegrationOptions(tolerance=1e-5))
     data = pf.tracking_dataset([run])
-    error, torque = float(data["tracking_rms"][0]), float(data["peak_torque"].max())
+    error, torque = float(data["tracking_rms_motion"][0]), float(data["peak_torque"].max())
     print(f"circle of 30 mm: error {1e3 * error:.3f} mm, torque up to {torque:.2f} N m")
     return {"frequency": float(lowest / (2 * pi)), "error": error, "torque": torque}
 

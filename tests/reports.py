@@ -45,7 +45,7 @@ def tracked() -> xr.Dataset:
             and name not in ("torque", "actuation_condition")
         ):
             data[name][stopped] = np.nan
-    data["tracking_rms"][2] = np.nan
+    data["tracking_rms"][2] = data["tracking_rms_motion"][2] = np.nan
     data["status"] = data["status"].astype(object)
     data["message"] = data["message"].astype(object)
     data["status"][2], data["message"][2] = "failed", "no end after 20 steps at t = 0.05 s"

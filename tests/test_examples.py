@@ -61,7 +61,7 @@ def test_five_bar_of_your_own(run):
     converged = pf.tracking_dataset(
         [task.simulate("++", method="esdirk5", options=pf.IntegrationOptions(tolerance=1e-6))]
     )
-    assert found["error"] == pytest.approx(float(converged["tracking_rms"][0]), rel=0.02)
+    assert found["error"] == pytest.approx(float(converged["tracking_rms_motion"][0]), rel=0.02)
     assert found["torque"] == pytest.approx(float(converged["peak_torque"].max()), rel=1e-3)
     assert f"{found['frequency']:.1f} Hz" in printed
     assert f"error {1e3 * found['error']:.3f} mm, torque up to {found['torque']:.2f} N m" in printed
@@ -76,7 +76,7 @@ def test_choosing_modes(run):
     task = pf.plan_tracking(robot.mechanism.with_geometry("second-order"), robot.paths["circle"], samples=301)
     options = pf.IntegrationOptions(method="esdirk4", tolerance=1e-6)
     converged = pf.tracking_dataset([task.simulate("+++-", options=options)])
-    assert errors["+++-"] == pytest.approx(float(converged["tracking_rms"][0]), rel=0.01)
+    assert errors["+++-"] == pytest.approx(float(converged["tracking_rms_motion"][0]), rel=0.01)
     assert f"{1e6 * errors['+++-']:.1f} um" in printed
 
 

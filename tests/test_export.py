@@ -19,6 +19,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset
 from paraflex.results.export import export_results, matlab_name, matlab_struct, result_tables
+from paraflex.results.storage import SCHEMA
 
 OLD = Path(__file__).parent / "data" / "schema1.nc"
 
@@ -105,7 +106,7 @@ def test_matlab_finds_time_first_and_names_that_it_allows(data, tmp_path):
     assert results["units"]["torque"] == "N m"
     assert results["meaning"]["work"].startswith("work of motors")
     assert results["attributes"]["mechanism"] == "RAParM-I"
-    assert results["attributes"]["schema"] == 3
+    assert results["attributes"]["schema"] == SCHEMA
     assert np.isnan(results["end_effector"][-1, :, 1]).all()
     # As MATLAB sees it: a column of time, a column of cells, text.
     raw = loadmat(file)["results"][0, 0]

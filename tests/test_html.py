@@ -169,9 +169,9 @@ def test_a_tracking_run_tells_what_its_dataset_does(run) -> None:
     shown = read(run)
     data = tracking_dataset([run]).isel(mode=0)
     assert "complete" in shown.text
-    assert row(shown, "tracking error, RMS")[1] == f"{1e3 * float(data['tracking_rms']):.4g} mm"
-    bent = np.hypot(data["tip_axial"], data["tip_transverse"]).max()
-    assert row(shown, "largest deflection")[1] == f"{1e3 * float(bent):.4g} mm"
+    error = float(data["tracking_rms_motion"])
+    assert row(shown, "tracking error during the motion, RMS")[1] == f"{1e3 * error:.4g} mm"
+    assert row(shown, "largest deflection")[1] == f"{1e3 * float(data['deflection'].max()):.4g} mm"
     for motor in data["motor"].values:
         peak, rms = (float(data[key].sel(motor=motor)) for key in ("peak_torque", "rms_torque"))
         assert row(shown, str(motor)) == [str(motor), "active", f"{peak:.4g}", f"{rms:.4g}", "N m"]

@@ -316,7 +316,9 @@ def test_tracking_errors_and_their_titles(data: xr.Dataset) -> None:
     for axes, mode in ((full, FULL), (part, PARTIAL)):
         for axis in "xy":
             same(curve(axes, f"error in ${axis}$")[:, 1], errors.sel(mode=mode, axis=axis))
-    assert full.get_title() == "⊕⊕: RMS 0.325 mm"
+    assert full.get_title() == "⊕⊕: RMS 0.325 mm over all"
+    of_motion = data.assign(tracking_rms_motion=0.5 * data["tracking_rms"]).assign_attrs(error="motion")
+    assert plots.tracking_errors(of_motion).axes[0].get_title() == "⊕⊕: RMS 0.163 mm in the motion"
     assert part.get_title() == "⊕⊖: stopped at 0.24 s"
 
 

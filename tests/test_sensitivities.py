@@ -60,6 +60,7 @@ fields = ["integration.alpha"]
 fields = ["path.line.max_acceleration"]
 """
 PARAMETERS = ("arm", "thickness", "lump", "modulus", "alpha", "acceleration")
+AFTER = {"tracking_rms_after", "tracking_max_after", "residual_vibration", "drift_speed"}
 # Central differences of fourth order, for a step of one.
 PLACES = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 
@@ -137,7 +138,10 @@ def test_metrics_against_differences_of_sweep_runs(tmp_path):
     design = Design(load_sensitivities(write(tmp_path, STUDY.replace("tolerance = 1e-7", "tolerance = 1e-9"))))
     ((mode, values, gradients),) = metric_gradients(design.setting, design.task)
     assert mode == "++++"
-    names = [name for name in gradients if name != "residual_vibration"]
+    # No sample is after the motion: no number and no derivative.
+    names = [name for name in gradients if np.isfinite(values[name])]
+    assert set(gradients) - set(names) == AFTER
+    assert all(np.isnan(gradients[name]).all() for name in AFTER)
     steps = dict.fromkeys(PARAMETERS, 3e-4)
     for k, name in enumerate(PARAMETERS):
         rows = []
@@ -149,6 +153,38 @@ def test_metrics_against_differences_of_sweep_runs(tmp_path):
             expected = sum(weight * row[metric] for (_, weight), row in zip(PLACES, rows, strict=True)) / steps[name]
             exact = gradients[metric][k] * design.task.values[k]
             assert exact == pytest.approx(expected, rel=1e-3, abs=1e-5 * abs(values[metric])), (name, metric)
+
+
+@pytest.mark.parametrize("geometry", ["linear", "second-order"])
+def test_metrics_of_the_time_after_the_motion_against_differences(tmp_path, geometry):
+    """Derivatives of the error after the motion, drift and vibration about it, and deflection from the chord."""
+    asked = ["tracking_rms_motion", "tracking_max_motion", *sorted(AFTER), "deflection_max"]
+    text = only("thickness", "arm").replace("samples = 13", f"samples = 46\nmetrics = {json.dumps(asked)}")
+    text = text.replace("duration = 0.06", "duration = 0.18").replace("tolerance = 1e-7", "tolerance = 1e-9")
+    study = load_sensitivities(write(tmp_path, text))
+    setting = replace(study.setting, data=dict(study.setting.data) | {"geometry": geometry})
+    task = Task(0, 0, nominal_values(setting), "line")
+    ((_, values, gradients),) = metric_gradients(setting, task)
+    assert list(gradients) == list(values) == asked
+    for k, value in enumerate(task.values):
+        rows = []
+        for place, _ in PLACES:
+            moved = list(task.values)
+            moved[k] = value * (1.0 + 3e-4 * place)
+            rows.append(run_task(setting, task._replace(values=tuple(moved))).rows[0])
+        for metric in asked:
+            expected = sum(weight * row[metric] for (_, weight), row in zip(PLACES, rows, strict=True)) / 3e-4
+            assert gradients[metric][k] * value == pytest.approx(expected, rel=1e-3, abs=1e-5 * abs(values[metric])), (
+                metric
+            )
+
+
+def test_brakes_have_no_derivatives(tmp_path):
+    study = load_sensitivities(write(tmp_path, only("thickness").replace("duration = 0.06", "duration = 0.14")))
+    data = dict(study.setting.data)
+    setting = replace(study.setting, data=data | {"study": dict(data["study"]) | {"after": "hold"}})
+    with pytest.raises(InputError, match=r"study.after: derivatives do not go through the engagement of brakes"):
+        metric_gradients(setting, Task(0, 0, nominal_values(setting), "line"))
 
 
 def test_second_order_geometry(tmp_path):
@@ -244,8 +280,8 @@ def test_another_nominal_point(tmp_path):
     text = only("thickness").replace("duration = 0.06", 'duration = 0.01\nmetrics = ["total_mass", "rms_torque"]')
     at = sensitivities(write(tmp_path, text), at={"thickness": 0.006})
     assert at.nominal == pytest.approx([0.006])
-    assert at.metrics == (*(f"rms_torque.{motor}" for motor in ("tau1", "tau2", "tau5", "tau6")), "total_mass")
-    assert at.relative[0, 4, 0] == pytest.approx(2700.0 * 0.03 * 1.7 * 0.006 / at.values[0, 4], rel=1e-9)
+    assert at.metrics == ("total_mass", *(f"rms_torque.{motor}" for motor in ("tau1", "tau2", "tau5", "tau6")))
+    assert at.relative[0, 0, 0] == pytest.approx(2700.0 * 0.03 * 1.7 * 0.006 / at.values[0, 0], rel=1e-9)
 
 
 def test_smooth_metrics_are_the_metrics(design):

@@ -4,20 +4,58 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
 from paraflex.display import shown
-from paraflex.dynamics import State, System, build_system, pack_signals, static_equilibrium
-from paraflex.errors import InputError, IntegrationError
+from paraflex.dynamics import (
+    State,
+    System,
+    brake,
+    build_system,
+    constant_signals,
+    pack_signals,
+    static_equilibrium,
+)
+from paraflex.errors import InputError, IntegrationError, suggestion
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.kinematics import Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 
 # Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
 _SAME_TIME = 1e-9
+
+
+class After(Enum):
+    """What the active motors do after the path.
+
+    FREE
+        Their feed-forward goes on: no torque where nothing pulls at the mechanism at rest, and what then is left of
+        vibration and error moves it on.
+    HOLD
+        Brakes hold them at the angles, or travels, they have when the path ends.
+    """
+
+    FREE = "free"
+    HOLD = "hold"
+
+
+def parse_after(after: After | str) -> After:
+    """What the motors do after the path by its name, "free" or "hold".
+
+    Raises
+    ------
+    InputError
+        Neither of the two.
+    """
+    try:
+        return After(after)
+    except ValueError:
+        names = [known.value for known in After]
+        raise InputError("unknown choice", field="after", value=after, remedy=suggestion(str(after), names)) from None
 
 
 @dataclass(frozen=True)
@@ -42,6 +80,8 @@ class TrackingTask:
     carriers : mapping
         For each finite segment the beam it was cut from, and how far along that it starts [m]; empty where nothing
         was cut.
+    after : After
+        What the active motors do after the path; a name is taken for it.
     """
 
     mechanism: Mechanism
@@ -53,6 +93,15 @@ class TrackingTask:
     start: State
     whole: TrackingTask | None = None
     carriers: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    after: After = After.FREE
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "after", parse_after(self.after))
+
+    @property
+    def holds(self) -> bool:
+        """Whether brakes engage in its runs: they are asked for, and the runs go on after the path."""
+        return self.after is After.HOLD and self.motion.t[-1] > self.path.duration * (1.0 + _SAME_TIME)
 
     def mode(self, mode: str | ActuationMode) -> ActuationMode:
         """An actuation mode by name, signs or motor names."""
@@ -122,10 +171,15 @@ class TrackingTask:
         return replace(self, start=static_equilibrium(self.system, self.start, joints))
 
     def simulate(
-        self, mode: str | ActuationMode, *, method: str | None = None, options: IntegrationOptions | None = None
+        self,
+        mode: str | ActuationMode,
+        *,
+        method: str | None = None,
+        options: IntegrationOptions | None = None,
+        after: After | str | None = None,
     ) -> TrackingRun:
         """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""
-        return simulate(self, mode, method=method, options=options)
+        return simulate(self, mode, method=method, options=options, after=after)
 
 
 @dataclass(frozen=True)
@@ -142,7 +196,7 @@ class TrackingRun:
     method : str
         How it was integrated.
     holding : (k, motors) array, optional
-        Torques at the samples where motors were held on a motion instead of driven by `torques` [N m].
+        Torques at the samples of a run in which motors were held, on a motion or by brakes, at all of them [N m].
     """
 
     task: TrackingTask
@@ -157,6 +211,11 @@ class TrackingRun:
         """The actuation mode."""
         return self.torques.mode
 
+    @property
+    def applied(self) -> NDArray[np.float64]:
+        """Torques of all motors, at every sample time of the task, or at the k reached where they were held [N m]."""
+        return self.torques.evaluate(self.task.motion.t) if self.holding is None else self.holding
+
     def _repr_html_(self) -> str:
         """In notebooks."""
         return shown(self)
@@ -170,6 +229,7 @@ def plan_tracking(
     samples: int = 701,
     assembly: str | None = None,
     orientation: float = 0.0,
+    after: After | str = After.FREE,
 ) -> TrackingTask:
     """Plan a motion of the end-effector: joint motion of the rigid mechanism and what it asks of the motors.
 
@@ -185,6 +245,8 @@ def plan_tracking(
         Which way the mechanism is put together; the first by default.
     orientation : float
         Angle of the end-effector where it is a task coordinate and the path does not say it [rad].
+    after : After or str
+        What the active motors do after the path: "free" or "hold".
 
     Raises
     ------
@@ -209,6 +271,7 @@ def plan_tracking(
         effort=required_effort(motion),
         plan=plan_torques(follow, path_knots(path, end)),
         start=_start(system, motion, _in_place(system)),
+        after=parse_after(after),
     )
 
 
@@ -218,6 +281,7 @@ def simulate(
     *,
     method: str | None = None,
     options: IntegrationOptions | None = None,
+    after: After | str | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> TrackingRun:
     """Drive the flexible mechanism with the torques of a mode.
@@ -230,6 +294,9 @@ def simulate(
     method : str, optional
         Of integration: that of the options by default; see `paraflex.METHODS`.
     options : IntegrationOptions, optional
+    after : After or str, optional
+        What the active motors do after the path, "free" or "hold": as the task says by default. Held, the joints of the
+        active motors are locked where they are when the path ends: see `dynamics.brake`.
     on_progress : callable, optional
         Told the time reached [s].
 
@@ -244,21 +311,77 @@ def simulate(
     IntegrationError
         The run could not be finished; it carries a TrackingRun with what was computed.
     """
+    if after is not None:
+        task = replace(task, after=parse_after(after))
     options = choose(method, options)
     title = options.description.title
     torques = task.torques(mode)
     condition = actuation_condition(task.effort, torques.mode)
-    times = task.motion.t
-    signals, knots = pack_signals(task.mechanism, torques.signals, float(times[-1]))
-    stops = np.sort(np.concatenate([torques.knots, knots]))
     try:
-        solution = integrate(
-            task.system, signals, task.start, times, knots=stops, options=options, on_progress=on_progress
-        )
+        if task.holds:
+            return _drive_and_hold(task, torques, condition, options, on_progress)
+        solution = _drive(task, torques, task.motion.t, options, on_progress)
     except IntegrationError as error:
-        error.partial = TrackingRun(task, torques, condition, error.partial, title)
+        if not isinstance(error.partial, TrackingRun):
+            error.partial = TrackingRun(task, torques, condition, error.partial, title)
         raise
     return TrackingRun(task, torques, condition, solution, title)
+
+
+def _drive(
+    task: TrackingTask,
+    torques: FeedForward,
+    times: NDArray[np.float64],
+    options: IntegrationOptions,
+    on_progress: Callable[[float], None] | None,
+) -> Solution:
+    signals, knots = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))
+    stops = np.sort(np.concatenate([torques.knots, knots]))
+    return integrate(task.system, signals, task.start, times, knots=stops, options=options, on_progress=on_progress)
+
+
+def _drive_and_hold(
+    task: TrackingTask,
+    torques: FeedForward,
+    condition: NDArray[np.float64],
+    options: IntegrationOptions,
+    on_progress: Callable[[float], None] | None,
+) -> TrackingRun:
+    """Along the path as ever, then with the joints of the active motors locked."""
+    times, end = task.motion.t, task.path.duration
+    count = int(np.searchsorted(times, end * (1.0 + _SAME_TIME), side="right"))
+    until = times[:count]
+    if count == 0 or until[-1] < end * (1.0 - _SAME_TIME):
+        until = np.append(until, end)
+    driven = _drive(task, torques, until, options, on_progress)
+    title = options.description.title
+    if driven.status != "complete":
+        return TrackingRun(task, torques, condition, driven, title)
+    motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]
+    braked = brake(task.system, State(float(until[-1]), driven.q[-1], driven.v[-1]), [motor.joint for motor in motors])
+    none = constant_signals([0.0] * len(task.mechanism.motors), float(times[-1]))
+    signals, knots = pack_signals(braked.system.mechanism, none, float(times[-1]))
+    own = [braked.system.rows.index(row) for row in task.system.rows]
+    columns = [task.mechanism.motors.index(motor) for motor in motors]
+
+    def whole(held: Solution) -> TrackingRun:
+        solution = driven.followed_by(held, count, held.multipliers[:, own], braked.energy)
+        efforts = np.zeros((held.t.size, len(task.mechanism.motors)))
+        efforts[:, columns] = braked.efforts(held.multipliers)
+        # The state at an event is a sample more than the task's times.
+        efforts = np.concatenate([torques.evaluate(driven.t[:count]), efforts[: held.t.size - bool(held.event)]])
+        return TrackingRun(task, torques, condition, solution, title, holding=efforts)
+
+    left = replace(options, max_steps=max(1, options.max_steps - driven.steps - driven.rejected))
+    try:
+        held = integrate(
+            braked.system, signals, braked.state, times[count:], knots=np.array(knots), options=left,
+            on_progress=on_progress,
+        )  # fmt: skip
+    except IntegrationError as error:
+        error.partial = whole(error.partial)
+        raise
+    return whole(held)
 
 
 def _in_place(system: System) -> dict[str, tuple[str, float]]:

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from paraflex.cli.tables import number
+from paraflex.results.metrics import SPAN_WORDS, ErrorSpan
 
 # Names that fit above a column.
 _SHORT = {
@@ -43,7 +44,10 @@ def print_agreement(console: Console, figures: dict[str, Any], mode: str) -> Non
         console.print(table)
 
     where = f"{figures['mechanism']}, mode {mode}"
-    show(f"{where}: tracking error, and distance from the path of {_SHORT[reference]}", _errors(models, reference))
+    span = SPAN_WORDS[ErrorSpan(figures["error"])]
+    show(
+        f"{where}: tracking error {span}, and distance from the path of {_SHORT[reference]}", _errors(models, reference)
+    )
     show("Largest distance between the paths of two models [m]", _distances(told, distances))
     show("Change of the path with a finer step and mesh, imbalance of energy, constraint violation", _soundness(told))
     for key, what in _LINKS.items() if compared else ():

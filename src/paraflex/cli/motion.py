@@ -56,6 +56,10 @@ def run_motion(
             "the model has no path, torques are constant", field="--mode", value=request.modes[0],
             remedy="add a [path.NAME] table, or give torques in [study]",
         )  # fmt: skip
+    if request.after is not None:
+        raise InputError(
+            "the model has no path to be held after", field="--after", value=request.after, remedy="leave it out"
+        )
     samples = model.study.samples if request.samples is None else request.samples
     folder = results_folder(request.out)
     compile_kernels_for(mechanism, console.print)

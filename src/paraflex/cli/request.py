@@ -29,6 +29,7 @@ class StudyRequest:
     out: str
     json: bool
     balanced: bool = field(default=False, kw_only=True)
+    after: str | None = field(default=None, kw_only=True)
     report: bool = field(default=True, kw_only=True)
 
 
@@ -84,6 +85,7 @@ def plan_study(
             samples=model.study.samples if samples is None else samples,
             assembly=request.assembly or model.study.assembly,
             orientation=model.study.orientation,
+            after=model.study.after if request.after is None else request.after,
         )
     except AssemblyError as error:
         raise InputError(
@@ -96,7 +98,13 @@ def plan_study(
 
 def at_fault(error: InputError, model: Model) -> InputError:
     """The same error, naming the option it came from or else the model's file."""
-    flags = {"duration": "--duration", "samples": "--samples", "assembly": "--assembly", "events": "--stop-at"}
+    flags = {
+        "duration": "--duration",
+        "samples": "--samples",
+        "assembly": "--assembly",
+        "after": "--after",
+        "events": "--stop-at",
+    }
     if error.field in flags:
         return InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy)
     return error.in_file(model.source)

@@ -26,7 +26,7 @@ from paraflex.cli.request import (
     with_frames,
     write_json,
 )
-from paraflex.cli.tables import events, failures, plain_console, study_table
+from paraflex.cli.tables import failures, plain_console, print_study
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -78,7 +78,7 @@ def run_command(request: RunRequest) -> int:
         check_stops(task.mechanism, options, request.integration)
     parameters = _parameters(model, path_name, modes, task, how, request)
     try:
-        result = _simulate(console, task, modes, options, parameters, _method(request, options))
+        result = _simulate(console, task, modes, options, parameters, _method(request, options), model.study.error)
     except InputError as error:
         raise at_fault(error, model) from None
     if result.data is None:
@@ -89,8 +89,7 @@ def run_command(request: RunRequest) -> int:
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
-        plain_console().print(study_table(figures, task, _model_name(request, mechanism)))
-        events(plain_console(), figures)
+        print_study(plain_console(), figures, task, _model_name(request, mechanism))
         console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
     failures(console, result)
     if result.interrupted:
@@ -142,10 +141,14 @@ def _check_fidelity(request: RunRequest) -> None:
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
     given = request.integration.given() | ({"--balanced": True} if request.balanced else {})
+    given |= {} if request.after is None else {"--after": request.after}
     for flag, value in given.items():
         if request.ked:
             raise InputError(
-                "means nothing with --ked", field=flag, value=value, remedy="its steps are fixed, its start undeformed"
+                "means nothing with --ked",
+                field=flag,
+                value=value,
+                remedy="its steps are fixed, its start undeformed, its motors held",
             )
 
 
@@ -189,6 +192,8 @@ def _parameters(
             "segments": request.segments,
             "ked": request.ked,
             "balanced": request.balanced,
+            "after": task.after.value,
+            "error": model.study.error,
             "geometry": task.mechanism.geometry.value,
             "reference": request.reference,
             "curvature": request.curvature,
@@ -204,6 +209,7 @@ def _simulate(
     options: IntegrationOptions,
     parameters: dict,
     method: Simulator | None,
+    error: str,
 ) -> StudyResult:
     end = float(task.motion.t[-1])
     columns = (
@@ -218,7 +224,9 @@ def _simulate(
             progress.start_task(bars[name])
             progress.update(bars[name], completed=reached)
 
-        return run_study(task, modes, options=options, parameters=parameters, on_progress=report, method=method)
+        return run_study(
+            task, modes, options=options, parameters=parameters, on_progress=report, method=method, error=error
+        )
 
 
 def _write(result: StudyResult, folder: Path, *, report: bool) -> None:

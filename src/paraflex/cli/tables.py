@@ -22,41 +22,66 @@ def plain_console(*, stderr: bool = False) -> Console:
     return Console(highlight=False, markup=False, stderr=stderr)
 
 
-def study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Table:
-    """Tracking error and peak torques of every mode in a model, and what the solver did."""
+def print_study(console: Console, figures: dict[str, Any], task: TrackingTask, model: str) -> None:
+    """What every mode came to in a model: tables, and a line for each mode that an event stopped."""
+    if figures["part"] is not None:
+        console.print(f"warning: {figures['part']['message']}", soft_wrap=True)
+    console.print(_study_table(figures, task, model))
+    if any(mode.get("tracking_rms_after") is not None for mode in figures["modes"].values()):
+        console.print(_after_table(figures, task))
+    for name, mode in figures["modes"].items():
+        if mode["status"] == "stopped":
+            console.print(f'mode "{name}": {mode["message"]}', soft_wrap=True)
+
+
+def _study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Table:
+    """Tracking error and peak torques of every mode, and what the solver did."""
+    from paraflex.results.metrics import HEADLINE, SPAN_WORDS, ErrorSpan
+
+    span = ErrorSpan(figures["error"])
     motors = [motor.name for motor in task.mechanism.motors]
     heads = [f"{name}\n[{unit}]" for name, unit in zip(motors, task.mechanism.motor_units(), strict=True)]
     efforts = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
-    table = Table(
-        title=f"{figures['mechanism']}, {model}: tracking error and peak {efforts}",
-        title_justify="left",
-        box=box.SIMPLE,
-        collapse_padding=True,
-        pad_edge=False,
-    )
-    table.add_column("mode", no_wrap=True)
-    for heading in ("error\n[m]", *heads, "vibration\n[m]", "steps\n", "wall\n[s]"):
+    table = _table(f"{figures['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {efforts}")
+    for heading in ("error\n[m]", *heads, "steps\n", "wall\n[s]"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name, mode in figures["modes"].items():
         if "steps" not in mode:
-            table.add_row(name, "failed", *["" for _ in motors], "", "", "")
+            table.add_row(name, "failed", *["" for _ in motors], "", "")
             continue
         table.add_row(
             name,
-            number(mode["tracking_rms"], ".4e") if mode["status"] == "complete" else mode["status"],
+            number(mode[HEADLINE[span]], ".4e") if mode["status"] == "complete" else mode["status"],
             *(number(mode["peak_torque"][motor], ".2f") for motor in motors),
-            number(mode["residual_vibration"], ".2e"),
             str(mode["steps"]),
             number(mode["wall_time"], ".2f"),
         )
     return table
 
 
-def events(console: Console, figures: dict[str, Any]) -> None:
-    """One line for each mode that an event stopped."""
+def _after_table(figures: dict[str, Any], task: TrackingTask) -> Table:
+    """Errors during the motion and after it, what goes on then, and what brakes took."""
+    held = task.holds
+    motors = "held by brakes" if held else "free"
+    if figures["parameters"]["run"].get("ked"):
+        motors = "held all the time"
+    table = _table(f"Tracking error during the motion and after it, the motors {motors}")
+    heads = ("motion\n[m]", "after\n[m]", "drift\n[m/s]", "vibration\n[m]", *(["brakes\n[J]"] if held else []))
+    for heading in heads:
+        table.add_column(heading, justify="right", no_wrap=True)
+    keys = ("tracking_rms_motion", "tracking_rms_after", "drift_speed", "residual_vibration")
     for name, mode in figures["modes"].items():
-        if mode["status"] == "stopped":
-            console.print(f'mode "{name}": {mode["message"]}', soft_wrap=True)
+        if "steps" in mode:
+            brakes = [number(mode["brake_energy"], ".2e")] if held else []
+            table.add_row(name, *(number(mode[key], ".2e") for key in keys), *brakes)
+    return table
+
+
+def _table(title: str) -> Table:
+    """An empty table with a column for modes."""
+    table = Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
+    table.add_column("mode", no_wrap=True)
+    return table
 
 
 def failures(console: Console, result: StudyResult) -> None:

@@ -74,7 +74,7 @@ def verify_command(request: VerifyRequest) -> int:
         | {"reference": request.reference, "curvature": request.curvature}
         | asdict(options),
     }
-    figures = agreement(verification) | {"parameters": parameters}
+    figures = agreement(verification, model.study.error) | {"parameters": parameters}
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
         _write(verification, figures, parameters, folder, report=request.report)
     if request.json:
@@ -136,7 +136,7 @@ def _write(verification: Verification, figures: dict, parameters: dict, folder: 
 
     folder.mkdir(parents=True, exist_ok=True)
     write_json(figures, folder / "verify.json")
-    data = verification.dataset(parameters=parameters)
+    data = verification.dataset(parameters=parameters, error=figures["error"])
     save_results(data, folder / "verify.nc")
     save_agreement_figures(data, folder / "figures")
     if report:

@@ -1,5 +1,7 @@
 """From a mechanism to a system of equations: constant arrays, energies, consistent states."""
 
+from paraflex.dynamics.brake import Braked, brake
+from paraflex.dynamics.chord import across_chord
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, end_markers, node_marker
 from paraflex.dynamics.drive import Reach, reach
 from paraflex.dynamics.equilibrium import static_equilibrium
@@ -25,6 +27,7 @@ from paraflex.dynamics.system import System, build_system
 
 __all__ = [
     "BodyCoordinates",
+    "Braked",
     "Closure",
     "Dependence",
     "InputSignals",
@@ -38,8 +41,10 @@ __all__ = [
     "State",
     "System",
     "Vibration",
+    "across_chord",
     "axis_angle",
     "blocks_of",
+    "brake",
     "build_system",
     "closure_of",
     "consistent_state",

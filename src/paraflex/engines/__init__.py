@@ -1,5 +1,5 @@
 """Other people's engines on the same mechanism, torques and start: adapters for comparison."""
 
-from paraflex.engines.common import ENGINES, check_engine
+from paraflex.engines.common import ENGINES, check_dwell, check_engine
 
-__all__ = ["ENGINES", "check_engine"]
+__all__ = ["ENGINES", "check_dwell", "check_engine"]

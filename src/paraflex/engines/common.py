@@ -11,10 +11,23 @@ from numpy.typing import NDArray
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError
 from paraflex.mechanism import FlexibleBeam, Mechanism, RevoluteJoint, given_shapes
+from paraflex.simulate import TrackingTask
 
 # Names of the engines as users and Python's packages know them, and in print.
 _PRINTED = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}
 ENGINES = tuple(_PRINTED)
+
+
+def check_dwell(name: str, task: TrackingTask) -> None:
+    """Nothing, if motors are free after the path: engines have no brakes here.
+
+    Raises
+    ------
+    InputError
+        They are to be held.
+    """
+    if task.holds:
+        refuse(_PRINTED[name], 'brakes after the path (after = "hold")', "study.after")
 
 
 def check_engine(name: str, mechanism: Mechanism) -> None:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.dynamics import System
 from paraflex.engines.cables import Array, Cable, Columns, Ground, History, Link, Linkage, Pose, RigidLink
-from paraflex.engines.common import check_engine, import_engine, steps_between
+from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
 from paraflex.results.drawing import Drawing, drawing
@@ -104,6 +104,7 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     options = options or ExudynOptions()
     task = task.whole or task
     check_engine("exudyn", task.mechanism)
+    check_dwell("exudyn", task)
     torques = task.torques(mode)
     substeps = steps_between(task.motion.t, options.step)
     begin = time.perf_counter()

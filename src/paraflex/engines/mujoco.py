@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.dynamics import System, constant_signals, pack_signals
-from paraflex.engines.common import check_engine, import_engine, steps_between
+from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
 from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
@@ -78,6 +78,7 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
         The run diverges; it carries the Record of what was computed.
     """
     check_engine("mujoco", task.mechanism)
+    check_dwell("mujoco", task)
     mujoco = import_engine("mujoco")
     options = options or MuJoCoOptions()
     began = time.perf_counter()

@@ -7,7 +7,7 @@ the beam, where slopes are taken too, then the lumps.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,23 +100,40 @@ def slope_squares(
 
     Parameters
     ----------
+    mesh, basis, x
+        See `slope_square_integrals`.
+    u : (k, nf) array
+        Flexible coordinates.
+    """
+    return slope_square_integrals(mesh, basis, x)(u)
+
+
+def slope_square_integrals(
+    mesh: BeamMesh, basis: NDArray[np.float64], x: NDArray[np.float64]
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """`slope_squares` as a function of the flexible coordinates alone, for who asks often.
+
+    Parameters
+    ----------
     mesh : BeamMesh
     basis : (n_nodal, nf) array
         Nodal coordinates per flexible coordinate.
     x : (places,) array
         From 0 to the length [m].
-    u : (k, nf) array
-        Flexible coordinates.
     """
     z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     # Within a piece of an element slopes are polynomials.
     knots = np.union1d(mesh.nodes, x)
     halves = 0.5 * np.diff(knots)
-    slopes = np.array([mesh.shape_at(a + h * (p + 1.0))[1] for a, h in zip(knots, halves, strict=False) for p in z])
-    squares = (u @ (slopes @ basis).T) ** 2
-    pieces = (squares.reshape(len(u), halves.size, z.size) @ w) * halves
-    f = np.concatenate([np.zeros((len(u), 1)), np.cumsum(pieces, axis=1)], axis=1)
-    return f[:, np.searchsorted(knots, x)]
+    places = knots[:-1, None] + halves[:, None] * (z + 1.0)
+    slopes, ends = mesh.shapes_at(places.ravel())[1] @ basis, np.searchsorted(knots, x)
+
+    def integrals(u: NDArray[np.float64]) -> NDArray[np.float64]:
+        squares = (u @ slopes.T) ** 2
+        pieces = (squares.reshape(len(u), halves.size, z.size) @ w) * halves
+        return np.concatenate([np.zeros((len(u), 1)), np.cumsum(pieces, axis=1)], axis=1)[:, ends]
+
+    return integrals
 
 
 def node_weights(mesh: BeamMesh, node: int) -> NDArray[np.float64]:

@@ -107,13 +107,22 @@ class BeamMesh:
 
     def shape_at(self, x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Shape matrix N (2, n_nodal) and slope row N2' (n_nodal,) of the point at x [m]."""
-        element = int(np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.n_elements - 1))
-        length = self.nodes[element + 1] - self.nodes[element]
-        local = np.array([x - self.nodes[element]])
-        axial = self.scatter(element, axial_shape(local, length))
-        transverse = self.scatter(element, transverse_shape(local, length))
-        slope = self.scatter(element, transverse_shape(local, length, derivative=1))
-        return np.vstack([axial, transverse]), slope[0]
+        N, slope = self.shapes_at(np.array([x]))
+        return N[0], slope[0]
+
+    def shapes_at(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """`shape_at` of many points: (k, 2, n_nodal) and (k, n_nodal)."""
+        elements = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.n_elements - 1)
+        kind = np.result_type(x, self.nodes)
+        N, slope = np.zeros((x.size, 2, self.n_nodal), kind), np.zeros((x.size, self.n_nodal), kind)
+        for element in range(self.n_elements):
+            own = elements == element
+            length = self.nodes[element + 1] - self.nodes[element]
+            local = x[own] - self.nodes[element]
+            N[own, 0] = self.scatter(element, axial_shape(local, length))
+            N[own, 1] = self.scatter(element, transverse_shape(local, length))
+            slope[own] = self.scatter(element, transverse_shape(local, length, derivative=1))
+        return N, slope
 
     def shape_at_node(self, node: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """`shape_at` of a node, whose coordinates are displacement and slope themselves."""

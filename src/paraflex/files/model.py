@@ -98,6 +98,10 @@ class StudyDefaults:
         Of the integration [m].
     step : float or None
         Fixed [s].
+    after : str
+        What the active motors do after the path: "free" or "hold".
+    error : str
+        Which tracking error ranks modes: that of the "motion", or of the "whole" run.
     """
 
     path: str | None = None
@@ -110,6 +114,8 @@ class StudyDefaults:
     method: str | None = None
     tolerance: float | None = None
     step: float | None = None
+    after: str = "free"
+    error: str = "motion"
 
 
 @dataclass(frozen=True)
@@ -296,6 +302,8 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
         method=table.study.method,
         tolerance=table.study.tolerance,
         step=table.study.step,
+        after=table.study.after,
+        error=table.study.error,
     )
     _check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates

@@ -405,6 +405,12 @@ class StudyTable(_Table):
     method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
     tolerance: Number | None = Field(default=None, description="the tolerance of the integration in m")
     step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
+    after: Literal["free", "hold"] = Field(
+        default="free", description='what the active motors do after the path: "free" or "hold", by brakes'
+    )
+    error: Literal["motion", "whole"] = Field(
+        default="motion", description='which tracking error ranks modes: of the "motion", or the "whole" run with dwell'
+    )
 
 
 class ModelTable(_Table):

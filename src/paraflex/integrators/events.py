@@ -45,10 +45,9 @@ class DeflectionLimit:
     ----------
     body : str
     limit : float
-        Of its largest transverse displacement [m]: from the x axis of its body frame, as results tell it of its tip,
-        so that it is what the reference condition of the link makes it, from the tangent at the first end or from the
-        line through both ends. Taken at ends and quarters of every element. Of a modal body the largest displacement of
-        its points.
+        Of its largest deflection [m]: across its chord, the line from its first end to its last, whatever its reference
+        condition is. Taken at ends and quarters of every element. Of a modal body, that of its points from where they
+        are beside the line from the first to the last.
     """
 
     body: str

@@ -10,8 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import BodyCoordinates, SingularityMeasure, System, joint_coordinate
+from paraflex.dynamics import BodyCoordinates, SingularityMeasure, System, across_chord, joint_coordinate
 from paraflex.errors import InputError
+from paraflex.fem import slope_square_integrals
 from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, check_events
 from paraflex.mechanism import AxisJoint
 
@@ -19,6 +20,8 @@ Array = NDArray[np.float64]
 
 # Places looked at within an element, its last end among them.
 _PLACES = 4
+# Two places are always on their chord.
+_LINE = 3
 
 
 @dataclass(frozen=True)
@@ -97,24 +100,39 @@ def _joint_value(system: System, joint: str) -> Callable[[Array], Array]:
 
 
 def _deflection(system: System, name: str) -> Callable[[Array], Array]:
-    """Largest displacement along a body."""
+    """Largest deflection along a body from its chord."""
     body = system.body(name)
-    rows = deflection_rows(body)
-    return lambda q: np.max(np.linalg.norm(np.tensordot(q[:, body.flexible], rows, (1, 2)), axis=2), axis=1, initial=0)
+    rest, rows, shortening = deflection_rows(body)
+    if len(rest) < _LINE or np.all(rest[0] == rest[-1]):
+        raise InputError(
+            "a deflection is from the line between first and last point, which takes three points", field="events",
+            value=name, remedy="give the body a point between, or leave the limit out",
+        )  # fmt: skip
+
+    def value(q: Array) -> Array:
+        u = q[:, body.flexible]
+        places = rest + np.tensordot(u, rows, (1, 2))
+        if shortening is not None:
+            places[:, :, 0] -= 0.5 * shortening(u)
+        return np.max(np.abs(across_chord(places, rest)), axis=1)
+
+    return value
 
 
-def deflection_rows(body: BodyCoordinates) -> Array:
-    """Rows (places, directions, nf) of a flexible body's displacements in its frame, per modal coordinate.
+def deflection_rows(body: BodyCoordinates) -> tuple[Array, Array, Callable[[Array], Array] | None]:
+    """Where a flexible body's deflection is looked at, and how these places move in the body frame.
 
-    Of a beam or bar the transverse one, of a beam at ends and quarters of its elements; of a modal body both, at its
-    points.
+    Of a beam its ends and quarters of its elements, of a bar of given shapes places along it, of a modal body its
+    points: places undeformed (places, 2) [m], displacements per modal coordinate (places, 2, nf), and of second-order
+    geometry int_0^x (N2' u)^2 dx of modal coordinates (k, nf), (k, places) [m].
     """
     D, mesh = body.integrals.D, body.mesh
     if mesh is not None:
         inner = [np.linspace(a, b, _PLACES + 1)[1:] for a, b in pairwise(mesh.nodes)]
-        places = np.concatenate([mesh.nodes[:1], *inner])
-        return np.array([mesh.shape_at(float(x))[0][1:] @ D for x in places])
-    if body.shape.line:
-        return np.array([point.N[1:] @ D for point in body.shape.line])
-    points = [point.N @ D for point in body.shape.points.values()]
-    return np.array(points).reshape(-1, 2, body.nf)
+        x = np.concatenate([mesh.nodes[:1], *inner])
+        rows = np.array([mesh.shape_at(float(place))[0] @ D for place in x])
+        shortening = None if body.points is None else slope_square_integrals(mesh, D, x)
+        return np.column_stack([x, np.zeros_like(x)]), rows, shortening
+    points = body.shape.line or tuple(body.shape.points.values())
+    rest = np.array([point.x0 for point in points]).reshape(-1, 2)
+    return rest, np.array([point.N @ D for point in points]).reshape(-1, 2, body.nf), None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ class Solution:
         Of the equations of motion.
     event : str
         Which event stopped the run, whose time and state are then the last sample; empty for none.
+    brake_energy : float
+        Kinetic energy that brakes took as they engaged [J]: `work` is less by it from then on.
     """
 
     t: NDArray[np.float64]
@@ -68,8 +70,44 @@ class Solution:
     method: str = ""
     evaluations: int = 0
     event: str = ""
+    brake_energy: float = 0.0
 
     @property
     def event_time(self) -> float:
         """When the event was that stopped the run [s]; NaN for none."""
         return float(self.t[-1]) if self.event else math.nan
+
+    def followed_by(self, other: Solution, samples: int, multipliers: NDArray[np.float64], energy: float) -> Solution:
+        """One run of this one and of another that goes on from its last state, once brakes have taken energy.
+
+        Parameters
+        ----------
+        other : Solution
+            Of the same coordinates.
+        samples : int
+            How many of this run's samples are kept.
+        multipliers : (k, m) array
+            Of the other run, one a row of this run's system [N, N m].
+        energy : float
+            What the brakes took [J].
+        """
+        gained = self.kinetic_energy[-1] + self.strain_energy[-1] - self.kinetic_energy[0] - self.strain_energy[0]
+        before = self.work[-1]
+        joined = {
+            name: np.concatenate([getattr(self, name)[:samples], getattr(other, name)])
+            for name in ("t", "q", "v", "a", "kinetic_energy", "strain_energy")
+        }
+        counts = ("steps", "rejected", "newton_iterations", "factorisations", "evaluations", "wall_time")
+        maxima = ("constraint_position_max", "constraint_velocity_max")
+        return replace(
+            other,
+            **joined,
+            multipliers=np.concatenate([self.multipliers[:samples], multipliers]),
+            work=np.concatenate([self.work[:samples], other.work + before - energy]),
+            **{name: getattr(self, name) + getattr(other, name) for name in counts},
+            **{name: max(getattr(self, name), getattr(other, name)) for name in maxima},
+            # The other's imbalance counts from where it begins.
+            energy_balance_max=max(self.energy_balance_max, abs(gained - before) + other.energy_balance_max),
+            singular_positions=self.singular_positions + other.singular_positions,
+            brake_energy=energy,
+        )

@@ -2,7 +2,7 @@
 
 from paraflex.kinematics.closure import RigidMotion, follow_path, path_follower
 from paraflex.kinematics.laws import TrapezoidalLaw
-from paraflex.kinematics.paths import Circle, Line, Path, PathMotion, PointPath, Polygon
+from paraflex.kinematics.paths import Circle, Line, Path, PathMotion, PointPath, Polygon, length_fraction
 
 __all__ = [
     "Circle",
@@ -14,5 +14,6 @@ __all__ = [
     "RigidMotion",
     "TrapezoidalLaw",
     "follow_path",
+    "length_fraction",
     "path_follower",
 ]

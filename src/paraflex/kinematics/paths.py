@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError
 from paraflex.kinematics.laws import TrapezoidalLaw
 
+# Of Gauss's rule for the length between two knots of a path.
+_LENGTH_POINTS = 40
+
 
 class PathMotion(NamedTuple):
     """Position [m], velocity [m/s] and acceleration [m/s^2] in the ground frame, each (k, 2)."""
@@ -249,6 +252,22 @@ class PointPath:
         inside = ((t >= 0.0) & (t <= self.motion_time))[:, None]
         x = np.clip(t, 0.0, self.motion_time)
         return np.stack([self._spline(x), *(np.where(inside, self._spline(x, k), 0.0) for k in (1, 2))])
+
+
+def length_fraction(path: Path, end: float) -> float:
+    """How much of a path's length has been passed by a time [s]: from 0 to 1."""
+    if end >= path.duration:
+        return 1.0
+    return _length(path, end) / _length(path, path.duration)
+
+
+def _length(path: Path, end: float) -> float:
+    """Length passed by a time, by Gauss's rule between the knots [m]."""
+    knots = np.unique([0.0, end, *(knot for knot in path.knots if 0.0 < knot < end)])
+    z, w = np.polynomial.legendre.leggauss(_LENGTH_POINTS)
+    half, middle = 0.5 * np.diff(knots)[:, None], 0.5 * (knots[1:] + knots[:-1])[:, None]
+    speed = np.linalg.norm(path.evaluate((middle + half * z).ravel()).velocity, axis=1)
+    return float(np.sum(half * w * speed.reshape(len(half), z.size)))
 
 
 def _pair(value: Sequence[float], field: str) -> tuple[float, float]:

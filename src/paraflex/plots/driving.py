@@ -16,6 +16,7 @@ from paraflex.plots.layout import ONE_COLUMN, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_curves, select_run, shade_rest
 from paraflex.plots.scales import mark_powers
 from paraflex.plots.style import BLUE, GREEN, VERMILLION, journal_style
+from paraflex.results.metrics import headline, ranked_by_motion
 
 # Height of a line of a list [mm].
 _LINE = 5.5
@@ -69,20 +70,21 @@ def tracking_distance(data: xr.Dataset) -> Figure:
 
 @journal_style()
 def mode_comparison(data: xr.Dataset) -> Figure:
-    """RMS tracking error, residual vibration and largest torque of every mode.
+    """RMS tracking error (of the motion, or the whole run), residual vibration and largest torque of every mode.
 
     Parameters
     ----------
     data : xarray.Dataset
         From `results.tracking_dataset`.
     """
+    rms, of_motion = headline(data)[0], ranked_by_motion(data)
     efforts = data["peak_torque"].max("motor").values
     label = effort_label(data["torque"].attrs.get("units", "N m"))
     figure, axes = panels(1, 3)
     modes = [str(name) for name in data["mode"].values]
     names = [mode_label(name) for name in modes]
     for panel, values, title, colour in (
-        (axes[0, 0], data["tracking_rms"].values, "RMS tracking error", BLUE),
+        (axes[0, 0], rms.values, f"RMS error {'of the motion' if of_motion else 'of the whole run'}", BLUE),
         (axes[0, 1], data["residual_vibration"].values, "residual vibration", GREEN),
     ):
         unit = display_unit("m", values)

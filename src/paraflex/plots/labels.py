@@ -66,9 +66,14 @@ def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", s
 
 # What a metric is called in print; others go by their own names.
 METRIC_NAMES = {
+    "tracking_rms_motion": "RMS error in the motion",
+    "tracking_max_motion": "largest error in the motion",
+    "tracking_rms_after": "RMS error after the motion",
+    "tracking_max_after": "largest error after the motion",
     "tracking_rms": "RMS tracking error",
     "tracking_max": "largest tracking error",
     "residual_vibration": "residual vibration",
+    "drift_speed": "drift after the motion",
     "deflection_max": "largest deflection",
     "peak_torque_max": "peak torque",
     "rms_torque_norm": "RMS torque",

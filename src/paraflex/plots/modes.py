@@ -14,6 +14,7 @@ from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_l
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, samples, select_run, shade_rest
 from paraflex.plots.style import BLUE, VERMILLION, ZERO, journal_style, keep_flat, look_of
+from paraflex.results.metrics import headline, ranked_by_motion
 
 # Of a mode and the names of its passive motors, as many as fit above a panel.
 _TITLE_LETTERS = 22
@@ -65,7 +66,8 @@ def tracking_errors(data: xr.Dataset) -> Figure:
     Parameters
     ----------
     data : xarray.Dataset
-        From `paraflex.results`. The titles hold its `tracking_rms` (Eq. 64).
+        From `paraflex.results`. The titles hold the RMS error of the motion, or over all (Eq. 64): see
+        `results.tracking_dataset`.
     """
     names = [str(name) for name in data["mode"].values]
     figure, axes = _mode_panels(len(names))
@@ -88,10 +90,11 @@ def tracking_errors(data: xr.Dataset) -> Figure:
 
 def _outcome(run: xr.Dataset) -> str:
     """RMS tracking error of a run, or when it stopped."""
-    rms = float(run["tracking_rms"])
+    rms = float(headline(run)[0])
     if math.isfinite(rms):
         unit = display_unit("m", rms)
-        return f"RMS {three_digits(unit.factor * rms)} {unit.name}"
+        span = "in the motion" if ranked_by_motion(run) else "over all"
+        return f"RMS {three_digits(unit.factor * rms)} {unit.name} {span}"
     reached = samples(run)
     return f"stopped at {run['time'].values[reached - 1]:.3g} s" if reached else "no samples"
 

@@ -23,6 +23,7 @@ _GIVEN = {
     "segments": "--segments",
     "reference": "--reference",
     "curvature": "--curvature",
+    "after": "--after",
 }
 
 

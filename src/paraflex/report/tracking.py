@@ -14,6 +14,7 @@ from paraflex.report.film import NO_SHAPES, film
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
+from paraflex.results.metrics import during_motion, headline, part_run, ranked_by_motion
 
 
 def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> Page:
@@ -37,7 +38,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         title=data.attrs["mechanism"],
         kind="run",
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
-        facts=[*([("model", _model(run))] if run else []), *common_facts(data)],
+        facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
         command=run_command_line(run),
         figures=_figures(data),
         tables=[("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {}))],
@@ -65,12 +66,16 @@ def torque_unit(data: xr.Dataset) -> str:
 def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     """What every mode came to."""
     runs = [str(name) for name in data["mode"].values]
-    gaps, deflections = errors(data), np.abs(data["tip_transverse"].values)
+    rms, words = headline(data)
+    gaps, deflections = errors(data), _deflections(data)
+    ranked = gaps[:, during_motion(data["time"].values, data.attrs["motion_end"])] if ranked_by_motion(data) else gaps
     length, bend = unit_for("m", gaps), unit_for("m", deflections)
+    after = _after_columns(data)
     motors = [str(name) for name in data["motor"].values]
     torques = data["torque"].transpose("mode", "motor", "time").values
     heads = [
         ("mode", ""), ("status", ""), ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
+        *((name, f"[{unit}]") for name, unit, _ in after),
         *((symbol(motor), f"[{torque_unit(data)}]") for motor in motors),
         ("deflection", f"largest [{bend.name}]"), ("strain", "energy [J]"), ("imbalance", "[J]"),
         ("steps", "rejected"), ("iterations", "factorisations"), ("wall time", "[s]"),
@@ -80,8 +85,9 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
         one = data.isel(mode=r)
         rows.append((name, [
             str(one["status"].item()),
-            number(one["tracking_rms"].item(), length.factor),
-            number(largest(gaps[r]), length.factor),
+            number(rms[r].item(), length.factor),
+            number(largest(ranked[r]), length.factor),
+            *(number(values[r]) for _, _, values in after),
             *(f"{number(largest(torque))}\n{number(_rms(torque))}" for torque in torques[r]),
             _deflection(deflections[r], data["body"].values, bend.factor),
             number(largest(one["strain_energy"].values)),
@@ -92,11 +98,50 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
         ]))  # fmt: skip
     rows += [(name, ["failed", *[NOTHING] * (len(heads) - 2)]) for name in failed]
     efforts = "Forces" if torque_unit(data) == "N" else "Torques"
-    note = f"{efforts}: peak and, below it, RMS. Strain energy: peak. Imbalance: largest, of energy and work."
+    note = f"Error and largest: {words}. "
+    if after:
+        note += "Error after: RMS, after the motion; drift: mean speed then; vibration: RMS about the drift. "
+    note += (
+        f"{efforts}: peak and, below it, RMS. Deflection: from a link's chord. Strain energy: peak. Imbalance: "
+        "largest, of energy and work."
+    )
     if failed or not bool((data["status"] == "complete").all()):
         note += " Of a mode that did not get to its end: until then."
     selects = {name: r for r, name in enumerate(runs)}
     return table(heads, rows, caption="What every mode came to", note=note, runs=selects)
+
+
+def _after(data: xr.Dataset) -> list[tuple[str, str]]:
+    """What the motors did after the motion, where runs went on after it."""
+    if data["time"].values[-1] <= data.attrs.get("motion_end", np.inf) or "after" not in data.attrs:
+        return []
+    if asked(data).get("ked"):
+        return [("after the motion", "motors held, as all the time")]
+    return [("after the motion", "motors held by brakes" if data.attrs["after"] == "hold" else "motors free")]
+
+
+def _after_columns(data: xr.Dataset) -> list[tuple[str, str, NDArray[np.float64]]]:
+    """Name, unit and values of what is told of the time after the motion; none where runs end with it."""
+    columns = []
+    for name, key, unit in (
+        ("error after", "tracking_rms_after", "m"),
+        ("drift", "drift_speed", "m"),
+        ("vibration", "residual_vibration", "m"),
+    ):
+        values = data[key].values
+        if np.isfinite(values).any():
+            shown = unit_for(unit, values)
+            columns.append((name, shown.name + ("/s" if key == "drift_speed" else ""), shown.factor * values))
+    brakes = data["brake_energy"].values if "brake_energy" in data else np.zeros(1)
+    if np.any(brakes > 0.0):
+        columns.append(("brakes", "J", brakes))
+    return columns
+
+
+def _deflections(data: xr.Dataset) -> NDArray[np.float64]:
+    """Of links from their chords (mode, time, body); of earlier results those of their ends."""
+    name = "deflection" if "deflection" in data else "tip_transverse"
+    return np.abs(data[name].transpose("mode", "time", "body").values)
 
 
 def largest(values: NDArray[np.float64]) -> float:
@@ -181,7 +226,8 @@ def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     """The few numbers to see first."""
-    errors_rms = data["tracking_rms"].values
+    rms, words = headline(data)
+    errors_rms = rms.values
     several = data.sizes["mode"] > 1
     peaks = np.array([largest(one) for one in data["torque"].values])
     tiles = []
@@ -189,13 +235,13 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         best = int(np.nanargmin(errors_rms))
         unit = unit_for("m", errors_rms[best : best + 1])
         value = f"{number(errors_rms[best], unit.factor)} {unit.name}"
-        tiles.append(("least tracking error" if several else "tracking error (RMS)", value, _name(data, best)))
+        tiles.append((f"{'least ' if several else ''}RMS error {words}", value, _name(data, best)))
     if np.isfinite(peaks).any():
         least = int(np.nanargmin(peaks))
         effort = "force" if torque_unit(data) == "N" else "torque"
         value = f"{number(peaks[least])} {torque_unit(data)}"
         tiles.append((f"least peak {effort}" if several else f"peak {effort}", value, _name(data, least)))
-    deflections = np.array([largest(one) for one in data["tip_transverse"].values])
+    deflections = np.array([largest(one) for one in _deflections(data)])
     if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
         most = int(np.nanargmax(deflections))
         unit = unit_for("m", deflections[most : most + 1])
@@ -211,8 +257,10 @@ def _name(data: xr.Dataset, run: int) -> str:
 
 
 def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
-    """Why modes did not get to their ends."""
-    out = [f"Mode {name} could not be run: {reason}" for name, reason in failed.items()]
+    """Which part of the path was run, if not all; why modes did not get to their ends."""
+    part = part_run(data)
+    out = [] if part is None else [f"{str(part)[0].upper()}{str(part)[1:]}."]
+    out += [f"Mode {name} could not be run: {reason}" for name, reason in failed.items()]
     for r, name in enumerate(data["mode"].values):
         status = str(data["status"].values[r])
         if status != "complete":

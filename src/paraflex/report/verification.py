@@ -17,6 +17,7 @@ from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, verify_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
 from paraflex.report.tracking import errors, torque_unit
+from paraflex.results.metrics import SPAN_WORDS, ErrorSpan
 
 _ENGINES = ("exudyn", "mujoco")
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
@@ -244,7 +245,8 @@ def _tiles(figures: Mapping[str, Any], reference: str) -> list[tuple[str, str, s
     error = mode["models"].get(reference, {}).get("tracking_error")
     if error is not None:
         unit = unit_for("m", np.array([error]))
-        tiles.append(("tracking error (RMS)", f"{number(error, unit.factor)} {unit.name}", printed(reference)))
+        span = SPAN_WORDS[ErrorSpan(figures.get("error", ErrorSpan.WHOLE.value))]
+        tiles.append((f"RMS error {span}", f"{number(error, unit.factor)} {unit.name}", printed(reference)))
     whole = all(one["status"] == "complete" for by in figures["modes"].values() for one in by["models"].values())
     tiles.append(("models", str(len(mode["models"])), "all complete" if whole else "not all complete"))
     return tiles

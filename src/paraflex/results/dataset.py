@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
+from paraflex.kinematics import length_fraction
 from paraflex.mechanism import Mechanism
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
-from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
-from paraflex.results.record import FIGURES, Record, record
+from paraflex.results.metrics import ErrorSpan, parse_error_span, peak_torque, rms_torque, tracking_variables
+from paraflex.results.outlines import chord_deflections
+from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
 from paraflex.results.storage import SCHEMA
 from paraflex.simulate import TrackingRun
 
@@ -30,6 +32,7 @@ UNITS = {
     "angular_acceleration": ("link angular acceleration", "rad/s^2"),
     "chord_angle": ("angle from a link's first end to its last", "rad"),
     "chord_velocity": ("rate of the angle from a link's first end to its last", "rad/s"),
+    "deflection": ("largest deflection along a link from its chord", "m"),
     "tip_axial": ("axial tip displacement", "m"),
     "tip_transverse": ("transverse tip displacement", "m"),
     "tip_slope": ("tip slope", "rad"),
@@ -62,6 +65,7 @@ UNITS = {
     "constraint_position_max": ("largest constraint violation in position", "m"),
     "constraint_velocity_max": ("largest constraint violation in velocity", "m/s"),
     "energy_balance_max": ("largest imbalance of energy and work", "J"),
+    "brake_energy": ("energy that brakes took as they engaged after the motion", "J"),
     "event": ("event that stopped the run", "1"),
     "event_time": ("when it was stopped", "s"),
 }
@@ -100,6 +104,7 @@ def tracking_dataset(
     *,
     options: IntegrationOptions | None = None,
     parameters: dict | None = None,
+    error: ErrorSpan | str = ErrorSpan.MOTION,
 ) -> xr.Dataset:
     """One dataset of the runs of several modes of a task.
 
@@ -112,6 +117,9 @@ def tracking_dataset(
         Kept as provenance.
     parameters : dict, optional
         Kept as provenance: the model as read, and what was asked for.
+    error : ErrorSpan or str
+        Which tracking error stands for a run in tables and figures: that "motion" alone, or that of the "whole" run,
+        dwell included (Eq. 64). Both are in the dataset.
 
     Returns
     -------
@@ -144,6 +152,7 @@ def tracking_dataset(
         data[f"{name}_desired"] = (("mode", "time", dim), np.broadcast_to(values, (len(runs), *values.shape)).copy())
     for name in FIGURES:
         data[name] = (("mode",), np.array([one.figures[name] for one in records]))
+    data[BRAKE_ENERGY] = (("mode",), np.array([one.figures.get(BRAKE_ENERGY, 0.0) for one in records]))
     out = xr.Dataset(
         data,
         coords={
@@ -158,10 +167,9 @@ def tracking_dataset(
             **drawing_coordinates(mechanism),
         },
     )
-    out["tracking_rms"] = tracking_error(out)
+    out = out.assign(tracking_variables(out, task.path.duration))
     out["peak_torque"] = peak_torque(out)
     out["rms_torque"] = rms_torque(out)
-    out["residual_vibration"] = residual_vibration(out, task.path.duration)
     for name in out.variables:
         label, unit = UNITS.get(str(name).removesuffix("_desired"), (None, None))
         if label is not None and unit is not None:
@@ -173,6 +181,7 @@ def tracking_dataset(
         if units == "N":
             out[name].attrs["long_name"] = out[name].attrs["long_name"].replace("torque", "force")
     out.attrs = _provenance(records[0], options or IntegrationOptions(), parameters or {})
+    out.attrs["error"] = parse_error_span(error).value
     return out
 
 
@@ -198,6 +207,7 @@ def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.floating]
         "tip_axial": (("body",), full(one.tip[:, :, 0])),
         "tip_transverse": (("body",), full(one.tip[:, :, 1])),
         "tip_slope": (("body",), full(one.tip[:, :, 2])),
+        "deflection": (("body",), full(chord_deflections(one.task.mechanism, one.drawing.shape))),
         "point_position": (("point", "axis"), full(one.points)),
         "joint_force": (("joint", "axis"), full(one.joint_force)),
         "joint_moment": (("joint",), full(one.joint_moment)),
@@ -222,6 +232,8 @@ def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> d
         "mechanism": one.task.mechanism.name,
         **end_effector_point(one.task.mechanism),
         "motion_end": one.task.path.duration,
+        "after": one.task.after.value,
+        "path_length_run": length_fraction(one.task.path, float(one.task.motion.t[-1])),
         "tolerance": options.tolerance,
         "baumgarte_alpha": options.alpha,
         "baumgarte_beta": options.beta,

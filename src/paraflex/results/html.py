@@ -9,7 +9,9 @@ import numpy as np
 from paraflex.display import facts, page, sentence, table
 from paraflex.integrators import METHODS, Solution
 from paraflex.motion import MotionRun
-from paraflex.results.motion import point_motion, tip_deflection
+from paraflex.results.metrics import during_motion, rms
+from paraflex.results.motion import point_motion
+from paraflex.results.outlines import deflections
 from paraflex.simulate import TrackingRun
 
 # Points told one by one.
@@ -20,7 +22,7 @@ def tracking_run_html(run: TrackingRun) -> str:
     """Status, tracking error, torques and deflection of one mode, and the solver's figures."""
     task, solution = run.task, run.solution
     whole = task if task.whole is None else task.whole
-    torque = run.torques.evaluate(task.motion.t) if run.holding is None else run.holding
+    torque = run.applied
     peaks, rms = np.max(np.abs(torque), axis=0, initial=0.0), np.sqrt(np.mean(torque**2, axis=0))
     motors = [
         (motor.name, "active" if motor.name in run.mode.motors else "passive", float(peak), float(each), unit)
@@ -74,20 +76,22 @@ def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
         return []
     place = point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]).position
     away = np.linalg.norm(place - task.motion.desired.position[:k], axis=1)
+    moving = during_motion(solution.t[:k], task.path.duration)
+    after = [("tracking error after it, RMS", f"{1e3 * rms(away[~moving]):.4g} mm")] if not moving.all() else []
     return [
-        ("tracking error, RMS", f"{1e3 * np.sqrt(np.mean(away**2)):.4g} mm"),
-        ("tracking error, largest", f"{1e3 * np.max(away):.4g} mm"),
+        ("tracking error during the motion, RMS", f"{1e3 * rms(away[moving]):.4g} mm"),
+        ("tracking error during the motion, largest", f"{1e3 * np.max(away[moving]):.4g} mm"),
+        *after,
         ("largest deflection", _deflection(run)),
         ("condition number, worst", float(np.max(run.condition))),
     ]
 
 
 def _deflection(run: TrackingRun | MotionRun) -> str | None:
-    """Largest tip displacement of any flexible body in its frame."""
+    """Largest deflection of any flexible body from its chord."""
     system = run.task.system if isinstance(run, TrackingRun) else run.system
-    tips = [tip_deflection(system, body.name, run.solution.q)[:, :2] for body in system.bodies if body.nf]
-    sizes = [float(np.nanmax(np.linalg.norm(tip, axis=1), initial=0.0)) for tip in tips]
-    return f"{1e3 * max(sizes):.4g} mm" if sizes else None
+    bent = np.abs(deflections(system, run.solution.q))
+    return f"{1e3 * np.nanmax(bent):.4g} mm" if np.isfinite(bent).any() else None
 
 
 def _last_places(run: MotionRun) -> list[tuple]:

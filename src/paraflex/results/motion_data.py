@@ -17,6 +17,7 @@ from paraflex.results.dataset import UNITS, describe, end_effector_point
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.joint_loads import joint_loads
 from paraflex.results.motion import point_motion, tip_deflection
+from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import FIGURES
 from paraflex.results.storage import SCHEMA
 from paraflex.results.summary import finite_or_none
@@ -78,7 +79,9 @@ def motion_dataset(
         "work": ((), solution.work),
     }
     data: dict[str, Any] = {name: (("time", *dims), _full(array, run)) for name, (dims, array) in values.items()}
-    for name, (dims, array) in drawing_variables(system_drawing(system, q)).items():
+    drawn = system_drawing(system, q)
+    data["deflection"] = (("time", "body"), _full(chord_deflections(mechanism, drawn.shape), run))
+    for name, (dims, array) in drawing_variables(drawn).items():
         data[name] = (("time", *dims), _full(array, run).astype(np.float32))
     data |= {name: getattr(solution, name) for name in FIGURES}
     data["applied_torque"] = (("motor",), np.array(list(run.torques.values())))

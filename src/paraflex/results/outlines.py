@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import BodyCoordinates, System
+from paraflex.dynamics import BodyCoordinates, System, across_chord
 from paraflex.fem import slope_squares
 from paraflex.mechanism import (
     AssumedModesBeam,
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 _PIECES, _FEWEST = 16, 4
 # Points closer than this part of a body's size are drawn as one.
 _SAME = 1e-9
+# Two stations are always on their chord: a deflection takes one more.
+_LINE = 3
 # Pieces shorter than this part of a body's size say nothing of a direction.
 _SHORT = 1e-6
 
@@ -86,6 +88,38 @@ def outline(body: Body) -> Outline:
 def outlines(mechanism: Mechanism) -> list[Outline]:
     """Of all bodies of a mechanism, in its order."""
     return [outline(body) for body in mechanism.bodies]
+
+
+def chord_deflections(mechanism: Mechanism, shape: Array) -> Array:
+    """Largest deflection along each body from its chord (k, bodies) [m], of drawn shapes (k, stations, 2).
+
+    Over the stations: see `across_chord`. NaN of a flexible body of which fewer than three places are known, as of a
+    modal body with two points.
+    """
+    found, first = [], 0
+    for body, one in zip(mechanism.bodies, outlines(mechanism), strict=True):
+        last = first + len(one.places)
+        if isinstance(body, RigidBody) or not body.flexible:
+            found.append(np.zeros(len(shape)))
+        elif len(one.places) < _LINE:
+            found.append(np.full(len(shape), np.nan))
+        else:
+            found.append(np.max(np.abs(across_chord(shape[:, first:last], one.places)), axis=1))
+        first = last
+    return np.stack(found, axis=1)
+
+
+def deflections(system: System, q: Array) -> Array:
+    """How far stations of all flexible bodies are across their chords (k, stations) [m], real or with a complex step.
+
+    Signed: see `across_chord`. NaN as in `chord_deflections`.
+    """
+    parts = [np.zeros((len(q), 0))]
+    for body, one in zip(system.mechanism.bodies, outlines(system.mechanism), strict=True):
+        if system.body(body.name).nf:
+            bent = across_chord(outline_motion(system, one, q), one.places)
+            parts.append(bent if len(one.places) >= _LINE else np.full_like(bent, np.nan))
+    return np.concatenate(parts, axis=1)
 
 
 def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
@@ -214,13 +248,10 @@ def _turned(position: Array, angle: Array, local: Array) -> Array:
 def _rows(system: System, body: BodyCoordinates, drawn: Outline) -> Array:
     """Displacements of the stations per modal coordinate (s, 2, nf)."""
     described = system.mechanism.body(drawn.body)
-    at: Callable[[float], tuple[Array, Array]] | None = None
     if isinstance(described, FlexibleBeam) and body.mesh is not None:
-        at = body.mesh.shape_at
-    elif isinstance(described, AssumedModesBeam):
-        at = described.shapes.shape_at
-    if at is not None:
-        return np.stack([at(float(x))[0] for x in drawn.places[:, 0]]) @ body.integrals.D
+        return body.mesh.shapes_at(drawn.places[:, 0])[0] @ body.integrals.D
+    if isinstance(described, AssumedModesBeam):
+        return np.stack([described.shapes.shape_at(x)[0] for x in drawn.places[:, 0]]) @ body.integrals.D
     if isinstance(described, RigidBody) or not body.shape.points:
         return np.zeros((len(drawn.places), 2, body.nf))
     return np.stack([point.N for point in body.shape.points.values()]) @ body.integrals.D
@@ -228,12 +259,14 @@ def _rows(system: System, body: BodyCoordinates, drawn: Outline) -> Array:
 
 def _along(length: float, points: Mapping[str, float]) -> Array:
     """Stations along a bar, its ends and points among them."""
+    # Places may have a complex step: what is real of them decides.
     knots = [0.0]
-    for x in sorted([*points.values(), length]):
-        if x - knots[-1] > _SAME * length:
-            knots.append(min(float(x), length))
+    for x in sorted([*points.values(), length], key=np.real):
+        if np.real(x - knots[-1]) > _SAME * np.real(length):
+            knots.append(min(x, length, key=np.real))
     knots[-1] = length
-    spans = [np.linspace(a, b, max(_FEWEST, round(_PIECES * (b - a) / length)) + 1)[1:] for a, b in pairwise(knots)]
+    pieces = [max(_FEWEST, round(float(np.real(_PIECES * (b - a) / length)))) for a, b in pairwise(knots)]
+    spans = [np.linspace(a, b, number + 1)[1:] for (a, b), number in zip(pairwise(knots), pieces, strict=True)]
     return np.concatenate([[0.0], *spans])
 
 

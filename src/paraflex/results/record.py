@@ -32,6 +32,8 @@ FIGURES = (
     "event",
     "event_time",
 )
+# What brakes took, where there were any.
+BRAKE_ENERGY = "brake_energy"
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ def record(run: TrackingRun) -> Record:
         for body, names in zip(whole.mechanism.bodies, parts, strict=True)
         for point in body.points
     ]
-    torque = run.torques.evaluate(task.motion.t) if run.holding is None else run.holding
+    torque = run.applied
     joints = [joint.name for joint in whole.mechanism.joints]
     loads = joint_loads(system, joints, q, solution.multipliers[:k], torque[:k])
     return Record(
@@ -142,7 +144,7 @@ def record(run: TrackingRun) -> Record:
         strain_energy=solution.strain_energy[:k],
         work=solution.work[:k],
         drawing=_drawing(task, parts, q),
-        figures={name: getattr(solution, name) for name in FIGURES},
+        figures={name: getattr(solution, name) for name in (*FIGURES, BRAKE_ENERGY)},
     )
 
 

@@ -7,10 +7,13 @@ from pathlib import Path
 import xarray as xr
 
 from paraflex.errors import InputError, OutputError, suggestion
+from paraflex.results.metrics import tracking_variables
 
-# Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from.
-# 3: joint forces are whole (before, of joints that slide their normal part), joint moments, multipliers of all runs.
+# Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from. 3:
+# errors during the motion and after it, vibration about the drift, deflections from the chord; joint forces are whole
+# (before, of joints that slide their normal part), joint moments, multipliers of all runs.
 SCHEMA = 3
+_FOLLOWING = 3
 # What commands call the file in their folder, and where a sweep keeps its runs.
 FILES = ("results.nc", "verify.nc")
 _TRAJECTORIES = "trajectories"
@@ -58,7 +61,7 @@ def open_results(path: str | Path) -> xr.Dataset:
     ----------
     path : str or Path
         The folder of a run or verification, or a file. Files of earlier versions of the schema stay readable; what
-        they do not tell (shapes in schema 1) is missing.
+        they do not tell (shapes in schema 1) is missing, tracking errors and vibration are those of today's formulas.
 
     Raises
     ------
@@ -154,4 +157,6 @@ def _checked(data: xr.Dataset, file: Path) -> xr.Dataset:
             field=str(file),
             remedy="update paraflex",
         )
+    if schema < _FOLLOWING and "end_effector" in data:
+        return data.assign(tracking_variables(data))
     return data

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from paraflex.results.metrics import FOLLOWING, ErrorSpan, Part, part_run
+
 _COUNTS = ("steps", "rejected", "newton_iterations", "factorisations")
 _FIGURES = (
-    "tracking_rms",
-    "residual_vibration",
+    *FOLLOWING,
+    "brake_energy",
     "wall_time",
     "constraint_position_max",
     "constraint_velocity_max",
@@ -33,8 +35,10 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     Returns
     -------
     dict
-        `modes.<mode>` with tracking_rms, peak_torque and rms_torque per motor, end_effector_final and the solver's
-        figures; `parameters`; `version`. A figure that was not reached is None.
+        `modes.<mode>` with tracking errors during the motion, after it and over all, vibration and drift, peak_torque
+        and rms_torque per motor, end_effector_final and the solver's figures; `error`, which of the errors ranks the
+        modes; `after`, what the motors do after the path; `part`, how much of the path a run did that was too short for
+        all of it, else None; `parameters`; `version`. A figure that was not reached is None.
     """
     modes: dict[str, Any] = {}
     for name in data["mode"].values:
@@ -44,7 +48,10 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
             figures["message"] = str(run["message"].item())
         if figures["status"] == "stopped":
             figures |= {"event": str(run["event"].item()), "event_time": run["event_time"].item()}
-        figures |= {key: finite_or_none(run[key].item()) for key in _FIGURES}
+        # Results of earlier versions lack some.
+        figures |= {key: finite_or_none(run[key].item()) for key in _FIGURES if key in run}
+        if "deflection" in run:
+            figures["deflection_max"] = finite_or_none(run["deflection"].max().item())
         figures |= {key: int(run[key].item()) for key in _COUNTS}
         for key in ("peak_torque", "rms_torque"):
             figures[key] = {str(m): finite_or_none(run[key].sel(motor=m).item()) for m in run["motor"].values}
@@ -55,10 +62,19 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         modes[name] = {"status": "failed", "message": reason}
     return {
         "mechanism": data.attrs["mechanism"],
+        "error": data.attrs.get("error", ErrorSpan.WHOLE.value),
+        "after": data.attrs.get("after", "free"),
+        "part": _part(part_run(data)),
         "modes": modes,
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }
+
+
+def _part(part: Part | None) -> dict[str, float | str] | None:
+    if part is None:
+        return None
+    return {"duration": part.duration, "path": part.path, "length": part.length, "message": str(part)}
 
 
 def finite_or_none(value: float) -> float | None:

@@ -8,32 +8,42 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.results.metrics import ErrorSpan, during_motion, parse_error_span
 from paraflex.results.record import Record
 from paraflex.simulate import TrackingTask
 from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model
 
 
-def agreement(verification: Verification) -> dict[str, Any]:
-    """The agreement of all models as plain numbers: what `verify.json` holds. None for what a run did not reach."""
-    task = verification.task
+def agreement(verification: Verification, error: ErrorSpan | str = ErrorSpan.MOTION) -> dict[str, Any]:
+    """The agreement of all models as plain numbers: what `verify.json` holds. None for what a run did not reach.
+
+    Parameters
+    ----------
+    verification : Verification
+    error : ErrorSpan or str
+        What tracking errors are of: the "motion", or the "whole" run, dwell included. Distances between models are of
+        the whole run.
+    """
+    task, span = verification.task, parse_error_span(error)
     reference = reference_model(verification.models)
     return {
         "mechanism": task.mechanism.name,
         "duration": float(task.motion.t[-1]),
         "samples": int(task.motion.t.size),
         "reference": reference,
+        "error": span.value,
         "links": [body.name for body in task.mechanism.bodies],
         "complete": verification.complete,
         "interrupted": verification.interrupted,
-        "modes": {mode: _of_mode(task, by_model, reference) for mode, by_model in verification.runs.items()},
+        "modes": {mode: _of_mode(task, span, by_model, reference) for mode, by_model in verification.runs.items()},
     }
 
 
-def _of_mode(task: TrackingTask, by_model: Mapping[str, ModelRuns], reference: str) -> dict[str, Any]:
+def _of_mode(task: TrackingTask, span: ErrorSpan, by_model: Mapping[str, ModelRuns], reference: str) -> dict[str, Any]:
     of_reference = by_model[reference].base if reference in by_model else None
     whole = {name: runs.base for name, runs in by_model.items()}
     return {
-        "models": {name: _of_model(task, runs, of_reference) for name, runs in by_model.items()},
+        "models": {name: _of_model(task, span, runs, of_reference) for name, runs in by_model.items()},
         "distances": {
             a: {b: None if x is None or y is None else _distance(x, y) for b, y in whole.items()}
             for a, x in whole.items()
@@ -41,16 +51,16 @@ def _of_mode(task: TrackingTask, by_model: Mapping[str, ModelRuns], reference: s
     }
 
 
-def _of_model(task: TrackingTask, runs: ModelRuns, reference: Record | None) -> dict[str, Any]:
+def _of_model(task: TrackingTask, span: ErrorSpan, runs: ModelRuns, reference: Record | None) -> dict[str, Any]:
     base = runs.base
     out: dict[str, Any] = {"status": "failed" if runs.failure else "complete", "message": runs.failure}
     if base is None:
         return out
     out |= {
         "method": base.method,
-        "tracking_error": _tracking_error(task, base),
-        "tracking_error_with_finer_step": _tracking_error(task, runs.finished(Refinement.STEP)),
-        "tracking_error_with_finer_mesh": _tracking_error(task, runs.finished(Refinement.MESH)),
+        "tracking_error": _tracking_error(task, span, base),
+        "tracking_error_with_finer_step": _tracking_error(task, span, runs.finished(Refinement.STEP)),
+        "tracking_error_with_finer_mesh": _tracking_error(task, span, runs.finished(Refinement.MESH)),
         "change_with_finer_step": _change(runs, Refinement.STEP),
         "change_with_finer_mesh": _change(runs, Refinement.MESH),
     }
@@ -76,9 +86,12 @@ def _change(runs: ModelRuns, level: Refinement) -> float | None:
     return None if base is None or finer is None else _distance(base, finer)
 
 
-def _tracking_error(task: TrackingTask, run: Record | None) -> float | None:
-    """Root mean square distance from the desired path (Eq. 64) [m]."""
-    return None if run is None else _rms(_gaps(run.end_effector.position, task.motion.desired.position))
+def _tracking_error(task: TrackingTask, span: ErrorSpan, run: Record | None) -> float | None:
+    """Root mean square distance from the desired path during the motion, or over all samples (Eq. 64) [m]."""
+    if run is None:
+        return None
+    gaps, t = _gaps(run.end_effector.position, task.motion.desired.position), task.motion.t
+    return _rms(gaps if span is ErrorSpan.WHOLE else gaps[during_motion(t, task.path.duration)])
 
 
 def _distance(a: Record, b: Record) -> float:

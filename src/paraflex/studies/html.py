@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from paraflex.display import facts, page, sentence, table
 from paraflex.results import summary
+from paraflex.results.metrics import HEADLINE, SPAN_WORDS, ErrorSpan
 
 if TYPE_CHECKING:
     from paraflex.studies.comparison import MethodComparison
@@ -28,23 +29,26 @@ def study_html(result: StudyResult) -> str:
     figures = summary(result.data, result.failed)
     motors = [str(name) for name in result.data["motor"].values]
     unit = result.data["torque"].attrs.get("units", "N m")
+    span = ErrorSpan(figures["error"])
     rows, why = [], []
     for name, mode in figures["modes"].items():
         if "message" in mode:
             why.append(sentence(f"{name}: {mode['message']}"))
         if "steps" not in mode:
-            rows.append((name, mode["status"], *[""] * (len(motors) + 5)))
+            rows.append((name, mode["status"], *[""] * (len(motors) + 7)))
             continue
         rows.append((
-            name, mode["status"], _millimetres(mode["tracking_rms"]), _millimetres(mode["residual_vibration"]),
+            name, mode["status"], _millimetres(mode[HEADLINE[span]]), _millimetres(mode["tracking_rms_after"]),
+            _millimetres(mode["drift_speed"]), _millimetres(mode["residual_vibration"]),
             *(mode["peak_torque"][motor] for motor in motors),
             mode["steps"], mode["newton_iterations"], mode["wall_time"],
         ))  # fmt: skip
     peaks = [f"peak {motor} [{unit}]" for motor in motors]
-    heads = ("mode", "status", "RMS tracking error [mm]", "residual vibration [mm]", *peaks, "steps",
-             "Newton iterations", "wall time [s]")  # fmt: skip
+    heads = ("mode", "status", f"RMS tracking error {SPAN_WORDS[span]} [mm]", "after the motion [mm]", "drift [mm/s]",
+             "residual vibration [mm]", *peaks, "steps", "Newton iterations", "wall time [s]")  # fmt: skip
     title = f"{figures['mechanism']}, {_modes_of(len(rows))}" + (", interrupted" if result.interrupted else "")
-    return page(title, table(heads, rows), *why)
+    part = [] if figures["part"] is None else [sentence(figures["part"]["message"])]
+    return page(title, *part, table(heads, rows), *why)
 
 
 def sweep_html(result: SweepResult) -> str:

@@ -15,6 +15,7 @@ from paraflex.errors import IntegrationError, NumericalError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import tracking_dataset
+from paraflex.results.metrics import ErrorSpan
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
 
 
@@ -69,6 +70,7 @@ def run_study(
     on_progress: Callable[[str, float], None] | None = None,
     workers: int | None = None,
     method: Simulator | None = None,
+    error: ErrorSpan | str = ErrorSpan.MOTION,
 ) -> StudyResult:
     """Simulate every mode; one that fails is reported and the others go on.
 
@@ -85,6 +87,8 @@ def run_study(
         Threads; as many as there are processors by default. The results do not depend on it.
     method : Simulator, optional
         `simulate` with the options by default.
+    error : ErrorSpan or str
+        Which tracking error ranks the modes: that of the "motion", or of the "whole" run, dwell included.
 
     Returns
     -------
@@ -127,5 +131,5 @@ def run_study(
     outcomes = {mode.name: future.result() for mode, future in zip(chosen, futures, strict=True)}
     runs = [outcome for outcome in outcomes.values() if isinstance(outcome, TrackingRun)]
     failed = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
-    data = tracking_dataset(runs, options=options, parameters=parameters) if runs else None
+    data = tracking_dataset(runs, options=options, parameters=parameters, error=error) if runs else None
     return StudyResult(data, failed, stop.is_set())

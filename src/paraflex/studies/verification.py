@@ -10,7 +10,7 @@ from functools import partial
 import xarray as xr
 
 from paraflex.elastodynamics import simulate_ked
-from paraflex.engines import ENGINES, check_engine
+from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
 from paraflex.errors import InputError, IntegrationError, NumericalError, as_enum, suggestion
@@ -25,6 +25,7 @@ from paraflex.mechanism import (
     proportional_segments,
 )
 from paraflex.results import tracking_dataset
+from paraflex.results.metrics import ErrorSpan
 from paraflex.results.record import Record, record
 from paraflex.simulate import TrackingTask, simulate
 
@@ -124,7 +125,7 @@ class Verification:
 
         return verification_html(self)
 
-    def dataset(self, *, parameters: dict | None = None) -> xr.Dataset:
+    def dataset(self, *, parameters: dict | None = None, error: ErrorSpan | str = ErrorSpan.MOTION) -> xr.Dataset:
         """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
 
         Modes that every model began; where there is none, models that every mode begun has.
@@ -139,7 +140,8 @@ class Verification:
         if not names:
             raise InputError("no run to keep", field="models", remedy="see why the runs failed")
         parts = [
-            tracking_dataset([records[name] for records in kept.values()], parameters=parameters) for name in names
+            tracking_dataset([records[name] for records in kept.values()], parameters=parameters, error=error)
+            for name in names
         ]
         methods = [part.attrs.pop("method") for part in parts]
         data = xr.concat(parts, xr.Variable("model", names), combine_attrs="drop_conflicts", join="exact")
@@ -188,6 +190,8 @@ def verify(
     models = list(dict.fromkeys(models))
     for name in models:
         check_model(name, task.mechanism)
+        if name in ENGINES:
+            check_dwell(name, task)
     chosen = list(dict.fromkeys(task.mode(mode) for mode in modes))
     plan = [
         (mode, name, level)

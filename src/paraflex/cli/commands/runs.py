@@ -75,6 +75,10 @@ def run(
     balanced: Annotated[
         bool, typer.Option("--balanced", help="Start from static equilibrium, active motors held; else undeformed.")
     ] = False,
+    after: Annotated[
+        str | None,
+        typer.Option(metavar="free|hold", help="The active motors after the path: hold is by brakes. Default: free."),
+    ] = None,
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder for results and figures.")] = "results",
     report: ReportOption = True,
     json: Json = False,
@@ -115,6 +119,7 @@ def run(
         segments=segments,
         ked=ked,
         balanced=balanced,
+        after=after,
         report=report,
     )
     raise typer.Exit(run_command(request))

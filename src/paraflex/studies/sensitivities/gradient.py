@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import numbers_of, with_numbers
-from paraflex.errors import Moment, NumericalError
+from paraflex.errors import InputError, Moment, NumericalError
 from paraflex.integrators.solution import Solution
 from paraflex.integrators.variation import (
     Direction,
@@ -88,6 +88,11 @@ def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] |
     """See `metric_gradients`."""
     planned, options = plan_task(setting, task)
     check_differentiable(options)
+    if planned.holds:
+        raise InputError(
+            "derivatives do not go through the engagement of brakes", field="study.after", value=planned.after.value,
+            remedy='say after = "free", or a duration that ends with the path',
+        )  # fmt: skip
     sizes = [None] * len(setting.names) if sizes is None else sizes
     sizes = [size_of(setting, task, k, size) for k, size in enumerate(sizes)]
     changes = [Change(setting, task, planned, k, size) for k, size in enumerate(sizes)]
@@ -142,7 +147,9 @@ def _slopes(
         kinetic_energy=energy[:, 0], strain_energy=energy[:, 1], work=work + energy[:, 2] - energy[0, 2],
     )  # fmt: skip
     moved = TrackingRun(change.task, change.torques, change.condition, solution, run.method)
-    return part(smooth_values(smooth_traces(moved), here, setting.metrics))
+    values = smooth_values(smooth_traces(moved), here, setting.metrics)
+    # A metric without a value has no derivative either.
+    return np.where(np.isnan(np.real(values)), np.nan, part(values))
 
 
 def _stepped_energies(nominal: Given, motion: Motion, along: Motion, direction: Direction) -> Array:

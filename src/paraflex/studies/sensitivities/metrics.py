@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import InputError
-from paraflex.results.motion import point_motion, tip_deflection
+from paraflex.results.motion import point_motion
+from paraflex.results.outlines import deflections
 from paraflex.simulate import TrackingRun
 from paraflex.studies.sweeps.metrics import METRICS, Traces
 
@@ -25,7 +26,8 @@ def _largest(trace: Callable[[Traces], Array]) -> Smooth:
     """The largest of an array, where it is largest in the nominal run."""
 
     def value(moved: Traces, nominal: Traces) -> Any:
-        return trace(moved).flat[int(np.nanargmax(trace(nominal)))]
+        at_nominal = trace(nominal)
+        return trace(moved).flat[int(np.nanargmax(at_nominal))] if at_nominal.size else float("nan")
 
     return value
 
@@ -40,30 +42,24 @@ def _largest_magnitude(moved: Traces, nominal: Traces) -> Any:
     return _largest_magnitudes(moved, nominal)[int(np.argmax(np.max(np.abs(nominal.torque), axis=0)))]
 
 
-def _deflections(traces: Traces) -> Array:
-    """Magnitudes of all tips' displacements, (bodies, k)."""
-    system, q = traces.run.task.system, traces.run.solution.q
-    tips = [tip_deflection(system, body.name, q) for body in system.bodies if body.nf]
-    return np.array([_length(tip) for tip in tips])
-
-
 def _length(away: Array) -> Array:
-    """Of vectors, (k,), by their first two columns."""
+    """Of vectors (k, 2)."""
     return np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2)
 
 
 def _deflection(moved: Traces, nominal: Traces) -> Any:
-    tips = _deflections(nominal)
-    return _deflections(moved).flat[int(np.nanargmax(tips))] if np.any(np.isfinite(tips)) else 0.0
-
-
-def _residual_vibration(moved: Traces, nominal: Traces) -> Any:
-    """Over the samples after the motion of the nominal run."""
-    after = nominal.run.task.motion.t > nominal.run.task.path.duration
-    if not np.any(after):
+    """With the sign of the nominal run's."""
+    bent = _deflections(nominal)
+    if bent.size == 0:
+        return 0.0
+    if not np.any(np.isfinite(bent)):
         return float("nan")
-    places = moved.position[after]
-    return np.sqrt(np.mean(np.sum((places - places.mean(axis=0)) ** 2, axis=1)))
+    at = int(np.nanargmax(np.abs(bent)))
+    return np.sign(bent.flat[at]) * _deflections(moved).flat[at]
+
+
+def _deflections(traces: Traces) -> Array:
+    return deflections(traces.run.task.system, traces.run.solution.q)
 
 
 def _motor_energy(moved: Traces, nominal: Traces) -> Any:
@@ -87,9 +83,14 @@ def _as_it_is(name: str) -> Smooth:
 
 
 SMOOTH: Mapping[str, Smooth] = {
+    "tracking_rms_motion": _as_it_is("tracking_rms_motion"),
+    "tracking_max_motion": _largest(lambda x: x.distance[x.moving]),
+    "tracking_rms_after": _as_it_is("tracking_rms_after"),
+    "tracking_max_after": _largest(lambda x: x.distance[~x.moving]),
     "tracking_rms": _as_it_is("tracking_rms"),
     "tracking_max": _largest(lambda x: x.distance),
-    "residual_vibration": _residual_vibration,
+    "residual_vibration": _as_it_is("residual_vibration"),
+    "drift_speed": _as_it_is("drift_speed"),
     "deflection_max": _deflection,
     "peak_torque_max": _largest_magnitude,
     "rms_torque_norm": _as_it_is("rms_torque_norm"),

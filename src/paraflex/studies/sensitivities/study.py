@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -170,8 +170,9 @@ def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> Sensiti
     chosen = list(metrics) or table.metrics
     try:
         _check_names(chosen)
-        smooth = chosen or list(SMOOTH)
-        setting, parameters, _ = make_setting(table.model_copy(update={"metrics": smooth}), Path(file).parent)
+        setting, parameters, _ = make_setting(table.model_copy(update={"metrics": chosen}), Path(file).parent)
+        if not chosen:
+            setting = replace(setting, metrics=tuple(name for name in setting.metrics if name in SMOOTH))
         if not parameters:
             raise InputError(
                 "no parameters to differentiate by",

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import joint_coordinate
-from paraflex.results.motion import point_motion, tip_deflection
+from paraflex.results.metrics import drift_speed, during_motion, largest, rms, vibration
+from paraflex.results.motion import point_motion
+from paraflex.results.outlines import deflections
 from paraflex.simulate import TrackingRun
 
 Array = NDArray[np.float64]
@@ -37,6 +39,11 @@ class Traces:
     position: Array
     distance: Array
     torque: Array
+
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        """Which samples (k,) are of the motion along the path; the others are after it."""
+        return during_motion(self.run.solution.t, self.run.task.path.duration)
 
 
 @dataclass(frozen=True)
@@ -82,24 +89,20 @@ def make_traces(run: TrackingRun) -> Traces:
     assert effector is not None
     position = point_motion(task.system, effector.point, q, run.solution.v, run.solution.a).position
     away = position - task.motion.desired.position
-    return Traces(run, position, np.hypot(away[:, 0], away[:, 1]), run.torques.evaluate(task.motion.t))
+    return Traces(run, position, np.hypot(away[:, 0], away[:, 1]), run.applied)
 
 
-def _rms(values: Array) -> Array:
-    return np.sqrt(np.mean(values**2, axis=0))
-
-
-def _residual_vibration(traces: Traces) -> float:
-    after = traces.position[traces.run.task.motion.t > traces.run.task.path.duration]
-    if after.size == 0:
-        return float("nan")
-    return float(np.sqrt(np.mean(np.sum((after - after.mean(axis=0)) ** 2, axis=1))))
+def after_motion(traces: Traces) -> tuple[Array, Array]:
+    """Times (j,) of the samples after the motion [s], and where the end-effector is at them (j, 2) [m]."""
+    after = ~traces.moving
+    return traces.run.solution.t[after], traces.position[after]
 
 
 def _deflection(traces: Traces) -> float:
-    system, q = traces.run.task.system, traces.run.solution.q
-    tips = [tip_deflection(system, body.name, q) for body in system.bodies if body.nf]
-    return max((float(np.nanmax(np.hypot(tip[:, 0], tip[:, 1]), initial=0.0)) for tip in tips), default=0.0)
+    bent = np.abs(deflections(traces.run.task.system, traces.run.solution.q))
+    if bent.size == 0:
+        return 0.0
+    return float(np.nanmax(bent)) if np.isfinite(bent).any() else float("nan")
 
 
 def _motor_energy(traces: Traces) -> float:
@@ -113,14 +116,45 @@ def _motor_energy(traces: Traces) -> float:
 
 
 METRICS: Mapping[str, Metric] = {
+    "tracking_rms_motion": Metric(
+        "root mean square distance of the end-effector from its desired place during the motion",
+        "m",
+        lambda x: rms(x.distance[x.moving]),
+    ),
+    "tracking_max_motion": Metric(
+        "largest distance of the end-effector from its desired place during the motion",
+        "m",
+        lambda x: largest(x.distance[x.moving]),
+    ),
+    "tracking_rms_after": Metric(
+        "root mean square distance of the end-effector from its desired place after the motion",
+        "m",
+        lambda x: rms(x.distance[~x.moving]),
+    ),
+    "tracking_max_after": Metric(
+        "largest distance of the end-effector from its desired place after the motion",
+        "m",
+        lambda x: largest(x.distance[~x.moving]),
+    ),
     "tracking_rms": Metric(
-        "root mean square distance of the end-effector from its path", "m", lambda x: _rms(x.distance)
+        "root mean square distance of the end-effector from its desired place over the whole run, dwell included",
+        "m",
+        lambda x: rms(x.distance),
     ),
-    "tracking_max": Metric("largest such distance", "m", lambda x: np.max(x.distance)),
+    "tracking_max": Metric(
+        "largest distance of the end-effector from its desired place over the whole run",
+        "m",
+        lambda x: largest(x.distance),
+    ),
     "residual_vibration": Metric(
-        "root mean square distance of the end-effector from its mean after the motion", "m", _residual_vibration
+        "root mean square distance of the end-effector from its drift after the motion",
+        "m",
+        lambda x: vibration(*after_motion(x)),
     ),
-    "deflection_max": Metric("largest tip displacement of any body in its frame", "m", _deflection),
+    "drift_speed": Metric(
+        "mean speed of the end-effector's drift after the motion", "m/s", lambda x: drift_speed(*after_motion(x))
+    ),
+    "deflection_max": Metric("largest deflection of any body from its chord", "m", _deflection),
     "peak_torque_max": Metric("largest magnitude of any motor's torque", "N m", lambda x: np.max(np.abs(x.torque))),
     "rms_torque_norm": Metric(
         "root mean square of the torques' Euclidean norm",
@@ -130,7 +164,7 @@ METRICS: Mapping[str, Metric] = {
     "peak_torque": Metric(
         "largest magnitude of each motor's torque", "N m", lambda x: np.max(np.abs(x.torque), axis=0), per_motor=True
     ),
-    "rms_torque": Metric("root mean square of each motor's torque", "N m", lambda x: _rms(x.torque), per_motor=True),
+    "rms_torque": Metric("root mean square of each motor's torque", "N m", lambda x: rms(x.torque), per_motor=True),
     "work": Metric("work done on the mechanism until the end", "J", lambda x: x.run.solution.work[-1]),
     "motor_energy": Metric("integral of the magnitudes of all motors' powers, from the samples", "J", _motor_energy),
     "strain_energy_max": Metric("largest strain energy", "J", lambda x: np.max(x.run.solution.strain_energy)),

@@ -116,6 +116,7 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
         samples=model.study.samples if setting.samples is None else setting.samples,
         assembly=setting.assembly or model.study.assembly,
         orientation=model.study.orientation,
+        after=model.study.after,
     )
     return planned, options
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.metadata import version
@@ -20,6 +20,7 @@ from paraflex.files.generators import is_generated
 from paraflex.files.read import read_toml, validate
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import parse_mode
+from paraflex.results.metrics import HEADLINE, ErrorSpan, parse_error_span
 from paraflex.studies.sweeps.metrics import METRICS
 from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
 from paraflex.studies.sweeps.samples import Varied, check_varied, designs
@@ -241,7 +242,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
         samples=table.samples,
         assembly=table.assembly,
         integration=_integration(table),
-        metrics=_metrics(table.metrics),
+        metrics=metrics_of(table.metrics, model.study.error),
         trajectories=table.trajectories,
         versions=versions(),
     )
@@ -325,11 +326,18 @@ def _modes(model: Model, names: list[str]) -> tuple[str, ...]:
         raise InputError(error.problem, field="modes", value=error.value, remedy=error.remedy) from None
 
 
-def _metrics(names: list[str]) -> tuple[str, ...]:
+def metrics_of(names: Sequence[str], error: ErrorSpan | str) -> tuple[str, ...]:
+    """Metrics in the order asked for; all where none is, that error first.
+
+    Raises
+    ------
+    InputError
+        An unknown name.
+    """
     for name in names:
         if name not in METRICS:
             raise InputError("unknown metric", field="metrics", value=name, remedy=suggestion(name, list(METRICS)))
-    return tuple(name for name in METRICS if not names or name in names)
+    return tuple(dict.fromkeys(names or [HEADLINE[parse_error_span(error)], *METRICS]))
 
 
 def _integration(table: SweepTable) -> dict[str, Any]:
