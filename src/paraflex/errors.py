@@ -25,6 +25,7 @@ __all__ = [
     "SingularActuationError",
     "StiffnessWarning",
     "UnreachablePathError",
+    "ValidityWarning",
     "suggestion",
 ]
 
@@ -161,3 +162,7 @@ class ConstraintDriftError(IntegrationError):
 
 class StiffnessWarning(UserWarning):
     """An explicit method will take very many steps, by stability alone."""
+
+
+class ValidityWarning(UserWarning):
+    """A run has gone beyond what its model can describe: see `validity`."""

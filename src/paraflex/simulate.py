@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,12 @@ from numpy.typing import NDArray
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
 from paraflex.display import shown
 from paraflex.dynamics import State, System, build_system, pack_signals, static_equilibrium
+from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.kinematics import Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
+from paraflex.validity import Following, Validity, assess, warn
 
 # Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
 _SAME_TIME = 1e-9
@@ -157,6 +160,23 @@ class TrackingRun:
         """The actuation mode."""
         return self.torques.mode
 
+    @cached_property
+    def validity(self) -> Validity | None:
+        """How far the run is within what its model can describe; None of rigid bodies and finite segments."""
+        return assess(self.task.system, self.solution, self._following())
+
+    def _following(self) -> Following | None:
+        """Deviation from the path and condition number, where torques drive the mechanism along it."""
+        task, solution = self.task, self.solution
+        # The state at an event is a sample more than the task's times.
+        k = solution.t.size - bool(solution.event)
+        effector = task.mechanism.end_effector
+        if effector is None or self.holding is not None or not k:
+            return None
+        place = marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0]
+        squares = np.sum((place - task.motion.desired.position[:k]) ** 2, axis=1)
+        return Following(float(np.sqrt(np.mean(squares))), float(np.max(self.condition[:k])))
+
     def _repr_html_(self) -> str:
         """In notebooks."""
         return shown(self)
@@ -219,6 +239,7 @@ def simulate(
     method: str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
+    warning: bool = True,
 ) -> TrackingRun:
     """Drive the flexible mechanism with the torques of a mode.
 
@@ -232,6 +253,8 @@ def simulate(
     options : IntegrationOptions, optional
     on_progress : callable, optional
         Told the time reached [s].
+    warning : bool
+        Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
 
     Returns
     -------
@@ -258,7 +281,10 @@ def simulate(
     except IntegrationError as error:
         error.partial = TrackingRun(task, torques, condition, error.partial, title)
         raise
-    return TrackingRun(task, torques, condition, solution, title)
+    run = TrackingRun(task, torques, condition, solution, title)
+    if warning:
+        warn(run.validity, f"mode {torques.mode.name}: ")
+    return run
 
 
 def _in_place(system: System) -> dict[str, tuple[str, float]]:

@@ -25,7 +25,7 @@ from paraflex.cli.request import (
     results_folder,
     write_json,
 )
-from paraflex.cli.tables import events, failures, plain_console, study_table
+from paraflex.cli.tables import events, failures, plain_console, study_table, validity
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -88,6 +88,7 @@ def run_command(request: RunRequest) -> int:
     else:
         plain_console().print(study_table(figures, task, _model_name(request, mechanism)))
         events(plain_console(), figures)
+        validity(plain_console(), figures)
         console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
     failures(console, result)
     if result.interrupted:
@@ -103,7 +104,7 @@ def _method(request: RunRequest, options: IntegrationOptions) -> Simulator | Non
         return None
 
     def from_equilibrium(task: TrackingTask, mode: str | ActuationMode, *, on_progress=None) -> TrackingRun:
-        return simulate(task.balanced(mode), mode, options=options, on_progress=on_progress)
+        return simulate(task.balanced(mode), mode, options=options, on_progress=on_progress, warning=False)
 
     return from_equilibrium
 
@@ -209,7 +210,9 @@ def _simulate(
             progress.start_task(bars[name])
             progress.update(bars[name], completed=reached)
 
-        return run_study(task, modes, options=options, parameters=parameters, on_progress=report, method=method)
+        return run_study(
+            task, modes, options=options, parameters=parameters, on_progress=report, method=method, warning=False
+        )
 
 
 def _write(result: StudyResult, folder: Path, *, report: bool) -> None:

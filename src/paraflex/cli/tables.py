@@ -8,6 +8,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from paraflex.results.validity import validity_lines
+
 if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
     from paraflex.simulate import TrackingTask
@@ -57,6 +59,12 @@ def events(console: Console, figures: dict[str, Any]) -> None:
     for name, mode in figures["modes"].items():
         if mode["status"] == "stopped":
             console.print(f'mode "{name}": {mode["message"]}', soft_wrap=True)
+
+
+def validity(console: Console, figures: dict[str, Any]) -> None:
+    """Whether the model holds: of the worst mode, and which others are beyond."""
+    for line in validity_lines({name: mode.get("validity") for name, mode in figures["modes"].items()}):
+        console.print(line, soft_wrap=True)
 
 
 def failures(console: Console, result: StudyResult) -> None:

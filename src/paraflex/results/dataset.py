@@ -17,6 +17,8 @@ from paraflex.results.drawing import drawing_coordinates, drawing_variables
 from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
 from paraflex.results.record import FIGURES, Record, record
 from paraflex.results.storage import SCHEMA
+from paraflex.results.validity import UNITS as VALIDITY_UNITS
+from paraflex.results.validity import validity_variables
 from paraflex.simulate import TrackingRun
 
 UNITS = {
@@ -62,7 +64,7 @@ UNITS = {
     "energy_balance_max": ("largest imbalance of energy and work", "J"),
     "event": ("event that stopped the run", "1"),
     "event_time": ("when it was stopped", "s"),
-}
+} | VALIDITY_UNITS
 
 
 def tracking_dataset(
@@ -114,6 +116,8 @@ def tracking_dataset(
         data[f"{name}_desired"] = (("mode", "time", dim), np.broadcast_to(values, (len(runs), *values.shape)).copy())
     for name in FIGURES:
         data[name] = (("mode",), np.array([one.figures[name] for one in records]))
+    for name, values in validity_variables([one.validity for one in records]).items():
+        data[name] = (("mode",), values)
     out = xr.Dataset(
         data,
         coords={

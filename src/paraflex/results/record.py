@@ -15,6 +15,7 @@ from paraflex.results.drawing import Drawing, drawing, system_drawing
 from paraflex.results.motion import PointMotion, joint_forces, marker_motion, point_motion, tip_deflection
 from paraflex.results.outlines import outline_motion, outlines, segment_motion
 from paraflex.simulate import TrackingRun, TrackingTask
+from paraflex.validity import Validity
 
 # How a run went: names of the figures every record has.
 FIGURES = (
@@ -71,6 +72,8 @@ class Record:
         Deformed shapes of all bodies.
     figures : mapping
         The numbers and words named in FIGURES.
+    validity : Validity, optional
+        How far it is within what its model can describe.
     """
 
     task: TrackingTask
@@ -92,6 +95,7 @@ class Record:
     work: NDArray[np.float64]
     drawing: Drawing
     figures: Mapping[str, Any] = field(default_factory=dict)
+    validity: Validity | None = None
 
 
 def record(run: TrackingRun) -> Record:
@@ -131,6 +135,7 @@ def record(run: TrackingRun) -> Record:
         work=solution.work[:k],
         drawing=_drawing(task, parts, q),
         figures={name: getattr(solution, name) for name in FIGURES},
+        validity=run.validity,
     )
 
 

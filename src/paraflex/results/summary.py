@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from paraflex.results.validity import validity_summary
+
 _COUNTS = ("steps", "rejected", "newton_iterations", "factorisations")
 _FIGURES = (
     "tracking_rms",
@@ -34,7 +36,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     -------
     dict
         `modes.<mode>` with tracking_rms, peak_torque and rms_torque per motor, end_effector_final and the solver's
-        figures; `parameters`; `version`. A figure that was not reached is None.
+        figures, and validity (None of rigid bodies); `parameters`; `version`. A figure that was not reached is None.
     """
     modes: dict[str, Any] = {}
     for name in data["mode"].values:
@@ -50,6 +52,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
             figures[key] = {str(m): finite_or_none(run[key].sel(motor=m).item()) for m in run["motor"].values}
         figures["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
         figures["actuation_condition_max"] = finite_or_none(np.max(run["actuation_condition"].values))
+        figures["validity"] = validity_summary(run)
         modes[str(name)] = figures
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}

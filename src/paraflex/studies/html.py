@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from paraflex.display import facts, page, sentence, table
 from paraflex.results import summary
+from paraflex.results.validity import validity_lines
 
 if TYPE_CHECKING:
     from paraflex.studies.comparison import MethodComparison
@@ -44,6 +45,7 @@ def study_html(result: StudyResult) -> str:
     heads = ("mode", "status", "RMS tracking error [mm]", "residual vibration [mm]", *peaks, "steps",
              "Newton iterations", "wall time [s]")  # fmt: skip
     title = f"{figures['mechanism']}, {_modes_of(len(rows))}" + (", interrupted" if result.interrupted else "")
+    why += map(sentence, validity_lines({name: mode.get("validity") for name, mode in figures["modes"].items()}))
     return page(title, table(heads, rows), *why)
 
 

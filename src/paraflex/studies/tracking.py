@@ -16,6 +16,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import tracking_dataset
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
+from paraflex.validity import warn
 
 
 class Simulator(Protocol):
@@ -69,6 +70,7 @@ def run_study(
     on_progress: Callable[[str, float], None] | None = None,
     workers: int | None = None,
     method: Simulator | None = None,
+    warning: bool = True,
 ) -> StudyResult:
     """Simulate every mode; one that fails is reported and the others go on.
 
@@ -85,6 +87,8 @@ def run_study(
         Threads; as many as there are processors by default. The results do not depend on it.
     method : Simulator, optional
         `simulate` with the options by default.
+    warning : bool
+        Whether runs beyond what their model can describe issue a `ValidityWarning` each.
 
     Returns
     -------
@@ -110,7 +114,7 @@ def run_study(
         try:
             if method is not None:
                 return method(task, mode, on_progress=report)
-            return simulate(task, mode, options=options, on_progress=report)
+            return simulate(task, mode, options=options, on_progress=report, warning=False)
         except IntegrationError as error:
             return error.partial
         except NumericalError as error:
@@ -126,6 +130,9 @@ def run_study(
             stop.set()
     outcomes = {mode.name: future.result() for mode, future in zip(chosen, futures, strict=True)}
     runs = [outcome for outcome in outcomes.values() if isinstance(outcome, TrackingRun)]
+    if warning:
+        for run_of_mode in runs:
+            warn(run_of_mode.validity, f"mode {run_of_mode.mode.name}: ")
     failed = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
     data = tracking_dataset(runs, options=options, parameters=parameters) if runs else None
     return StudyResult(data, failed, stop.is_set())

@@ -20,7 +20,7 @@ from paraflex.files.generators import is_generated
 from paraflex.files.read import read_toml, validate
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import parse_mode
-from paraflex.studies.sweeps.metrics import METRICS
+from paraflex.studies.sweeps.metrics import METRICS, VALIDITY
 from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
 from paraflex.studies.sweeps.samples import Varied, check_varied, designs
 from paraflex.studies.sweeps.schema import SweepTable, VaryTable
@@ -329,7 +329,7 @@ def _metrics(names: list[str]) -> tuple[str, ...]:
     for name in names:
         if name not in METRICS:
             raise InputError("unknown metric", field="metrics", value=name, remedy=suggestion(name, list(METRICS)))
-    return tuple(name for name in METRICS if not names or name in names)
+    return tuple(name for name in METRICS if not names or name in (*names, VALIDITY))
 
 
 def _integration(table: SweepTable) -> dict[str, Any]:
