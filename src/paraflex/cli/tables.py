@@ -8,8 +8,6 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from paraflex.results.validity import validity_lines
-
 if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
     from paraflex.simulate import TrackingTask
@@ -63,6 +61,8 @@ def events(console: Console, figures: dict[str, Any]) -> None:
 
 def validity(console: Console, figures: dict[str, Any]) -> None:
     """Whether the model holds: of the worst mode, and which others are beyond."""
+    from paraflex.results.validity import validity_lines  # with xarray, which descriptions of mechanisms do without
+
     for line in validity_lines({name: mode.get("validity") for name, mode in figures["modes"].items()}):
         console.print(line, soft_wrap=True)
 

@@ -15,6 +15,7 @@ from paraflex.integrators import Solution
 from paraflex.validity.bending import bending_of
 from paraflex.validity.indicators import (
     AXIAL_LIMIT,
+    DRIVEN_AXIAL_LIMIT,
     FOURTH_ORDER_LIMIT,
     SHORTENING_LIMIT,
     SLOPE_LIMIT,
@@ -27,6 +28,7 @@ from paraflex.validity.indicators import (
 
 __all__ = [
     "AXIAL_LIMIT",
+    "DRIVEN_AXIAL_LIMIT",
     "FOURTH_ORDER_LIMIT",
     "SHORTENING_LIMIT",
     "SLOPE_LIMIT",

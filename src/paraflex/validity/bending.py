@@ -57,21 +57,23 @@ def bending_of(system: System, name: str, solution: Solution) -> Bending:
     """How a flexible body bent over a run of one or more samples."""
     body, described = system.body(name), system.mechanism.body(name)
     u, line = solution.q[:, body.flexible], _line(body, described)
-    beam = isinstance(described, FlexibleBeam)
-    tangent = isinstance(described, FlexibleBeam) and described.reference is ReferenceCondition.CANTILEVER
+    given = not isinstance(described, FlexibleBeam)
+    tangent = not given and described.reference is ReferenceCondition.CANTILEVER
     slopes = u @ line.slopes.T
-    slope = np.max(np.abs(slopes), axis=1, initial=0.0)
+    # Slopes are largest at ends more often than not, and Gauss points stop short of them.
+    ends = u @ (body.shape.slopes @ body.integrals.D).T
+    slope = np.maximum(np.max(np.abs(slopes), axis=1, initial=0.0), np.max(np.abs(ends), axis=1, initial=0.0))
     shortening = axial = np.zeros(solution.t.size)
     if line.weights.size:
         shortening = 0.5 * slopes**2 @ line.weights
         axial = _axial_force(system, body, line, solution) / _buckling_load(body, line)
-    return Bending(body.name, body.points is None, not beam, tangent, slope, shortening, axial)
+    return Bending(body.name, body.points is None, given, tangent, slope, shortening, axial)
 
 
 class _Line(NamedTuple):
     """Stations along a body: weights of an integral over its length [m], slopes and strains per coordinate, E A [N].
 
-    Of a modal body there are slopes at its points alone.
+    Of a modal body there are none.
     """
 
     weights: Array
@@ -102,7 +104,7 @@ def _line(body: BodyCoordinates, described: Body) -> _Line:
         stiffness = span_properties(described.section, described.material).axial_stiffness
         return _Line(weights, slopes, strains, np.full(x.size, stiffness))
     none = np.zeros(0)
-    return _Line(none, body.shape.slopes @ D, np.zeros((0, body.nf)), none)
+    return _Line(none, np.zeros((0, body.nf)), np.zeros((0, body.nf)), none)
 
 
 def _buckling_load(body: BodyCoordinates, line: _Line) -> float:
