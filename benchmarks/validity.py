@@ -1,6 +1,7 @@
 """Do the validity indicators tell when a model does not hold? Each against the error that it is to tell of.
 
     python benchmarks/validity.py [--skip-engine]
+    python benchmarks/validity.py --page     # tables of docs/validity.md from benchmarks/measured/validity.json
 
 Three parts, a few minutes: beams bent statically against the exact elastica; the library's mechanisms with every path
 and mode in linear geometry, in both frames, against second order; RAParM-I in second order against Exudyn's exact
@@ -10,13 +11,17 @@ beams. The limits in `paraflex/validity/indicators.py` come from here.
 from __future__ import annotations
 
 import argparse
+import json
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import single_thread, table, write_json
+from common import markdown, single_thread, table, write_json
+from cost_model import write_page
 from scipy.integrate import solve_bvp
+from scipy.stats import spearmanr
 
 import paraflex as pf
 from paraflex.cli.motion import start_of
@@ -48,8 +53,13 @@ from paraflex.results.drawing import system_drawing
 from paraflex.simulate import plan_tracking, simulate
 from paraflex.validity import FOURTH_ORDER_LIMIT, fourth_order
 
+ROOT = Path(__file__).parents[1]
+MEASURED, PAGE = ROOT / "benchmarks" / "measured" / "validity.json", ROOT / "docs" / "validity.md"
+
 OPTIONS = IntegrationOptions(method="esdirk5", tolerance=2e-6)
 FRAMES = (ReferenceCondition.CANTILEVER, ReferenceCondition.PINNED)
+# Static cases are shown up to this slope [rad].
+_STEEPEST = 0.4
 # A linear run is off if its path is further than this from that of second order, as a share of the deviation.
 OFF = 0.05
 TRACKED = ("raparm_i", "raparm_ii", "3rrr", "4rrr", "3prr", "five_bar")
@@ -288,11 +298,68 @@ def against_exact() -> Iterator[dict[str, Any]]:
             }
 
 
+def page(values: dict[str, Any]) -> str:
+    """The tables of the documentation."""
+    return "\n\n".join([_library(values), _rows(values["linear"]), _statics(values["statics"]), _exact(values)])
+
+
+def _library(values: dict[str, Any]) -> str:
+    found, rows = values["counts"], [row for row in values["linear"] if row["path"]]
+    error = [row["error"] for row in rows]
+    names = ("shortening", "slope", "axial_force")
+    ranks = [spearmanr(error, [row[name] for row in rows]).statistic for name in names]  # pyright: ignore[reportAttributeAccessIssue]
+    return (
+        f"Of {found['off'] + found['right']} linear runs {found['off']} are further off than 5 %; "
+        f"{found['off'] - found['off_without_warning']} of these warn. So do {found['right_with_warning']} of the "
+        f"other {found['right']}. Rank correlation with the error, runs along a path: shortening {ranks[0]:.2f}, slope "
+        f"{ranks[1]:.2f}, axial force {ranks[2]:.2f}."
+    )
+
+
+def _rows(rows: list[dict[str, Any]]) -> str:
+    """RAParM-I on the square, and what has no path."""
+    shown = [row for row in rows if (row["mechanism"] == "raparm_i" and row["path"] == "square") or not row["path"]]
+    heads = ("Linear run", "Frame", "Off by", "Shortening", "Axial force", "Slope [rad]", "Warns")
+
+    def number(row: dict[str, Any], name: str) -> str:
+        # A run that diverged has no end.
+        return "–" if name not in row or row["error"] is None else f"{row[name]:.3f}"
+
+    return markdown(heads, [
+        (f"{row['mechanism']} {row['mode']}".rstrip(), row["frame"],
+         "diverges" if row["error"] is None else f"{100 * row['error']:.1f} %",
+         *(number(row, name) for name in ("shortening", "axial_force", "slope")), "yes" if row["warns"] else "no")
+        for row in shown
+    ])  # fmt: skip
+
+
+def _statics(rows: list[dict[str, Any]]) -> str:
+    heads = ("Second order, at rest", "Frame", "P/P_cr", "Slope [rad]", "Off by", "Indicator")
+    return markdown(heads, [
+        (row["case"], row["frame"], f"{row['compression']:g}", f"{row['slope']:.3f}", f"{100 * row['error']:.2f} %",
+         f"{100 * row['estimate']:.2f} %")
+        for row in rows if row["frame"] != "free" and row["slope"] < _STEEPEST
+    ])  # fmt: skip
+
+
+def _exact(values: dict[str, Any]) -> str:
+    heads = ("RAParM-I, second order", "Frame", "Off from exact beams by", "Tracking error", "Indicator")
+    return markdown(heads, [
+        (row["mode"], row["frame"], f"{100 * row['error']:.2f} %", f"{100 * row['tracking_error_change']:+.2f} %",
+         f"{100 * row['fourth_order']:.2f} %")
+        for row in values["second_order"]
+    ])  # fmt: skip
+
+
 def main() -> None:
     single_thread()
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--skip-engine", action="store_true")
-    skip = parser.parse_args().skip_engine
+    parser.add_argument("--page", action="store_true")
+    asked = parser.parse_args()
+    if asked.page:
+        write_page(page(json.loads(MEASURED.read_text(encoding="utf-8"))), PAGE)
+        return
     statics = list(static_cases())
     print(table(
         ("case", "frame", "N/N_cr", "slope [rad]", "error", "estimate"),
@@ -313,7 +380,7 @@ def main() -> None:
     ))  # fmt: skip
     linear = counts(rows)
     print(f"linear runs: {linear}")
-    exact = [] if skip else list(against_exact())
+    exact = [] if asked.skip_engine else list(against_exact())
     print(table(
         ("mode", "frame", "apart", "fourth order", "warns"),
         [(r["mode"], r["frame"], f"{100 * r['error']:.2f} %", f"{100 * r['fourth_order']:.2f} %",

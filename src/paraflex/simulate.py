@@ -125,10 +125,15 @@ class TrackingTask:
         return replace(self, start=static_equilibrium(self.system, self.start, joints))
 
     def simulate(
-        self, mode: str | ActuationMode, *, method: str | None = None, options: IntegrationOptions | None = None
+        self,
+        mode: str | ActuationMode,
+        *,
+        method: str | None = None,
+        options: IntegrationOptions | None = None,
+        warning: bool = True,
     ) -> TrackingRun:
         """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""
-        return simulate(self, mode, method=method, options=options)
+        return simulate(self, mode, method=method, options=options, warning=warning)
 
 
 @dataclass(frozen=True)

@@ -47,13 +47,10 @@ class Validity:
 
     Attributes
     ----------
-    model : str
-        "linear geometry" or "second-order geometry".
     indicators : tuple of Indicator
         One or more.
     """
 
-    model: str
     indicators: tuple[Indicator, ...]
 
     @property
@@ -76,8 +73,8 @@ class Validity:
         """One sentence: whether the model holds, by what, and what to do if it does not."""
         worst = self.worst
         if self.holds:
-            return f"{self.model} holds: {worst.text}"
-        return f"{self.model} does not hold: {worst.text}; {worst.remedy}"
+            return f"{worst.geometry} geometry holds: {worst.text}"
+        return f"{worst.geometry} geometry does not hold: {worst.text}; {worst.remedy}"
 
 
 def assess(system: System, solution: Solution, following: Following | None = None) -> Validity | None:
@@ -95,9 +92,7 @@ def assess(system: System, solution: Solution, following: Following | None = Non
     bodies = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
     linear, second = [one for one in bodies if one.linear], [one for one in bodies if not one.linear]
     indicators = [*of_linear(linear, solution.t, following), *of_second_order(second, solution.t)]
-    if not indicators:
-        return None
-    return Validity(f"{system.mechanism.geometry.value} geometry", tuple(indicators))
+    return Validity(tuple(indicators)) if indicators else None
 
 
 def warn(validity: Validity | None, whose: str = "") -> None:

@@ -11,6 +11,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from paraflex.mechanism import Geometry
 from paraflex.validity.bending import Array, Bending
 
 Number = TypeVar("Number", float, Array)
@@ -34,6 +35,8 @@ FOURTH_ORDER_LIMIT = 0.01
 _CURVATURE, _CHORD, _TANGENT = 1.0 / 3.0, 1.0 / 8.0, 0.3
 # A beam clamped at one end buckles at a quarter of the load that one hinged at both ends does.
 _CLAMPED = 0.25
+# Name of the one indicator of second order.
+_SECOND_ORDER = "fourth order"
 # A mean axial force so near the buckling load, or beyond, is counted as this fraction of it.
 _ALMOST = 0.99
 
@@ -65,6 +68,11 @@ class Indicator:
     time: float
     text: str
     remedy: str
+
+    @property
+    def geometry(self) -> str:
+        """What it is of: bars of assumed modes and modal bodies are linear in mechanisms of second order, too."""
+        return Geometry.SECOND_ORDER.value if self.name == _SECOND_ORDER else Geometry.LINEAR.value
 
     @property
     def ratio(self) -> float:
@@ -136,7 +144,7 @@ def of_second_order(bodies: Sequence[Bending], t: Array) -> list[Indicator]:
         f"{body.name} bends to a slope of {body.slope[k]:.2g} rad at t = {t[k]:.3g} s; terms of fourth order, which "
         f"are left out, are about {100.0 * value:.2g} % of its deflection (limit {100.0 * FOURTH_ORDER_LIMIT:g} %)"
     )
-    return [Indicator("fourth order", value, FOURTH_ORDER_LIMIT, body.name, float(t[k]), text, _remedy(body))]
+    return [Indicator(_SECOND_ORDER, value, FOURTH_ORDER_LIMIT, body.name, float(t[k]), text, _remedy(body))]
 
 
 def fourth_order(slope: Number, compression: float, *, tangent: bool) -> Number:
