@@ -38,10 +38,10 @@ class Bending(NamedTuple):
     slope : (k,) array
         Largest along it, in its frame [rad].
     shortening : (k,) array
-        1/2 int slope^2 dx [m]; zero where that is not known.
+        1/2 int slope^2 dx [m]; NaN of a modal body.
     axial : (k,) array
         Axial force where it is largest, over the buckling load of the body as its frame holds it; positive in
-        tension. Zero where that is not known.
+        tension; NaN of a modal body.
     """
 
     name: str
@@ -63,7 +63,7 @@ def bending_of(system: System, name: str, solution: Solution) -> Bending:
     # Slopes are largest at ends more often than not, and Gauss points stop short of them.
     ends = u @ (body.shape.slopes @ body.integrals.D).T
     slope = np.maximum(np.max(np.abs(slopes), axis=1, initial=0.0), np.max(np.abs(ends), axis=1, initial=0.0))
-    shortening = axial = np.zeros(solution.t.size)
+    shortening = axial = np.full(solution.t.size, np.nan)
     if line.weights.size:
         shortening = 0.5 * slopes**2 @ line.weights
         axial = _axial_force(system, body, line, solution) / _buckling_load(body, line)

@@ -99,10 +99,13 @@ def of_linear(bodies: Sequence[Bending], t: Array, following: Following | None) 
     """Of the bodies of linear geometry."""
     if not bodies:
         return []
-    limit = AXIAL_LIMIT if following is None else DRIVEN_AXIAL_LIMIT
-    out = [_axial_force(bodies, t, limit), _slope(bodies, t)]
-    if following is not None and following.deviation > 0.0:
-        out.append(_shortening(bodies, t, following))
+    out = [_slope(bodies, t)]
+    # Of modal bodies there is no more to say.
+    beams = [body for body in bodies if not np.isnan(body.axial).any()]
+    if beams:
+        out.append(_axial_force(beams, t, AXIAL_LIMIT if following is None else DRIVEN_AXIAL_LIMIT))
+    if beams and following is not None and following.deviation > 0.0:
+        out.append(_shortening(beams, t, following))
     return out
 
 
