@@ -13,7 +13,7 @@ DOCS = ROOT / "docs"
 
 @pytest.mark.parametrize(
     ("page", "least"),
-    [("tutorial.md", 8), ("first-mechanism.md", 7), ("modes.md", 3), ("index.md", 2)],
+    [("tutorial.md", 8), ("first-mechanism.md", 7), ("modes.md", 3), ("index.md", 2), ("validity.md", 1)],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):
     assert run_page(DOCS / page, tmp_path, monkeypatch) >= least

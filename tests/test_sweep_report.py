@@ -138,7 +138,7 @@ def test_charts_of_all_designs_offer_every_parameter_and_metric(page):
     chart = page["survey"][0]["charts"][0]
     names = [[page["designs"]["columns"][k]["identity"] for k in picker["columns"]] for picker in chart["pickers"]]
     assert names[1] == ["thickness", "end"]
-    assert names[0] == ["tracking_rms", "deflection_max", "peak_torque_max", "total_mass", "steps"]
+    assert names[0] == ["tracking_rms", "deflection_max", "peak_torque_max", "total_mass", "validity", "steps"]
 
 
 def test_the_best_runs_are_made_again_and_move(finished, page, html):

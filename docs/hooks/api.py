@@ -18,6 +18,7 @@ PACKAGES = (
     "actuation",
     "simulate",
     "motion",
+    "validity",
     "elastodynamics",
     "integrators",
     "dynamics",

@@ -13,7 +13,7 @@ from paraflex.cache_folder import ensure_cache_folder
 
 if TYPE_CHECKING:
     from paraflex import plots
-    from paraflex.errors import InputError, NumericalError, ParaflexError, StiffnessWarning
+    from paraflex.errors import InputError, NumericalError, ParaflexError, StiffnessWarning, ValidityWarning
     from paraflex.files import Model, library_names, load, load_path
     from paraflex.integrators import METHODS, DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
@@ -50,6 +50,7 @@ _HOME = {
     "Polygon": "kinematics",
     "SingularDistance": "integrators",
     "StiffnessWarning": "errors",
+    "ValidityWarning": "errors",
     "chain_of_segments": "mechanism",
     "four_bars_in_a_row": "mechanism",
     "identify": "studies",
@@ -91,6 +92,7 @@ __all__ = [
     "Polygon",
     "SingularDistance",
     "StiffnessWarning",
+    "ValidityWarning",
     "chain_of_segments",
     "four_bars_in_a_row",
     "identify",

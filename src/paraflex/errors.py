@@ -29,6 +29,7 @@ __all__ = [
     "SingularActuationError",
     "StiffnessWarning",
     "UnreachablePathError",
+    "ValidityWarning",
     "as_enum",
     "suggestion",
 ]
@@ -182,3 +183,7 @@ class ConstraintDriftError(IntegrationError):
 
 class StiffnessWarning(UserWarning):
     """An explicit method will take very many steps, by stability alone."""
+
+
+class ValidityWarning(UserWarning):
+    """A run has gone beyond what its model can describe: see `validity`."""

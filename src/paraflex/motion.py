@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from paraflex.dynamics import State, System, build_system, consistent_state, con
 from paraflex.errors import InputError, IntegrationError, suggestion
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.mechanism import Mechanism
+from paraflex.validity import Validity, assess, warn
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,11 @@ class MotionRun:
     torques: Mapping[str, float]
     solution: Solution
 
+    @cached_property
+    def validity(self) -> Validity | None:
+        """How far the run is within what its model can describe; None of rigid bodies."""
+        return assess(self.system, self.solution)
+
     def _repr_html_(self) -> str:
         """In notebooks."""
         return shown(self)
@@ -50,6 +57,7 @@ def simulate_motion(
     method: str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
+    warning: bool = True,
 ) -> MotionRun:
     """Integrate a mechanism under what acts on it.
 
@@ -71,6 +79,8 @@ def simulate_motion(
     options : IntegrationOptions, optional
     on_progress : callable, optional
         Told the time reached [s].
+    warning : bool
+        Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
 
     Raises
     ------
@@ -105,4 +115,7 @@ def simulate_motion(
     except IntegrationError as error:
         error.partial = MotionRun(system, times, values, error.partial)
         raise
-    return MotionRun(system, solution.t if solution.event else times, values, solution)
+    run = MotionRun(system, solution.t if solution.event else times, values, solution)
+    if warning:
+        warn(run.validity)
+    return run

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,12 @@ from paraflex.dynamics import (
     pack_signals,
     static_equilibrium,
 )
+from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError, suggestion
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.kinematics import Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
+from paraflex.validity import Following, Validity, assess, warn
 
 # Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
 _SAME_TIME = 1e-9
@@ -177,9 +180,10 @@ class TrackingTask:
         method: str | None = None,
         options: IntegrationOptions | None = None,
         after: After | str | None = None,
+        warning: bool = True,
     ) -> TrackingRun:
         """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""
-        return simulate(self, mode, method=method, options=options, after=after)
+        return simulate(self, mode, method=method, options=options, after=after, warning=warning)
 
 
 @dataclass(frozen=True)
@@ -215,6 +219,23 @@ class TrackingRun:
     def applied(self) -> NDArray[np.float64]:
         """Torques of all motors, at every sample time of the task, or at the k reached where they were held [N m]."""
         return self.torques.evaluate(self.task.motion.t) if self.holding is None else self.holding
+
+    @cached_property
+    def validity(self) -> Validity | None:
+        """How far the run is within what its model can describe; None of rigid bodies and finite segments."""
+        return assess(self.task.system, self.solution, self._following())
+
+    def _following(self) -> Following | None:
+        """Deviation from the path and condition number, where torques drive the mechanism along it."""
+        task, solution = self.task, self.solution
+        # The state at an event is a sample more than the task's times.
+        k = solution.t.size - bool(solution.event)
+        effector = task.mechanism.end_effector
+        if effector is None or (self.holding is not None and not task.holds) or not k:
+            return None
+        place = marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0]
+        squares = np.sum((place - task.motion.desired.position[:k]) ** 2, axis=1)
+        return Following(float(np.sqrt(np.mean(squares))), float(np.max(self.condition[:k])))
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -283,6 +304,7 @@ def simulate(
     options: IntegrationOptions | None = None,
     after: After | str | None = None,
     on_progress: Callable[[float], None] | None = None,
+    warning: bool = True,
 ) -> TrackingRun:
     """Drive the flexible mechanism with the torques of a mode.
 
@@ -299,6 +321,8 @@ def simulate(
         active motors are locked where they are when the path ends: see `dynamics.brake`.
     on_progress : callable, optional
         Told the time reached [s].
+    warning : bool
+        Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
 
     Returns
     -------
@@ -319,13 +343,17 @@ def simulate(
     condition = actuation_condition(task.effort, torques.mode)
     try:
         if task.holds:
-            return _drive_and_hold(task, torques, condition, options, on_progress)
-        solution = _drive(task, torques, task.motion.t, options, on_progress)
+            run = _drive_and_hold(task, torques, condition, options, on_progress)
+        else:
+            solution = _drive(task, torques, task.motion.t, options, on_progress)
+            run = TrackingRun(task, torques, condition, solution, title)
     except IntegrationError as error:
         if not isinstance(error.partial, TrackingRun):
             error.partial = TrackingRun(task, torques, condition, error.partial, title)
         raise
-    return TrackingRun(task, torques, condition, solution, title)
+    if warning:
+        warn(run.validity, f"mode {torques.mode.name}: ")
+    return run
 
 
 def _drive(

@@ -30,6 +30,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary, save_results
+from paraflex.results.validity import validity_lines
 
 # Singular positions told one by one.
 _NAMED = 4
@@ -113,6 +114,7 @@ def _simulate(
             start=start,
             options=options,
             on_progress=report,
+            warning=False,
         )
     except IntegrationError as error:
         return error.partial
@@ -168,6 +170,8 @@ def _report(figures: dict, data: xr.Dataset) -> None:
         f"largest violation of constraints {figures['constraint_position_max']:.1e} m, "
         f"imbalance of energy {figures['energy_balance_max']:.1e} J"
     )
+    for line in validity_lines({"": figures["validity"]}):
+        out.print(line, soft_wrap=True)
 
 
 def _write(data: xr.Dataset, figures: dict, folder: Path, *, report: bool) -> None:

@@ -26,7 +26,7 @@ from paraflex.cli.request import (
     with_frames,
     write_json,
 )
-from paraflex.cli.tables import failures, plain_console, print_study
+from paraflex.cli.tables import failures, plain_console, print_study, validity
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -90,6 +90,7 @@ def run_command(request: RunRequest) -> int:
         print(json.dumps(figures, indent=2))
     else:
         print_study(plain_console(), figures, task, _model_name(request, mechanism))
+        validity(plain_console(), figures)
         console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
     failures(console, result)
     if result.interrupted:
@@ -105,7 +106,7 @@ def _method(request: RunRequest, options: IntegrationOptions) -> Simulator | Non
         return None
 
     def from_equilibrium(task: TrackingTask, mode: str | ActuationMode, *, on_progress=None) -> TrackingRun:
-        return simulate(task.balanced(mode), mode, options=options, on_progress=on_progress)
+        return simulate(task.balanced(mode), mode, options=options, on_progress=on_progress, warning=False)
 
     return from_equilibrium
 
@@ -225,7 +226,14 @@ def _simulate(
             progress.update(bars[name], completed=reached)
 
         return run_study(
-            task, modes, options=options, parameters=parameters, on_progress=report, method=method, error=error
+            task,
+            modes,
+            options=options,
+            parameters=parameters,
+            on_progress=report,
+            method=method,
+            error=error,
+            warning=False,
         )
 
 

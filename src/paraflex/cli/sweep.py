@@ -15,6 +15,7 @@ from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.studies import SweepProgress, SweepResult, load_sweep, sweep
 from paraflex.studies.sweeps import SweepStudy
+from paraflex.studies.sweeps.metrics import beyond_limits
 
 REPORT = "report.html"
 
@@ -93,6 +94,8 @@ def _write_report(console: Console, folder: Path) -> bool:
 def _report(console: Console, result: SweepResult) -> None:
     statuses = ", ".join(f"{number} {status}" for status, number in sorted(result.counts.items()))
     plain_console().print(f"{result.done} of {result.total} runs: {statuses or 'none yet'}")
+    if result.beyond:
+        plain_console().print(f"warning: {beyond_limits(result.beyond)}", soft_wrap=True)
     if result.fresh:
         console.print(f"{result.fresh} of them in {result.seconds:.1f} s now, {_rate(result)} runs/s")
     if result.finished:
@@ -108,6 +111,7 @@ def _figures(result: SweepResult) -> dict:
         "runs": result.total,
         "done": result.done,
         "status": dict(result.counts),
+        "beyond_validity": result.beyond,
         "fresh": result.fresh,
         "seconds": result.seconds,
         "interrupted": result.interrupted,

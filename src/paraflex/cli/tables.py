@@ -84,6 +84,14 @@ def _table(title: str) -> Table:
     return table
 
 
+def validity(console: Console, figures: dict[str, Any]) -> None:
+    """Whether the model holds: of the worst mode, and which others are beyond."""
+    from paraflex.results.validity import validity_lines  # with xarray, which descriptions of mechanisms do without
+
+    for line in validity_lines({name: mode.get("validity") for name, mode in figures["modes"].items()}):
+        console.print(line, soft_wrap=True)
+
+
 def failures(console: Console, result: StudyResult) -> None:
     """One line for each mode that did not run to its end."""
     for reason in result.failed.values():

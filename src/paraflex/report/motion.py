@@ -13,6 +13,7 @@ from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import count, number, pairs, symbol
 from paraflex.report.tracking import energies, largest
+from paraflex.results.validity import validity_lines, validity_summary
 
 _ALONE = ("",)
 # Charts choose among so many points and joints; results.nc has them all.
@@ -38,7 +39,10 @@ def motion_page(data: xr.Dataset) -> Page:
         runs=_ALONE,
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=[] if status == "complete" else [f"{status}: {data['message'].item()}"],
+        notes=[
+            *([] if status == "complete" else [f"{status}: {data['message'].item()}"]),
+            *validity_lines({"": validity_summary(data)}),
+        ],
     )
 
 

@@ -15,6 +15,7 @@ from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
 from paraflex.results.metrics import during_motion, headline, part_run, ranked_by_motion
+from paraflex.results.validity import validity_lines, validity_summary
 
 
 def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> Page:
@@ -48,7 +49,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         selected=runs.index(default_mode(data)),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=_unfinished(data, failed or {}),
+        notes=[*_unfinished(data, failed or {}), *_validity(data)],
     )
 
 
@@ -266,6 +267,11 @@ def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
         if status != "complete":
             out.append(f"Mode {name}: {status}. {data['message'].values[r]}".rstrip())
     return out
+
+
+def _validity(data: xr.Dataset) -> list[str]:
+    """Whether the model holds."""
+    return validity_lines({str(name): validity_summary(data.sel(mode=name)) for name in data["mode"].values})
 
 
 def _model(run: Mapping[str, object]) -> str:

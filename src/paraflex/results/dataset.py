@@ -19,6 +19,8 @@ from paraflex.results.metrics import ErrorSpan, parse_error_span, peak_torque, r
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
 from paraflex.results.storage import SCHEMA
+from paraflex.results.validity import UNITS as VALIDITY_UNITS
+from paraflex.results.validity import validity_variables
 from paraflex.simulate import TrackingRun
 
 UNITS = {
@@ -68,7 +70,7 @@ UNITS = {
     "brake_energy": ("energy that brakes took as they engaged after the motion", "J"),
     "event": ("event that stopped the run", "1"),
     "event_time": ("when it was stopped", "s"),
-}
+} | VALIDITY_UNITS
 
 # What units do not say: on which body, in which frame, positive which way.
 _COMMENTS = {
@@ -153,6 +155,8 @@ def tracking_dataset(
     for name in FIGURES:
         data[name] = (("mode",), np.array([one.figures[name] for one in records]))
     data[BRAKE_ENERGY] = (("mode",), np.array([one.figures.get(BRAKE_ENERGY, 0.0) for one in records]))
+    for name, values in validity_variables([one.validity for one in records]).items():
+        data[name] = (("mode",), values)
     out = xr.Dataset(
         data,
         coords={

@@ -33,6 +33,7 @@ def tracking_run_html(run: TrackingRun) -> str:
     return page(
         f"{whole.mechanism.name}, mode {run.mode.name}: {_ended(solution)}",
         sentence(solution.message),
+        sentence(_verdict(run)),
         facts([*_tracking(run), *_solver(solution, run.method)]),
         table(("motor", "", "peak", "RMS", "unit"), motors),
     )
@@ -57,9 +58,14 @@ def motion_run_html(run: MotionRun) -> str:
     return page(
         title,
         sentence(solution.message),
+        sentence(_verdict(run)),
         facts([*energies, ("constant torques", torques), *_solver(solution, method)]),
         table(("point", "x at the end [m]", "y [m]"), points),
     )
+
+
+def _verdict(run: TrackingRun | MotionRun) -> str:
+    return "" if run.validity is None else run.validity.verdict
 
 
 def _ended(solution: Solution) -> str:

@@ -21,6 +21,7 @@ from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import FIGURES
 from paraflex.results.storage import SCHEMA
 from paraflex.results.summary import finite_or_none
+from paraflex.results.validity import validity_summary, validity_variables
 
 _OWN_UNITS = {
     "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
@@ -84,6 +85,7 @@ def motion_dataset(
     for name, (dims, array) in drawing_variables(drawn).items():
         data[name] = (("time", *dims), _full(array, run).astype(np.float32))
     data |= {name: getattr(solution, name) for name in FIGURES}
+    data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
     data["applied_torque"] = (("motor",), np.array(list(run.torques.values())))
     out = xr.Dataset(
         data,
@@ -127,6 +129,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     return {
         "mechanism": data.attrs["mechanism"],
         **figures,
+        "validity": validity_summary(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]),

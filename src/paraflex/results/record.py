@@ -16,6 +16,7 @@ from paraflex.results.joint_loads import joint_loads
 from paraflex.results.motion import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.results.outlines import outline_motion, outlines, segment_motion
 from paraflex.simulate import TrackingRun, TrackingTask
+from paraflex.validity import Validity
 
 # How a run went: names of the figures every record has.
 FIGURES = (
@@ -78,6 +79,8 @@ class Record:
         Deformed shapes of all bodies.
     figures : mapping
         The numbers and words named in FIGURES.
+    validity : Validity, optional
+        How far it is within what its model can describe.
     """
 
     task: TrackingTask
@@ -101,6 +104,7 @@ class Record:
     work: NDArray[np.float64]
     drawing: Drawing
     figures: Mapping[str, Any] = field(default_factory=dict)
+    validity: Validity | None = None
 
 
 def record(run: TrackingRun) -> Record:
@@ -145,6 +149,7 @@ def record(run: TrackingRun) -> Record:
         work=solution.work[:k],
         drawing=_drawing(task, parts, q),
         figures={name: getattr(solution, name) for name in (*FIGURES, BRAKE_ENERGY)},
+        validity=run.validity,
     )
 
 

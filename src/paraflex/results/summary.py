@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.results.metrics import FOLLOWING, ErrorSpan, Part, part_run
+from paraflex.results.validity import validity_summary
 
 _COUNTS = ("steps", "rejected", "newton_iterations", "factorisations")
 _FIGURES = (
@@ -36,9 +37,9 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     -------
     dict
         `modes.<mode>` with tracking errors during the motion, after it and over all, vibration and drift, peak_torque
-        and rms_torque per motor, end_effector_final and the solver's figures; `error`, which of the errors ranks the
-        modes; `after`, what the motors do after the path; `part`, how much of the path a run did that was too short for
-        all of it, else None; `parameters`; `version`. A figure that was not reached is None.
+        and rms_torque per motor, end_effector_final, the solver's figures and validity (None of rigid bodies); `error`,
+        which of the errors ranks the modes; `after`, what the motors do after the path; `part`, how much of the path a
+        run did that was too short for all of it, else None; `parameters`; `version`. A figure not reached is None.
     """
     modes: dict[str, Any] = {}
     for name in data["mode"].values:
@@ -57,6 +58,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
             figures[key] = {str(m): finite_or_none(run[key].sel(motor=m).item()) for m in run["motor"].values}
         figures["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
         figures["actuation_condition_max"] = finite_or_none(np.max(run["actuation_condition"].values))
+        figures["validity"] = validity_summary(run)
         modes[str(name)] = figures
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}

@@ -17,6 +17,7 @@ from paraflex.mechanism import ActuationMode
 from paraflex.results import tracking_dataset
 from paraflex.results.metrics import ErrorSpan
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
+from paraflex.validity import warn
 
 
 class Simulator(Protocol):
@@ -71,6 +72,7 @@ def run_study(
     workers: int | None = None,
     method: Simulator | None = None,
     error: ErrorSpan | str = ErrorSpan.MOTION,
+    warning: bool = True,
 ) -> StudyResult:
     """Simulate every mode; one that fails is reported and the others go on.
 
@@ -89,6 +91,8 @@ def run_study(
         `simulate` with the options by default.
     error : ErrorSpan or str
         Which tracking error ranks the modes: that of the "motion", or of the "whole" run, dwell included.
+    warning : bool
+        Whether runs beyond what their model can describe issue a `ValidityWarning` each.
 
     Returns
     -------
@@ -114,7 +118,7 @@ def run_study(
         try:
             if method is not None:
                 return method(task, mode, on_progress=report)
-            return simulate(task, mode, options=options, on_progress=report)
+            return simulate(task, mode, options=options, on_progress=report, warning=False)
         except IntegrationError as error:
             return error.partial
         except NumericalError as error:
@@ -130,6 +134,9 @@ def run_study(
             stop.set()
     outcomes = {mode.name: future.result() for mode, future in zip(chosen, futures, strict=True)}
     runs = [outcome for outcome in outcomes.values() if isinstance(outcome, TrackingRun)]
+    if warning:
+        for run_of_mode in runs:
+            warn(run_of_mode.validity, f"mode {run_of_mode.mode.name}: ")
     failed = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
     data = tracking_dataset(runs, options=options, parameters=parameters, error=error) if runs else None
     return StudyResult(data, failed, stop.is_set())

@@ -100,7 +100,7 @@ def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] |
 
 
 def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Change]) -> ModeGradients:
-    run = simulate(nominal.task, mode, options=nominal.options)
+    run = simulate(nominal.task, mode, options=nominal.options, warning=False)
     if run.solution.singular_positions:
         time = run.solution.singular_positions[0]
         raise NumericalError(

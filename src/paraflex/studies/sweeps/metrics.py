@@ -115,6 +115,20 @@ def _motor_energy(traces: Traces) -> float:
     return float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(solution.t)))
 
 
+# Kept of every run: numbers of a model that does not hold are not to be taken for others.
+VALIDITY = "validity"
+
+
+def beyond_limits(runs: int) -> str:
+    """What to tell of runs whose validity is above 1."""
+    which = "one run is" if runs == 1 else f"{runs} runs are"
+    return f"{which} beyond what the model can describe (column {VALIDITY} above 1): use second-order geometry"
+
+
+def _validity(traces: Traces) -> float:
+    return 0.0 if traces.run.validity is None else traces.run.validity.ratio
+
+
 METRICS: Mapping[str, Metric] = {
     "tracking_rms_motion": Metric(
         "root mean square distance of the end-effector from its desired place during the motion",
@@ -177,6 +191,9 @@ METRICS: Mapping[str, Metric] = {
         "largest constraint violation", "m", lambda x: x.run.solution.constraint_position_max
     ),
     "energy_balance_max": Metric("largest imbalance of energy", "J", lambda x: x.run.solution.energy_balance_max),
+    VALIDITY: Metric(
+        "what the model leaves out, over its limit: it holds up to 1, and 0 where nothing bends", "1", _validity
+    ),
     "steps": Metric("accepted steps", "1", lambda x: x.run.solution.steps, whole=True),
     "rejected": Metric("rejected steps", "1", lambda x: x.run.solution.rejected, whole=True),
     "newton_iterations": Metric("Newton iterations", "1", lambda x: x.run.solution.newton_iterations, whole=True),

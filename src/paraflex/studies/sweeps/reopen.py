@@ -104,7 +104,7 @@ def run_again(
         See `watch`.
     """
     planned, options = plan_task(setting, Task(0, 0, tuple(values), path))
-    run = simulate(planned, mode, options=options, on_progress=watch)
+    run = simulate(planned, mode, options=options, on_progress=watch, warning=False)
     if run.solution.status == "interrupted":
         raise Abandoned
     return tracking_dataset([run], options=options), measure(run, setting.metrics)

@@ -21,6 +21,7 @@ from paraflex.report.choice import MOST_RUNS, Picked, best_runs
 from paraflex.report.designs import Studied, read_studied
 from paraflex.report.survey import Step
 from paraflex.report.sweep import Parameter, StudyAccount, sweep_page
+from paraflex.studies.sweeps.metrics import VALIDITY, beyond_limits
 from paraflex.studies.sweeps.reopen import StudyFolder, open_study, reason_of, run_again
 from paraflex.studies.sweeps.run import Abandoned
 from paraflex.studies.sweeps.table import RESULTS, parts
@@ -143,6 +144,9 @@ def _notes(study: StudyFolder, studied: Studied, differ: Sequence[int]) -> list[
     notes = []
     if not studied.table.complete.any():
         notes.append("No run is complete: there is nothing to draw. The reasons stand below.")
+    beyond = int(np.sum(studied.table.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
+    if beyond:
+        notes.append(f"{beyond_limits(beyond)}.")
     if differ:
         why = "" if study.same_versions else " The versions of the packages are not those of the study."
         names = ", ".join(studied.label(row) for row in differ)

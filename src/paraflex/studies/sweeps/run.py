@@ -161,7 +161,7 @@ def _blank(setting: Setting, task: Task, mode: str) -> Row:
 def _simulate(
     planned: TrackingTask, mode: str, options: IntegrationOptions, watch: Callable[[float], None] | None
 ) -> TrackingRun:
-    run = simulate(planned, mode, options=options, on_progress=watch)
+    run = simulate(planned, mode, options=options, on_progress=watch, warning=False)
     if run.solution.status == "interrupted":
         raise Abandoned
     return run

@@ -59,7 +59,7 @@ class SweepTable(_Table):
     duration: Number | None = Field(default=None, description="the duration in s, dwell included")
     samples: Count | None = Field(default=None, description="the number of samples of each run")
     assembly: Text | None = Field(default=None, description="the name of an assembly")
-    metrics: list[Text] = Field(default=[], description="names of the metrics to keep; all by default")
+    metrics: list[Text] = Field(default=[], description="names of the metrics to keep, validity always; all by default")
     trajectories: Annotated[bool, Field(strict=True)] = Field(
         default=False, description="true to keep every run as a netCDF file"
     )

@@ -19,7 +19,16 @@ from paraflex.studies.sweeps.engines import THREADS, Engine, LostWorker, open_en
 from paraflex.studies.sweeps.folder import TRAJECTORIES, claim, done_runs, forget_unfinished, held
 from paraflex.studies.sweeps.run import Outcome, Row, Task, lost, run_task
 from paraflex.studies.sweeps.study import SweepStudy, load_sweep
-from paraflex.studies.sweeps.table import RESULTS, PartsWriter, merge, parts, status_counts, table_schema, write_json
+from paraflex.studies.sweeps.table import (
+    RESULTS,
+    PartsWriter,
+    beyond_counts,
+    merge,
+    parts,
+    status_counts,
+    table_schema,
+    write_json,
+)
 
 # Rows are written when so many wait, or the first has waited so long [s]: what a crash can cost.
 _ROWS, _SECONDS = 2048, 2.0
@@ -75,6 +84,8 @@ class SweepResult:
         It took.
     interrupted : bool
         Whether the user stopped it.
+    beyond : int
+        Runs beyond what their model can describe: validity above 1.
     """
 
     folder: Path
@@ -83,6 +94,7 @@ class SweepResult:
     fresh: int = 0
     seconds: float = 0.0
     interrupted: bool = False
+    beyond: int = 0
 
     @property
     def done(self) -> int:
@@ -165,7 +177,9 @@ def sweep(
             made = open_engine(engine, workers, cluster) if isinstance(engine, str) else engine
             interrupted = session.go(made, partial(run, study.setting), limit)
         counts = session.end()
-    return SweepResult(folder, study.runs, counts, session.fresh, time.perf_counter() - began, interrupted)
+    return SweepResult(
+        folder, study.runs, counts, session.fresh, time.perf_counter() - began, interrupted, session.beyond
+    )
 
 
 class _Session:
@@ -207,7 +221,8 @@ class _Session:
         table = self.folder / RESULTS
         if self.finished and not table.exists():
             merge(self.folder, self.schema, self.ranges)
-        counts = status_counts([table] if table.exists() else parts(self.folder))
+        files = [table] if table.exists() else parts(self.folder)
+        counts, self.beyond = status_counts(files), beyond_counts(files)
         self._summarise(counts)
         return counts
 
@@ -254,5 +269,11 @@ class _Session:
 
     def _summarise(self, counts: dict[str, int]) -> None:
         """Counts beside the table; the time taken stands nowhere in it, for it is no result."""
-        told = {"name": self.study.name, "runs": self.study.runs, "done": sum(counts.values()), "status": counts}
+        told = {
+            "name": self.study.name,
+            "runs": self.study.runs,
+            "done": sum(counts.values()),
+            "status": counts,
+            "beyond_validity": self.beyond,
+        }
         write_json(self.folder / SUMMARY, told)

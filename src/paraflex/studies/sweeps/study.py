@@ -21,7 +21,7 @@ from paraflex.files.read import read_toml, validate
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import parse_mode
 from paraflex.results.metrics import HEADLINE, ErrorSpan, parse_error_span
-from paraflex.studies.sweeps.metrics import METRICS
+from paraflex.studies.sweeps.metrics import METRICS, VALIDITY
 from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
 from paraflex.studies.sweeps.samples import Varied, check_varied, designs
 from paraflex.studies.sweeps.schema import SweepTable, VaryTable
@@ -337,7 +337,7 @@ def metrics_of(names: Sequence[str], error: ErrorSpan | str) -> tuple[str, ...]:
     for name in names:
         if name not in METRICS:
             raise InputError("unknown metric", field="metrics", value=name, remedy=suggestion(name, list(METRICS)))
-    return tuple(dict.fromkeys(names or [HEADLINE[parse_error_span(error)], *METRICS]))
+    return tuple(dict.fromkeys([*(names or [HEADLINE[parse_error_span(error)], *METRICS]), VALIDITY]))
 
 
 def _integration(table: SweepTable) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import OutputError
-from paraflex.studies.sweeps.metrics import METRICS
+from paraflex.studies.sweeps.metrics import METRICS, VALIDITY
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -189,6 +189,19 @@ def status_counts(files: Iterable[Path]) -> dict[str, int]:
                 for each in batch.column(0).value_counts().to_pylist():
                     counts[each["values"]] = counts.get(each["values"], 0) + each["counts"]
     return counts
+
+
+def beyond_counts(files: Iterable[Path]) -> int:
+    """How many runs are beyond what their model can describe: those whose validity is above 1."""
+    import pyarrow.parquet as pq
+
+    count = 0
+    for file in files:
+        with pq.ParquetFile(file) as table:
+            if VALIDITY in table.schema_arrow.names:
+                for batch in table.iter_batches(columns=[VALIDITY]):
+                    count += int(np.sum(batch.column(0).to_numpy(zero_copy_only=False).astype(float) > 1.0))
+    return count
 
 
 def read_rows(files: Iterable[Path]) -> Iterator[dict[str, Any]]:

@@ -1,0 +1,77 @@
+"""What datasets keep of the validity of runs, and what summaries say of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+if TYPE_CHECKING:
+    # Files are read without what computes them.
+    from paraflex.validity import Validity
+
+_INDICATORS = {
+    "validity_shortening": "shortening by bending, times the condition number, over the tracking error",
+    "validity_axial_force": "largest axial force of a body of linear geometry over its buckling load",
+    "validity_slope": "largest slope of a body of linear geometry, in its frame",
+    "validity_fourth_order": "terms of fourth order over the deflection, of a beam of second-order geometry",
+}
+UNITS = {
+    "validity": ("what the model leaves out, over its limit: it holds up to 1", "1"),
+    "validity_verdict": ("whether the model holds", "1"),
+    **{name: (meaning, "rad" if name.endswith("slope") else "1") for name, meaning in _INDICATORS.items()},
+}
+
+
+def validity_variables(runs: Sequence[Validity | None]) -> dict[str, np.ndarray]:
+    """Variables of a dataset, a number or text a run: NaN and "" where there is nothing to say."""
+    out = {
+        "validity": np.array([math.nan if one is None else one.ratio for one in runs]),
+        "validity_verdict": np.array(["" if one is None else one.verdict for one in runs]),
+    }
+    for name in _INDICATORS:
+        told = name.removeprefix("validity_").replace("_", " ")
+        values = [{} if one is None else {each.name: each.value for each in one.indicators} for one in runs]
+        out[name] = np.array([value.get(told, math.nan) for value in values])
+    return out
+
+
+def validity_summary(run: xr.Dataset) -> dict[str, Any] | None:
+    """Of one run of a dataset: ratio of its worst indicator to its limit, whether the model holds, all indicators.
+
+    None where there is nothing to say, as of rigid bodies and in files of earlier versions.
+    """
+    if "validity" not in run or not math.isfinite(run["validity"].item()):
+        return None
+    ratio = float(run["validity"].item())
+    values = {name.removeprefix("validity_"): run[name].item() for name in _INDICATORS}
+    return {
+        "ratio": ratio,
+        "holds": ratio <= 1.0,
+        "verdict": str(run["validity_verdict"].item()),
+        **{name: float(value) for name, value in values.items() if math.isfinite(value)},
+    }
+
+
+def validity_lines(verdicts: Mapping[str, Mapping[str, Any] | None]) -> list[str]:
+    """Lines on the validity of runs by name, from their summaries: the worst, and which others are beyond.
+
+    The name of a single run may be empty.
+    """
+    told = {name: one for name, one in verdicts.items() if one is not None}
+    if not told:
+        return []
+    worst = max(told, key=lambda name: told[name]["ratio"])
+    whose = f"mode {worst}: " if worst else ""
+    if told[worst]["holds"]:
+        return [
+            f"validity: {whose}{told[worst]['verdict']}{'; further from its limit in the others' * (len(told) > 1)}"
+        ]
+    lines = [f"warning: {whose}{told[worst]['verdict']}"]
+    others = [f"{name} ({one['ratio']:.2g} times)" for name, one in told.items() if not one["holds"] and name != worst]
+    if others:
+        lines.append(f"warning: beyond the limit as well, mode {', '.join(others)}")
+    return lines

@@ -1,0 +1,101 @@
+"""Does the model hold for a run? What its geometry leaves out, found from the samples that the run kept.
+
+Linear geometry leaves out that beams shorten as they bend, and what axial forces do to their bending. Second order has
+both, and leaves out terms of fourth order in the slopes.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+from paraflex.dynamics import System
+from paraflex.errors import ValidityWarning
+from paraflex.integrators import Solution
+from paraflex.validity.bending import bending_of
+from paraflex.validity.indicators import (
+    AXIAL_LIMIT,
+    DRIVEN_AXIAL_LIMIT,
+    FOURTH_ORDER_LIMIT,
+    SHORTENING_LIMIT,
+    SLOPE_LIMIT,
+    Following,
+    Indicator,
+    fourth_order,
+    of_linear,
+    of_second_order,
+)
+
+__all__ = [
+    "AXIAL_LIMIT",
+    "DRIVEN_AXIAL_LIMIT",
+    "FOURTH_ORDER_LIMIT",
+    "SHORTENING_LIMIT",
+    "SLOPE_LIMIT",
+    "Following",
+    "Indicator",
+    "Validity",
+    "assess",
+    "fourth_order",
+    "warn",
+]
+
+
+@dataclass(frozen=True)
+class Validity:
+    """How far a run is within what its model can describe.
+
+    Attributes
+    ----------
+    indicators : tuple of Indicator
+        One or more.
+    """
+
+    indicators: tuple[Indicator, ...]
+
+    @property
+    def worst(self) -> Indicator:
+        """The indicator nearest to its limit, or furthest beyond."""
+        return max(self.indicators, key=lambda one: one.ratio)
+
+    @property
+    def ratio(self) -> float:
+        """Its value over its limit: the model holds up to 1."""
+        return self.worst.ratio
+
+    @property
+    def holds(self) -> bool:
+        """Whether all are within their limits."""
+        return self.ratio <= 1.0
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: whether the model holds, by what, and what to do if it does not."""
+        worst = self.worst
+        if self.holds:
+            return f"{worst.geometry} geometry holds: {worst.text}"
+        return f"{worst.geometry} geometry does not hold: {worst.text}; {worst.remedy}"
+
+
+def assess(system: System, solution: Solution, following: Following | None = None) -> Validity | None:
+    """How far a run is within what its model can describe; None where no body is flexible.
+
+    Parameters
+    ----------
+    system : System
+    solution : Solution
+    following : Following, optional
+        Of a run along a path that torques drive.
+    """
+    if not solution.t.size:
+        return None
+    bodies = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
+    linear, second = [one for one in bodies if one.linear], [one for one in bodies if not one.linear]
+    indicators = [*of_linear(linear, solution.t, following), *of_second_order(second, solution.t)]
+    return Validity(tuple(indicators)) if indicators else None
+
+
+def warn(validity: Validity | None, whose: str = "") -> None:
+    """Issue a `ValidityWarning` where a model does not hold; `whose` run it is stands before the verdict."""
+    if validity is not None and not validity.holds:
+        warnings.warn(f"{whose}{validity.verdict}", ValidityWarning, stacklevel=3)

@@ -1,0 +1,191 @@
+"""Numbers that tell whether a model holds, each with its limit.
+
+Limits were measured by `benchmarks/validity.py`; its tables are in `docs/validity.md`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from paraflex.mechanism import Geometry
+from paraflex.validity.bending import Array, Bending
+
+Number = TypeVar("Number", float, Array)
+
+# Linear geometry, limits for 5 % of the deviation or deflection. Of 174 tracking runs of the library 133 are further
+# off than that, and all of these have a shortening share above this limit; so have 15 of the other 41.
+SHORTENING_LIMIT = 0.1
+# A lasting force P times 1 / (1 - P / P_cr) what a beam deflects by: 5 % at 0.05. The library's runs without a path are
+# off by up to 1.05 of their largest axial force over P_cr.
+AXIAL_LIMIT = 0.05
+# Where torques drive a mechanism along a path its deviation has other causes, which shortening tells of. Of the runs
+# within 5 % none has an axial force above 0.195.
+DRIVEN_AXIAL_LIMIT = 0.2
+# A cantilever under a load at its tip, against the elastica: 4 % of the deflection at 0.10 rad, 6 % at 0.15 rad.
+SLOPE_LIMIT = 0.12
+# Second order, for 1 % of the deflection: `fourth_order` against the elastica, beams clamped at one end under a load or
+# moment at the tip, and hinged at both under a load in the middle, with up to 0.95 of the buckling load.
+FOURTH_ORDER_LIMIT = 0.01
+# Its two coefficients, of slopes squared: that of the curvature, and that of what stiffens a beam on the point of
+# buckling, for the frame on the chord (1/8: the elastica's own) and for that on the tangent at the first end.
+_CURVATURE, _CHORD, _TANGENT = 1.0 / 3.0, 1.0 / 8.0, 0.3
+# A beam clamped at one end buckles at a quarter of the load that one hinged at both ends does.
+_CLAMPED = 0.25
+# Name of the one indicator of second order.
+_SECOND_ORDER = "fourth order"
+# A mean axial force so near the buckling load, or beyond, is counted as this fraction of it.
+_ALMOST = 0.99
+
+
+@dataclass(frozen=True)
+class Indicator:
+    """One number that tells whether a model holds.
+
+    Attributes
+    ----------
+    name : str
+        "shortening", "axial force", "slope" or "fourth order".
+    value, limit : float
+        The model is not to be trusted where the value is above the limit.
+    body : str
+        The body that it is largest of.
+    time : float
+        When it is largest [s].
+    text : str
+        In words, with the limit.
+    remedy : str
+        What to do where it is above the limit.
+    """
+
+    name: str
+    value: float
+    limit: float
+    body: str
+    time: float
+    text: str
+    remedy: str
+
+    @property
+    def geometry(self) -> str:
+        """What it is of: bars of assumed modes and modal bodies are linear in mechanisms of second order, too."""
+        return Geometry.SECOND_ORDER.value if self.name == _SECOND_ORDER else Geometry.LINEAR.value
+
+    @property
+    def ratio(self) -> float:
+        """Value over limit."""
+        return self.value / self.limit
+
+
+class Following(NamedTuple):
+    """What a run along a path adds: the end-effector's deviation from it.
+
+    Attributes
+    ----------
+    deviation : float
+        Root mean square distance from the path over the run [m].
+    condition : float
+        Largest condition number of the actuation matrix.
+    """
+
+    deviation: float
+    condition: float
+
+
+def of_linear(bodies: Sequence[Bending], t: Array, following: Following | None) -> list[Indicator]:
+    """Of the bodies of linear geometry."""
+    if not bodies:
+        return []
+    out = [_slope(bodies, t)]
+    # Of modal bodies there is no more to say.
+    beams = [body for body in bodies if not np.isnan(body.axial).any()]
+    if beams:
+        out.append(_axial_force(beams, t, AXIAL_LIMIT if following is None else DRIVEN_AXIAL_LIMIT))
+    if beams and following is not None and following.deviation > 0.0:
+        out.append(_shortening(beams, t, following))
+    return out
+
+
+def _axial_force(bodies: Sequence[Bending], t: Array, limit: float) -> Indicator:
+    body, k = _largest(bodies, [np.abs(body.axial) for body in bodies])
+    value = float(abs(body.axial[k]))
+    text = f"{body.name}'s axial force reaches {value:.2g} of its buckling load at t = {t[k]:.3g} s"
+    return Indicator("axial force", value, limit, body.name, float(t[k]), f"{text}{_upto(limit)}", _remedy(body))
+
+
+def _slope(bodies: Sequence[Bending], t: Array) -> Indicator:
+    body, k = _largest(bodies, [body.slope for body in bodies])
+    value = float(body.slope[k])
+    text = f"{body.name} bends to a slope of {value:.2g} rad at t = {t[k]:.3g} s"
+    return Indicator("slope", value, SLOPE_LIMIT, body.name, float(t[k]), f"{text}{_upto(SLOPE_LIMIT)}", _remedy(body))
+
+
+def _shortening(bodies: Sequence[Bending], t: Array, following: Following) -> Indicator:
+    body, k = _largest(bodies, [body.shortening for body in bodies])
+    shortening = float(body.shortening[k])
+    value = shortening * following.condition / following.deviation
+    text = (
+        f"bending shortens {body.name} by {1e3 * shortening:.2g} mm at t = {t[k]:.3g} s, which is left out; with the "
+        f"actuation's condition number of {following.condition:.2g} that is {value:.2g} of the tracking error"
+    )
+    return Indicator(
+        "shortening", value, SHORTENING_LIMIT, body.name, float(t[k]), f"{text}{_upto(SHORTENING_LIMIT)}", _remedy(body)
+    )
+
+
+def of_second_order(bodies: Sequence[Bending], t: Array) -> list[Indicator]:
+    """Of the beams of second-order geometry."""
+    if not bodies:
+        return []
+    terms = [fourth_order(body.slope, _steady(body), tangent=body.tangent) for body in bodies]
+    body, k = _largest(bodies, terms)
+    value = float(fourth_order(body.slope[k], _steady(body), tangent=body.tangent))
+    text = (
+        f"{body.name} bends to a slope of {body.slope[k]:.2g} rad at t = {t[k]:.3g} s; terms of fourth order, which "
+        f"are left out, are about {100.0 * value:.2g} % of its deflection (limit {100.0 * FOURTH_ORDER_LIMIT:g} %)"
+    )
+    return [Indicator(_SECOND_ORDER, value, FOURTH_ORDER_LIMIT, body.name, float(t[k]), text, _remedy(body))]
+
+
+def fourth_order(slope: Number, compression: float, *, tangent: bool) -> Number:
+    """What second order leaves out, as a fraction of the deflection: slope^2 (1/3 + c / (1 - P/P_cr)).
+
+    Parameters
+    ----------
+    slope : float or (k,) array
+        Largest along the beam, in its frame [rad].
+    compression : float
+        Lasting axial force over the load under which the beam, hinged at both ends, buckles.
+    tangent : bool
+        Whether the frame is on the tangent at the first end (the cantilever's): c is 0.3, else 1/8.
+    """
+    towards = 1.0 - min(max(compression, 0.0), _ALMOST)
+    return slope**2 * (_CURVATURE + (_TANGENT if tangent else _CHORD) / towards)
+
+
+def _steady(body: Bending) -> float:
+    """Mean compression over the load under which the body, hinged at both ends, buckles."""
+    return -float(np.mean(body.axial)) * (_CLAMPED if body.tangent else 1.0)
+
+
+def _largest(bodies: Sequence[Bending], values: Sequence[Array]) -> tuple[Bending, int]:
+    """The body whose values (k,) are largest, and the sample at which they are."""
+    one = int(np.argmax([np.max(each) for each in values]))
+    return bodies[one], int(np.argmax(values[one]))
+
+
+def _upto(limit: float) -> str:
+    return f" (limit {limit:g})"
+
+
+def _remedy(body: Bending) -> str:
+    if body.given:
+        return f'describe {body.name} as type = "beam" and use second-order geometry'
+    if body.linear:
+        return "use second-order geometry (--geometry second-order)"
+    if body.tangent:
+        return 'use reference = "pinned"'
+    return f"make {body.name} of several beams welded together, or compare with exact beams (paraflex verify)"
