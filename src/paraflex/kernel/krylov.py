@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, fill
-from paraflex.kernel.compiling import inlined, routine
+from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.linear import right_hand_side, solve_system
 from paraflex.kernel.records import by_reference
 from paraflex.kernel.tangent import residual_tangent
@@ -124,7 +124,7 @@ def combine(space, count, unit, ws):
             ws.mu[r] += unit * space.rest[k] * space.basis[k, ws.x.size + r]
 
 
-@routine
+@kernel
 def exact_correction(p, g, b, weights, q, v, a, lam, torques, unit, d, space, ws):
     """Turn the correction of a run in ws.x and ws.mu to the one that the exact matrix asks for.
 
