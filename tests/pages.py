@@ -109,10 +109,14 @@ def with_numbers_of(shown: str, printed: str) -> str:
 def _blocks_run(
     page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, names: dict[str, Any]
 ) -> Iterator[tuple[Block, str]]:
-    """Blocks of a page one after the other, and what the last that was run has printed; names are those of Python's."""
+    """Blocks of a page one after the other, and what the last that was run has printed.
+
+    The names are those of Python's blocks, and `printed_number`: of what a pattern found in all output.
+    """
     monkeypatch.chdir(folder)
     monkeypatch.setenv("COLUMNS", "80")
-    printed = ""
+    printed, all_printed = "", []
+    names["printed_number"] = lambda pattern: float(re.search(pattern, "\n".join(all_printed))[1])
     for before, block in pairwise([None, *blocks_of(page)]):
         assert block is not None
         if block.note.startswith("not run: "):
@@ -130,6 +134,7 @@ def _blocks_run(
             _append_or_find(folder, block)
         else:
             pytest.fail(f"{page.name}: a block that is neither run nor marked: {block}")
+        all_printed.append(printed)
         yield block, printed
 
 
