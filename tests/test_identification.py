@@ -276,7 +276,7 @@ def test_command_line(tmp_path):
     targets = [TARGET % ("tracking_rms", 1e-4, ""), TARGET % ("peak_torque_max", 10.0, "")]
     file, out = write_study(tmp_path, STUDY + "".join(targets) + "[search]\nevaluations = 14\n"), tmp_path / "out"
     done = subprocess.run(
-        command("identify", file, "--output", out), capture_output=True, text=True, check=False, timeout=100
+        command("identify", file, "--output", out), capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 0, done.stderr
     assert "peak_torque_max" in done.stdout
