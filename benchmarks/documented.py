@@ -223,7 +223,7 @@ def run(page: Path) -> None:
     sys.path.append(str(ROOT / "tests"))
     import pytest
 
-    from pages import refreshed
+    from pages import refreshed  # pyright: ignore[reportMissingImports]
 
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         text = refreshed(page, Path(folder), patch, filled)
