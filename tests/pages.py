@@ -7,6 +7,7 @@ import io
 import re
 import shlex
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -57,29 +58,84 @@ def run_page(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> int:
     folder or of the library. A `text` block is what the block above printed. A block of another kind, or one that is
     not to be run, has a comment above it that says so: `<!-- not run: REASON -->`.
     """
+    count, names = 0, {}
+    for block, printed in _blocks_run(page, folder, monkeypatch, names):
+        if block.language == "text":
+            check_output(block.text, printed, last_differs=block.note == "last column differs")
+        count += block.language in ("python", "sh")
+    text = page.read_text(encoding="utf-8")
+    for what, shown in marks_of_run(text):
+        _, form, expression = what.split(maxsplit=2)
+        now = format(eval(expression, names), form)
+        assert _same_word(shown, now), f"{page.name}: shown {shown!r}, now {now!r}: {expression}"
+    return count
+
+
+def marks_of_run(text: str) -> list[tuple[str, str]]:
+    """Numbers of a text that follow from its blocks, `<!--=run FORMAT EXPRESSION-->NUMBER<!--/-->`: mark, number."""
+    return re.findall(r"<!--=(run [^>]+?)-->(.*?)<!--/-->", text)
+
+
+def refreshed(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, filled: Any) -> str:
+    """A page that shows what its blocks print now; `filled` puts numbers between marks, given the names of the blocks.
+
+    Raises
+    ------
+    AssertionError
+        A line that is shown is printed no more: words are for a person to change.
+    """
+    text, names = page.read_text(encoding="utf-8"), {}
+    for block, printed in _blocks_run(page, folder, monkeypatch, names):
+        if block.language == "text":
+            text = text.replace(f"```text\n{block.text}```", f"```text\n{with_numbers_of(block.text, printed)}```", 1)
+    return filled(text, names)
+
+
+def with_numbers_of(shown: str, printed: str) -> str:
+    """Lines as shown with the numbers of the lines that were printed."""
+    rest, lines = [line for line in printed.splitlines() if _tokens(line)], []
+    for line in shown.splitlines():
+        words = [_NUMBER.sub("#", word) for word in _tokens(line)]
+        if words and words != ["..."]:
+            while rest and [_NUMBER.sub("#", word) for word in _tokens(rest[0])] != words:
+                rest.pop(0)
+            assert rest, f"shown {line!r}, printed:\n{printed}"
+            numbers = iter(_NUMBER.findall(" ".join(_tokens(rest.pop(0)))))
+            line = _NUMBER.sub(lambda _, numbers=numbers: next(numbers), line)
+        lines.append(line)
+    return "\n".join([*lines, ""])
+
+
+def _blocks_run(
+    page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, names: dict[str, Any]
+) -> Iterator[tuple[Block, str]]:
+    """Blocks of a page one after the other, and what the last that was run has printed.
+
+    The names are those of Python's blocks, and `printed_number`: of what a pattern found in all output.
+    """
     monkeypatch.chdir(folder)
     monkeypatch.setenv("COLUMNS", "80")
-    names: dict[str, Any] = {}
-    printed, count = "", 0
+    printed, all_printed = "", []
+    names["printed_number"] = lambda pattern: float(re.search(pattern, "\n".join(all_printed))[1])
     for before, block in pairwise([None, *blocks_of(page)]):
         assert block is not None
         if block.note.startswith("not run: "):
             continue
         if block.language == "python":
-            printed, count = _run_python(block.text, page.name, names), count + 1
+            printed = _run_python(block.text, page.name, names)
         elif block.language == "sh":
-            printed, count = _run_shell(block.text), count + 1
+            printed = _run_shell(block.text)
         elif block.language == "text":
             assert before is not None
             assert before.language in ("python", "sh"), block
-            check_output(block.text, printed, last_differs=block.note == "last column differs")
         elif block.language == "diff":
             apply_diff(folder / block.title, block.text)
         elif block.language == "toml":
             _append_or_find(folder, block)
         else:
             pytest.fail(f"{page.name}: a block that is neither run nor marked: {block}")
-    return count
+        all_printed.append(printed)
+        yield block, printed
 
 
 def check_output(shown: str, printed: str, *, last_differs: bool = False) -> None:

@@ -1,14 +1,18 @@
 """Pages for newcomers are run block by block; pages made from the code say what the code says."""
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
-from pages import blocks_of, check_output, run_page
+from pages import blocks_of, check_output, run_page, with_numbers_of
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
+sys.path.append(str(ROOT / "benchmarks"))
+
+import documented  # noqa: E402
 
 
 @pytest.mark.parametrize(
@@ -17,6 +21,34 @@ DOCS = ROOT / "docs"
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):
     assert run_page(DOCS / page, tmp_path, monkeypatch) >= least
+
+
+def test_numbers_of_pages_are_those_that_were_measured():
+    """`python benchmarks/documented.py write` would change nothing."""
+    marks = 0
+    for page in documented.pages():
+        text = page.read_text(encoding="utf-8")
+        marks += len(documented.MARK.findall(text))
+        assert documented.filled(text) == text, f"{page.name}: run python benchmarks/documented.py write"
+    assert marks > 60
+
+
+def test_a_number_that_was_not_measured_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.setattr(documented, "MEASURED", tmp_path)
+    mark = "<!--=x.some.0 1e3 .2f-->{}<!--/-->"
+    assert documented.filled(mark.format("6.19")) == mark.format(documented.NOT_MEASURED)
+    (tmp_path / "x.json").write_text('{"some": [0.00735]}')
+    assert documented.filled(mark.format("6.19")) == mark.format("7.35")
+    of_run = "<!--=run .1f 2.0 * error-->1.0<!--/-->"
+    assert documented.filled(of_run) == of_run
+    assert documented.filled(of_run, {"error": 0.7}) == of_run.replace("1.0", "1.4")
+
+
+def test_shown_lines_take_the_numbers_that_were_printed():
+    shown, printed = "...\n error 0.63 mm\n ++   1.5e-04\n...\n", "loaded\n error 0.70 mm\n ++   2.5e-03\nend\n"
+    assert with_numbers_of(shown, printed) == "...\n error 0.70 mm\n ++   2.5e-03\n...\n"
+    with pytest.raises(AssertionError, match="printed"):
+        with_numbers_of("errors 0.63 mm", printed)
 
 
 def test_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):

@@ -1,5 +1,6 @@
 """Examples run as they stand; what they print is what they return, and that is checked by other means."""
 
+import dataclasses
 import importlib.util
 from pathlib import Path
 
@@ -8,6 +9,9 @@ import pytest
 
 import paraflex as pf
 from paraflex.dynamics import build_system, consistent_state, natural_frequencies
+from paraflex.studies import load_identification, load_optimisation, load_sensitivities, load_sweep
+from paraflex.studies.sensitivities import nominal_values
+from paraflex.studies.sweeps import Task, run_task
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -37,6 +41,27 @@ def test_every_example_is_tested():
     tests = Path(__file__).read_text(encoding="utf-8")
     for path in EXAMPLES.glob("*.py"):
         assert f'run("{path.stem}")' in tests, path
+
+
+STUDIES = {
+    "identification": load_identification, "optimisation": load_optimisation, "sensitivity_study": load_sensitivities,
+    "thickness_study": load_sweep,
+}  # fmt: skip
+
+
+def test_every_study_can_be_read_and_its_first_design_runs():
+    """To their ends they are run by benchmarks/documented.py, which keeps what they find."""
+    assert {path.stem for path in EXAMPLES.glob("*.toml")} == set(STUDIES)
+    for name, load in STUDIES.items():
+        study = load(EXAMPLES / f"{name}.toml")
+        setting, values = study.setting, [parameter.low for parameter in study.parameters]
+        if name == "sensitivity_study":
+            values = nominal_values(setting)
+        if name in ("identification", "optimisation"):
+            values = study.start
+        short = dataclasses.replace(setting, modes=setting.modes[-1:], duration=0.05, samples=11)
+        (row,) = run_task(short, Task(0, 0, tuple(values), "square")).rows
+        assert row["status"] == "complete", row["reason"]
 
 
 def test_raparm_square(run, tmp_path):

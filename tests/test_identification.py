@@ -11,7 +11,8 @@ from made_up import STUDY, made_up, write_study
 from paraflex.errors import InputError
 from paraflex.plots import targets_reached
 from paraflex.studies import identify, load_identification
-from paraflex.studies.optimisation.fit import confidence, residual_slopes
+from paraflex.studies.optimisation.confidence import confidence
+from paraflex.studies.optimisation.fit import residual_slopes
 from paraflex.studies.sweeps import Task, run_task
 
 TARGET = """
@@ -85,7 +86,12 @@ def test_deviations_are_those_of_a_linear_model(tmp_path):
     found = result.confidence
     assert found is not None
     scale = np.array([0.006, values[1] * np.log(10.0)])
-    assert list(found.deviations.values()) == pytest.approx(np.sqrt(np.diag(covariance)) * scale, rel=1e-5)
+    errors = np.sqrt(np.diag(covariance)) * scale
+    assert list(found.errors.values()) == pytest.approx(errors, rel=1e-5)
+    # Of two degrees of freedom: P(|t| < x) = x / sqrt(2 + x^2).
+    factor = np.sqrt(2.0 * 0.6826894921**2 / (1.0 - 0.6826894921**2))
+    assert list(found.deviations.values()) == pytest.approx(factor * errors, rel=1e-5)
+    assert (found.freedom, found.reasons) == (2, {})
     correlation = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
     assert found.correlation == pytest.approx(np.array([[1.0, correlation], [correlation, 1.0]]), rel=1e-5)
     assert found.condition == pytest.approx(np.linalg.cond(jacobian), rel=1e-5)
@@ -121,6 +127,7 @@ def test_parameters_that_the_data_cannot_tell_apart(tmp_path):
     assert abs(along @ [1.0, -2.0]) / np.sqrt(5.0) == pytest.approx(1.0, abs=1e-4)
     told = json.loads((tmp_path / "out" / "result.json").read_text())["confidence"]
     assert told["telling"] is False
+    assert told["deviations"] == {"x": None, "y": None}
 
 
 def test_fewer_targets_than_parameters(tmp_path):
@@ -129,6 +136,7 @@ def test_fewer_targets_than_parameters(tmp_path):
     assert found is not None
     assert found.condition == np.inf
     assert found.deviations == {"x": None, "y": None}
+    assert found.reasons["x"] == "1 targets leave nothing to judge 2 free parameters by"
     assert json.loads((tmp_path / "out" / "result.json").read_text())["confidence"]["condition"] is None
 
 
@@ -140,6 +148,7 @@ def test_a_parameter_at_its_bound_has_no_deviation(tmp_path):
     assert result.confidence is not None
     assert result.confidence.free == ("y",)
     assert result.confidence.deviations["x"] is None
+    assert result.confidence.reasons == {"x": "at its low bound"}
     assert result.confidence.deviations["y"] is not None
 
 
@@ -152,7 +161,7 @@ def test_all_parameters_at_bounds(tmp_path):
 
     design = Evaluated(0, tuple(result.values.values()), (), ())
     slopes = {name: np.ones((1, 2)) for name in METRICS}
-    found = confidence(study, design, residual_slopes(study.targets, slopes), ["x", "y"])
+    found = confidence(study, design, residual_slopes(study.targets, slopes), {"x": "low", "y": "low"})
     assert found.free == ()
     assert found.condition == 1.0
 
@@ -267,7 +276,7 @@ def test_command_line(tmp_path):
     targets = [TARGET % ("tracking_rms", 1e-4, ""), TARGET % ("peak_torque_max", 10.0, "")]
     file, out = write_study(tmp_path, STUDY + "".join(targets) + "[search]\nevaluations = 14\n"), tmp_path / "out"
     done = subprocess.run(
-        command("identify", file, "--output", out), capture_output=True, text=True, check=False, timeout=100
+        command("identify", file, "--output", out), capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 0, done.stderr
     assert "peak_torque_max" in done.stdout

@@ -15,9 +15,7 @@ def identify_command(request: SearchRequest) -> int:
 def _report(result: IdentificationResult) -> None:
     console = plain_console()
     found = result.confidence
-    deviations = {} if found is None else found.deviations
-    told = {name: "" if value is None else f"{value:.2g}" for name, value in deviations.items()}
-    console.print(parameter_table(result, deviation=told))
+    console.print(parameter_table(result, deviation=_deviations(result)))
     table = plain_table()
     for heading in ("mode", "path", "metric"):
         table.add_column(heading, no_wrap=True)
@@ -29,11 +27,26 @@ def _report(result: IdentificationResult) -> None:
         table.add_row(target.mode, target.path, target.column, *numbers, f"{each.residual:+.3g}")
     console.print(table)
     console.print(f"root mean square residual {result.residual:.4g}, {result.start_residual:.4g} at the start")
-    if found is not None and found.telling:
-        console.print(f"condition of the Jacobian {found.condition:.3g}")
-    elif found is not None:
+    console.print(f"derivatives: {result.derivatives or 'none were needed'}", soft_wrap=True)
+    if found is None:
+        console.print(f"deviations not given: {result.stopped} before derivatives there were known", soft_wrap=True)
+        return
+    for reason in dict.fromkeys(found.reasons.values()):
+        names = ", ".join(name for name, why in found.reasons.items() if why == reason)
+        console.print(f"deviations not given of {names}: {reason}", soft_wrap=True)
+    if found.telling:
+        console.print(f"condition of the Jacobian {found.condition:.3g}, degrees of freedom {found.freedom}")
+    else:
         told = ", ".join(f"{share:+.2f} {name}" for name, share in found.weakest.items())
         console.print(
             f"the targets cannot tell the parameters apart (condition {found.condition:.3g}): they hardly change along "
             f"{told}, in shares of the ranges"
         )
+
+
+def _deviations(result: IdentificationResult) -> dict[str, str]:
+    """Half-widths of intervals of 68 %, or that there are none."""
+    if result.confidence is None:
+        return dict.fromkeys(result.values, "not given")
+    told = result.confidence.deviations
+    return {name: "not given" if value is None else f"{value:.2g}" for name, value in told.items()}

@@ -16,6 +16,7 @@ from paraflex.integrators.native import NativeRun, prepare
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Problem, empty_samples
 from paraflex.integrators.stretches import hidden_from
+from paraflex.kernel.krylov import make_krylov
 from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
 from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
 from paraflex.kernel.settle import History, make_history, sample_energies, settle_steps
@@ -219,7 +220,7 @@ class _Varied:
         self.march = make_march(system.n, system.m, stages, len(system.mechanism.motors))
         self.march.q[:], self.march.v[:] = initial.q, initial.v
         self.workspace, self.samples = system.workspace(), empty_samples(problem.times, system)
-        self.tangent = make_tangent(system.packed)
+        self.tangent, self.space = make_tangent(system.packed), make_krylov(system.n, system.m)
         self.moved = [
             (_moved(system.packed, direction.packed), _moved(problem.signals, direction.signals))
             for direction in directions
@@ -251,12 +252,13 @@ class _Varied:
         """Solve and differentiate the steps of a chunk."""
         run, system = self.run, self.problem.system
         arguments = (run.scheme, run.controls, chunk.count, chunk.history)
-        settle_steps(system.packed, chunk.signals, *arguments, self.march, self.workspace, self.samples)
+        room = (self.tangent, self.space)
+        settle_steps(system.packed, chunk.signals, *arguments, self.march, *room, self.workspace, self.samples)
         self._check(chunk, chunk.history.left)
         torques = self.march.torques
         for y, direction, moved in zip(self.variations, self.directions, self.moved, strict=True):
             self._vary_times(chunk, y, direction)
-            rest = (*arguments, y, self.tangent, torques, self.workspace)
+            rest = (*arguments, y, *room, torques, self.workspace)
             vary_steps(system.packed, chunk.signals, *moved, self.pieces, *rest)
             self._check(chunk, y.left)
 

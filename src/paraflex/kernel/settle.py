@@ -14,6 +14,7 @@ from paraflex.kernel.compiling import inlined, kernel, lasting, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
+from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.march import step_work, write_samples
 from paraflex.kernel.packed import INDEX_1
@@ -21,11 +22,13 @@ from paraflex.kernel.records import by_reference
 from paraflex.kernel.run_state import SAMPLE, WORK
 from paraflex.kernel.stage import equations, place
 from paraflex.kernel.step import input_power, stage_start
+from paraflex.kernel.tangent import note_slopes
 
 # Corrections end where the next is to be expected below this part of what they correct, or where, below the second
 # bound, they fall no more.
 ROUNDING, NEARLY, FALLING = 2e-16, 1e-9, 0.5
-MOST_CORRECTIONS = 200
+# With the matrix of a run; after these, with the exact one.
+MOST_CORRECTIONS, MOST_EXACT = 60, 20
 # What is no more than this part of the largest accelerations of a run, or forces, is solved no more closely than that.
 NOTHING = 1e-6
 
@@ -96,18 +99,38 @@ def prepare_matrix(p, b, q, v, a, lam, dependent_part, ws):
     orient(p, q, ws, dependent_part)
 
 
+@inlined
+def multiplier_unit(least):
+    """What multipliers are measured in beside accelerations: the ratio of the largest ones of a run."""
+    return least[1] / least[0] if least[0] > 0.0 and least[1] > 0.0 else 1.0
+
+
 @routine
-def settle(p, signals, t, g, b, weights, dependent_part, m, a, lam, least, ws):
-    """Solve a stage from m.qs and m.vs to rounding: a and lam, and its q and v in ws; the last relative correction."""
+def settle(p, signals, t, g, b, weights, dependent_part, m, a, lam, least, d, space, ws):
+    """Solve a stage from m.qs and m.vs to rounding: a and lam, and its q and v in ws; the last relative correction.
+
+    Where corrections with the iteration matrix do not get there, they begin anew from the guess with the exact one.
+    """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
-    place(m.qs, m.vs, g, b, a, m.shift, ws)
-    prepare_matrix(p, b, ws.q, ws.v, a, lam, dependent_part, ws)
     change, previous = 0.0, 0.0
-    for iteration in range(MOST_CORRECTIONS):
+    copy(a, space.guess_a)
+    copy(lam, space.guess_lam)
+    for iteration in range(MOST_CORRECTIONS + MOST_EXACT):
+        exact = iteration >= MOST_CORRECTIONS
+        if iteration == MOST_CORRECTIONS:
+            copy(space.guess_a, a)
+            copy(space.guess_lam, lam)
         place(m.qs, m.vs, g, b, a, m.shift, ws)
+        if iteration == 0 or exact:
+            prepare_matrix(p, b, ws.q, ws.v, a, lam, dependent_part, ws)
+        if exact:
+            note_slopes(p, ws.q, ws.v, ws.mu, ws.compliance, d)
         equations(p, signals, t, weights, ws.q, ws.v, a, lam, m.torques, ws)
         right_hand_side(p, ws, scale)
         solve_system(p, ws, ws.x, ws.mu)
+        if exact:
+            unit = multiplier_unit(least)
+            exact_correction(p, g, b, weights, ws.q, ws.v, a, lam, m.torques, unit, d, space, ws)
         add(ws.x, a)
         add(ws.mu, lam)
         change = relative(ws.x, ws.mu, a, lam, least[0], least[1])
@@ -119,7 +142,7 @@ def settle(p, signals, t, g, b, weights, dependent_part, m, a, lam, least, ws):
 
 
 @lasting
-def settle_steps(p, signals, tableau, controls, count, x, m, ws, out):
+def settle_steps(p, signals, tableau, controls, count, x, m, d, space, ws, out):
     """Solve the first `count` steps of a history again, each to rounding, from where m stands; samples into out.
 
     m holds q, v and, unless the first step restarts, the accelerations and multipliers of its first stage.
@@ -148,6 +171,8 @@ def settle_steps(p, signals, tableau, controls, count, x, m, ws, out):
                 m.stage_a[1, 0],
                 m.stage_lam[0],
                 x.least,
+                d,
+                space,
                 ws,
             )
             m.power[0] = input_power(p, signals, t, m.q, m.v, m.stage_lam[0], m.torques, ws)
@@ -177,6 +202,8 @@ def settle_steps(p, signals, tableau, controls, count, x, m, ws, out):
                 m.stage_a[1, i],
                 m.stage_lam[i],
                 x.least,
+                d,
+                space,
                 ws,
             )
             x.left[k] = max(x.left[k], left)

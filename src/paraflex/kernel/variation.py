@@ -19,9 +19,18 @@ import numpy as np
 from paraflex.kernel.arrays import add, apart, copy, fill
 from paraflex.kernel.compiling import inlined, lasting, routine
 from paraflex.kernel.constraints import note_friction
+from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import right_hand_side, solve_system
 from paraflex.kernel.packed import Signals
-from paraflex.kernel.settle import MOST_CORRECTIONS, baumgarte_weights, ended, prepare_matrix, relative
+from paraflex.kernel.settle import (
+    MOST_CORRECTIONS,
+    MOST_EXACT,
+    baumgarte_weights,
+    ended,
+    multiplier_unit,
+    prepare_matrix,
+    relative,
+)
 from paraflex.kernel.signals import piece_at
 from paraflex.kernel.stage import equations, note_torques
 from paraflex.kernel.step import input_power
@@ -70,7 +79,7 @@ def find_parametric(moved, signals, times, weights, q, v, a, lam, torques, y, ws
 
 
 @routine
-def respond_to_parameter(p, g, b, weights, dependent_part, q, v, a, lam, least, i, torques, y, d, ws):
+def respond_to_parameter(p, g, b, weights, dependent_part, q, v, a, lam, least, i, torques, y, d, space, ws):
     """Solve the linear equations of a stage for y.a[i] and y.lam[i]; the last relative correction.
 
     y.q[i] and y.v[i] hold what they are without the stage's own y.a, and then all.
@@ -80,7 +89,10 @@ def respond_to_parameter(p, g, b, weights, dependent_part, q, v, a, lam, least, 
     prepare_matrix(p, b, q, v, a, lam, dependent_part, ws)
     note_slopes(p, q, v, ws.mu, ws.compliance, d)
     change, previous = 0.0, 0.0
-    for iteration in range(MOST_CORRECTIONS):
+    for iteration in range(MOST_CORRECTIONS + MOST_EXACT):
+        if iteration == MOST_CORRECTIONS:
+            fill(da, 0.0)
+            fill(dlam, 0.0)
         for j in range(da.size):
             d.q[j] = y.q[i, j] + b * da[j]
             d.v[j] = y.v[i, j] + g * da[j]
@@ -93,6 +105,8 @@ def respond_to_parameter(p, g, b, weights, dependent_part, q, v, a, lam, least, 
             ws.rows[r] = d.rows[r] + y.rows[r]
         right_hand_side(p, ws, scale)
         solve_system(p, ws, ws.x, ws.mu)
+        if iteration >= MOST_CORRECTIONS:
+            exact_correction(p, g, b, weights, q, v, a, lam, torques, multiplier_unit(least), d, space, ws)
         add(ws.x, da)
         add(ws.mu, dlam)
         change = relative(ws.x, ws.mu, da, dlam, least[0], least[1])
@@ -130,7 +144,7 @@ def vary_power(moved, signals, times, i, q, v, lam, torques, y, ws):
 
 
 @lasting
-def vary_steps(p, signals, moved, moved_signals, pieces, tableau, controls, count, x, y, d, torques, ws):
+def vary_steps(p, signals, moved, moved_signals, pieces, tableau, controls, count, x, y, d, space, torques, ws):
     """Derivatives of the motion by one parameter over the first `count` steps of a history.
 
     Parameters
@@ -177,7 +191,7 @@ def vary_steps(p, signals, moved, moved_signals, pieces, tableau, controls, coun
             note_torques(signals, t, torques)
             here = baumgarte_weights(controls, controls.alpha, controls.beta, length)
             left = respond_to_parameter(
-                p, g, g * g, here, controls.dependent_part, q, v, a, lam, x.least, i, torques, y, d, ws
+                p, g, g * g, here, controls.dependent_part, q, v, a, lam, x.least, i, torques, y, d, space, ws
             )
             y.left[k] = max(y.left[k], left)
             vary_power(moved, pieces, times, i, q, v, lam, torques, y, ws)

@@ -82,9 +82,17 @@ def optimisation_html(result: OptimisationResult) -> str:
 
 def identification_html(result: IdentificationResult) -> str:
     """The parameters found, with deviations, and what becomes of every target."""
-    deviations: Mapping[str, float | None] = {} if result.confidence is None else result.confidence.deviations
+    found = result.confidence
+    deviations: Mapping[str, float | None] = {} if found is None else found.deviations
+    reasons: Mapping[str, str] = {} if found is None else found.reasons
     numbers = [
-        (name, result.start[name], value, deviations.get(name), result.bounds.get(name, ""))
+        (
+            name,
+            result.start[name],
+            value,
+            _given(deviations.get(name), reasons.get(name, result.stopped)),
+            result.bounds.get(name, ""),
+        )
         for name, value in result.values.items()
     ]
     targets = [
@@ -96,7 +104,7 @@ def identification_html(result: IdentificationResult) -> str:
         f"identification: {result.stopped}",
         table(("parameter", "start", "found", "deviation", "at its bound"), numbers),
         table(("target", "path", "mode", "value", "start", "reached"), targets),
-        facts([*residuals, *_search_facts(result)]),
+        facts([*residuals, ("derivatives", result.derivatives), *_search_facts(result)]),
     )
 
 
@@ -183,6 +191,10 @@ def _state(finished: bool, interrupted: bool) -> str:
 
 def _modes_of(number: int) -> str:
     return f"{number} mode{'' if number == 1 else 's'}"
+
+
+def _given(deviation: float | None, reason: str) -> float | str:
+    return f"not given: {reason}" if deviation is None else deviation
 
 
 def _millimetres(metres: float | None) -> float | None:

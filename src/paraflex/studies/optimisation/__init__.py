@@ -1,6 +1,6 @@
 """Designs looked for: what minimises metrics, what reproduces them, and which parameters matter at all."""
 
-from paraflex.studies.optimisation.fit import Confidence
+from paraflex.studies.optimisation.confidence import Confidence
 from paraflex.studies.optimisation.identify import IdentificationResult, Reached, identify
 from paraflex.studies.optimisation.indices import (
     IndicesResult,

@@ -77,9 +77,11 @@ class Evaluate:
     record : Record
     engine : Engine
     run : callable
-        What is done for a task: `run_task` but for exact gradients and in tests.
+        What is done for a task: `run_task` but in tests.
     on_evaluated : callable, optional
         Told each design as it is done.
+    run_slopes : callable, optional
+        What is done for exact derivatives: its rows hold what `slopes.run_slopes` finds.
     """
 
     def __init__(
@@ -89,8 +91,10 @@ class Evaluate:
         engine: Engine,
         run: RunTask = run_task,
         on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
+        run_slopes: RunTask | None = None,
     ) -> None:
         self.study, self.record, self.engine, self.run, self.on_evaluated = study, record, engine, run, on_evaluated
+        self.run_slopes = run_slopes
         self.known: dict[Design, Evaluated] = {}
         self.fresh = 0
         self._numbers: dict[Design, int] = {}
@@ -114,13 +118,22 @@ class Evaluate:
         limit = self.study.search.evaluations
         within = [design for design in dict.fromkeys(designs) if self._numbers[design] < limit]
         lacking = [design for design in within if design not in self.known and not self._read(design)]
-        for design, rows in self._compute(lacking):
+        for design, rows in self._compute(lacking, self.run):
             self.record.add(rows)
             self.fresh += 1
             self._keep(design, rows)
         if len(within) < len(set(designs)):
             raise LimitReached
         return [self.known[design] for design in designs]
+
+    def add_slopes(self, at: Evaluated) -> Evaluated:
+        """A design with what `run_slopes` adds to its rows, which are kept with it."""
+        assert self.run_slopes is not None
+        for _, found in self._compute([at.design], self.run_slopes):
+            rows = tuple(row | more for row, more in zip(at.rows, found, strict=True))
+            self.record.add(rows)
+            self.known[at.design] = replace(at, rows=rows)
+        return self.known[at.design]
 
     def _read(self, design: Design) -> bool:
         setting = self.study.setting
@@ -136,11 +149,11 @@ class Evaluate:
         if self.on_evaluated is not None:
             self.on_evaluated(self, done)
 
-    def _compute(self, designs: list[Design]) -> Iterator[tuple[Design, tuple[Row, ...]]]:
+    def _compute(self, designs: list[Design], run: RunTask) -> Iterator[tuple[Design, tuple[Row, ...]]]:
         """Designs and all their rows, as they become complete."""
         setting = self.study.setting
         rows: dict[Design, dict[tuple[str, str], Row]] = {design: {} for design in designs}
-        for job, outcome in outcomes(self.engine, partial(_do, self.run), self._jobs(designs)):
+        for job, outcome in outcomes(self.engine, partial(_do, run), self._jobs(designs)):
             if isinstance(outcome, LostWorker):
                 outcome = lost(job.setting, job.task, str(outcome))
             design = job.task.values

@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from paraflex.studies.optimisation.best import write_best
+from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
-from paraflex.studies.optimisation.fit import (
-    Confidence,
-    closest,
-    confidence,
-    fit,
-    residual_slopes,
-    root_mean_square,
-)
+from paraflex.studies.optimisation.fit import closest, fit, residual_slopes, root_mean_square
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.optimise import at_bounds, failures
 from paraflex.studies.optimisation.problem import running_start
 from paraflex.studies.optimisation.record import RESULT
 from paraflex.studies.optimisation.session import INTERRUPTED, Progress, Session, Workers, sampled_start, search
-from paraflex.studies.optimisation.slopes import slopes_of
+from paraflex.studies.optimisation.slopes import ExactSlopes, no_exact_slopes, slopes_of
 from paraflex.studies.optimisation.study import DesignStudy, load_identification
 from paraflex.studies.sweeps.engines import THREADS, Engine
 from paraflex.studies.sweeps.table import write_json
@@ -67,6 +60,8 @@ class IdentificationResult:
     targets : tuple of Reached
     confidence : Confidence or None
         None where the search ended before derivatives at the best design were known.
+    derivatives : str
+        "exact", or "differences" and why.
     bounds : mapping of str to str
         "low" or "high" for parameters at a bound.
     evaluations, fresh, failed : int
@@ -91,6 +86,7 @@ class IdentificationResult:
     start_residual: float | None
     targets: tuple[Reached, ...]
     confidence: Confidence | None
+    derivatives: str
     bounds: Mapping[str, str]
     evaluations: int
     fresh: int
@@ -106,7 +102,7 @@ class IdentificationResult:
         out = {name: value for name, value in vars(self).items() if name not in ("fresh", "seconds", "folder", "table")}
         return out | {
             "targets": [each.told() for each in self.targets],
-            "confidence": None if self.confidence is None else _told(self.confidence),
+            "confidence": None if self.confidence is None else self.confidence.figures(),
             "history": [list(each) for each in self.history],
             "reasons": list(self.reasons),
         }
@@ -155,7 +151,7 @@ def identify(
     solution = _Solution(study)
     watch = None if on_progress is None else _watch(study, on_progress)
     session = search(study, Path(folder), Workers(engine, workers, cluster, run), solution.solve, watch)
-    result = _result(study, Path(folder), session, solution.confidence)
+    result = _result(study, Path(folder), session, solution)
     write_json(Path(folder) / RESULT, {"kind": "identification", "name": study.name} | result.figures())
     if result.residual is not None:
         write_best(Path(folder), study, tuple(result.values.values()))
@@ -163,11 +159,13 @@ def identify(
 
 
 class _Solution:
-    """The search itself; keeps what derivatives at its end say."""
+    """The search itself; keeps where it ended, what derivatives there say, and how they were taken."""
 
     def __init__(self, study: DesignStudy) -> None:
         self.study = study
+        self.best: Evaluated | None = None
         self.confidence: Confidence | None = None
+        self.derivatives = ""
 
     def solve(self, evaluate: Evaluate) -> str:
         """From the start, or the best of samples, to the least residuals."""
@@ -175,19 +173,30 @@ class _Solution:
         running_start(study, evaluate)
         start = sampled_start(study, evaluate, lambda designs: closest(study.targets, designs))
         stopped = fit(study, evaluate, slopes, start)
-        best = closest(study.targets, evaluate.history)
+        self.best = best = closest(study.targets, evaluate.history)
         assert best is not None
         try:
             jacobian = residual_slopes(study.targets, slopes(best))
+            found = confidence(study, best, jacobian, at_bounds(study, best.design))
+            self.confidence = checked(study, evaluate, best, jacobian, found)
         except LimitReached:
-            return stopped
-        self.confidence = confidence(study, best, jacobian, list(at_bounds(study, best.design)))
+            pass
+        self.derivatives = _how(study, slopes)
         return stopped
 
 
-def _result(study: DesignStudy, folder: Path, session: Session, found: Confidence | None) -> IdentificationResult:
+def _how(study: DesignStudy, slopes: object) -> str:
+    """How derivatives were taken, and why not exactly."""
+    if isinstance(slopes, ExactSlopes):
+        others = list(dict.fromkeys(slopes.reasons))
+        return f"exact; differences at {len(slopes.reasons)} designs ({others[0]})" if others else "exact"
+    reason = no_exact_slopes(study) if study.search.gradients is None else ""
+    return f"differences ({reason})" if reason else "differences"
+
+
+def _result(study: DesignStudy, folder: Path, session: Session, solution: _Solution) -> IdentificationResult:
     history, names = session.evaluate.history, study.setting.names
-    start, best = session.evaluate.known.get(study.start), closest(study.targets, history)
+    start, best = session.evaluate.known.get(study.start), solution.best or closest(study.targets, history)
     running = start is not None and start.complete
     failed, reasons = failures(history)
     return IdentificationResult(
@@ -198,7 +207,8 @@ def _result(study: DesignStudy, folder: Path, session: Session, found: Confidenc
         residual=None if best is None else root_mean_square(study.targets, best),
         start_residual=root_mean_square(study.targets, start) if start is not None and running else None,
         targets=tuple(_reached(target, best, start) for target in study.targets) if best and start and running else (),
-        confidence=found,
+        confidence=solution.confidence,
+        derivatives=solution.derivatives,
         bounds={} if best is None else at_bounds(study, best.design),
         evaluations=len(history),
         fresh=session.evaluate.fresh,
@@ -217,18 +227,6 @@ def _result(study: DesignStudy, folder: Path, session: Session, found: Confidenc
 def _reached(target: Target, best: Evaluated, start: Evaluated) -> Reached:
     reached, before = (float(each.metric(target.column)[target.run]) for each in (best, start))
     return Reached(target, reached, before, target.residual(best))
-
-
-def _told(found: Confidence) -> dict[str, Any]:
-    """JSON has no infinity and no numbers that are none."""
-    return {
-        "deviations": dict(found.deviations),
-        "free": list(found.free),
-        "correlation": [[x if math.isfinite(x) else None for x in row] for row in found.correlation.tolist()],
-        "condition": found.condition if math.isfinite(found.condition) else None,
-        "weakest": dict(found.weakest),
-        "telling": found.telling,
-    }
 
 
 def _watch(study: DesignStudy, on_progress: Callable[[Progress], None]) -> Callable[[Evaluate, Evaluated], None]:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 # Rows wait so long before they are written [s]: what a crash can cost.
 _SECONDS = 2.0
 RESULT = "result.json"
+# Column that says why a run has no exact derivatives.
+NO_SLOPES = "slope.reason"
 
 
 def slope_column(column: str, parameter: str) -> str:
@@ -34,6 +36,7 @@ def record_schema(study: DesignStudy, *, slopes: bool) -> pa.Schema:
         for column in study.columns:
             for name in setting.names:
                 schema = schema.append(pa.field(slope_column(column, name), pa.float64()))
+        schema = schema.append(pa.field(NO_SLOPES, pa.string()))
     return schema
 
 

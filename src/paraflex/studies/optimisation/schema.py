@@ -64,8 +64,15 @@ class SearchTable(_Table):
     samples: Count = Field(default=0, description="Sobol samples looked at first; the search starts from the best")
     seed: Count = Field(default=0, description="a whole number from 0 on")
     tolerance: Number | None = Field(default=None, description="the relative change at which it ends")
-    gradients: GradientsName = Field(default="differences", description='"differences" or "exact"')
-    difference: Number = Field(default=1e-3, description="the step of differences, as a share of a parameter's range")
+    gradients: GradientsName | None = Field(
+        default=None,
+        description='"differences" or "exact"; an identification takes exact ones where its metrics have them',
+    )
+    difference: Number | None = Field(
+        default=None,
+        description="the step of differences, as a share of a parameter's range; 1e-3, or in an identification chosen "
+        "against the noise of the metrics",
+    )
 
 
 class StudyTable(SweepTable):

@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, WITH_SLOPES
 from paraflex.studies.optimisation.record import Record, record_schema
-from paraflex.studies.optimisation.slopes import EXACT, run_with_slopes
+from paraflex.studies.optimisation.slopes import DIFFERENCES, EXACT, no_exact_slopes, run_slopes
 from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.studies.sweeps.engines import THREADS, Engine, open_engine
 from paraflex.studies.sweeps.folder import claim_for, forget_unfinished, held, ranges_of
@@ -123,11 +123,11 @@ def search(
         claim_for(folder, study.content(), study.setting.versions, told)
         forget_unfinished(folder)
         began = time.perf_counter()
-        run, exact = _run(study, workers)
-        record = Record(folder, record_schema(study, slopes=exact))
+        exact = _slopes_run(study, workers)
+        record = Record(folder, record_schema(study, slopes=exact is not None))
         compile_kernels_for(study.base.model().mechanism, lambda _: None)
         engine = workers.open()
-        evaluate = Evaluate(study, record, engine, run, on_evaluated)
+        evaluate = Evaluate(study, record, engine, workers.run or run_task, on_evaluated, exact)
         stopped = _solved(evaluate, solve)
         if stopped != INTERRUPTED:
             record.finish()
@@ -164,14 +164,27 @@ def _solved(evaluate: Evaluate, solve: Callable[[Evaluate], str]) -> str:
             evaluate.record.write()
 
 
-def _run(study: DesignStudy, workers: Workers) -> tuple[RunTask, bool]:
-    """What is done for a task, and whether it brings exact derivatives."""
-    if study.search.gradients != EXACT:
-        return workers.run or run_task, False
+def _slopes_run(study: DesignStudy, workers: Workers) -> RunTask | None:
+    """What is done for exact derivatives; None where differences are taken.
+
+    Raises
+    ------
+    InputError
+        They are asked for, and there are none.
+    """
+    asked = study.search.gradients
+    if asked == DIFFERENCES or (asked is None and (study.objective is not None or workers.run is not None)):
+        return None
     method = study.search.method or DEFAULT_METHOD
     if study.objective is not None and method not in WITH_SLOPES:
         raise InputError(
             f"{method} uses none", field="search.gradients", value=EXACT,
             remedy=f"leave it out, or choose from {', '.join(WITH_SLOPES)}",
         )  # fmt: skip
-    return workers.run or partial(run_with_slopes, study.columns), True
+    reason = no_exact_slopes(study)
+    if reason and asked == EXACT:
+        raise InputError(
+            f"no exact derivatives ({reason})", field="search.gradients", value=EXACT, remedy='say "differences"'
+        )
+    sizes = tuple(float(p.high) - float(p.low) for p in study.parameters)  # pyright: ignore[reportArgumentType]
+    return None if reason else partial(run_slopes, study.columns, sizes)

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, NumericalError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
-from paraflex.studies.optimisation.record import slope_column
+from paraflex.studies.optimisation.noise import NOISE_POINTS, noise_of
+from paraflex.studies.optimisation.record import NO_SLOPES, slope_column
 from paraflex.studies.optimisation.study import DesignStudy
-from paraflex.studies.sweeps.run import COMPLETE, Outcome, Task, run_task, trouble
+from paraflex.studies.sweeps.run import Outcome, Row, Task, trouble
 from paraflex.studies.sweeps.study import Setting
 
 Array = NDArray[np.float64]
-EXACT = "exact"
+EXACT, DIFFERENCES = "exact", "differences"
+# Bounds of a step that is chosen against noise, as a share of the ranges: what is bent is no straight line beyond.
+_LEAST_STEP, _MOST_STEP = 1e-3, 0.05
 
 
 class Slopes(Protocol):
@@ -28,13 +32,64 @@ class Slopes(Protocol):
 
 
 def slopes_of(study: DesignStudy, evaluate: Evaluate) -> Slopes:
-    """Derivatives as a study asks for them."""
-    if study.search.gradients == EXACT:
-        return lambda at: exact_slopes(study, at)
-    return lambda at: differences(study, evaluate, at)
+    """Derivatives as a study asks for them: exact ones where the evaluation makes such."""
+    differing = Differences(study, evaluate)
+    return differing if evaluate.run_slopes is None else ExactSlopes(study, evaluate, differing)
 
 
-def differences(study: DesignStudy, evaluate: Evaluate, at: Evaluated) -> Mapping[str, Array]:
+class Differences:
+    """Central differences; their step is the study's, or chosen against the noise of its metrics.
+
+    Noise is measured once, where derivatives are first asked for. The step that balances it against what a smooth
+    metric bends by, if it bends by itself over a range, is its cubic root (Press et al., Numerical Recipes, 5.7).
+    """
+
+    def __init__(self, study: DesignStudy, evaluate: Evaluate) -> None:
+        self.study, self.evaluate, self.step = study, evaluate, study.search.difference
+
+    def __call__(self, at: Evaluated) -> Mapping[str, Array]:
+        """See `Slopes`."""
+        if self.step is None:
+            self.step = float(np.clip(np.cbrt(relative_noise(self.study, self.evaluate, at)), _LEAST_STEP, _MOST_STEP))
+        return differences(self.study, self.evaluate, at, self.step)
+
+
+class ExactSlopes:
+    """Exact derivatives of the runs; differences at designs that have none, with the reasons."""
+
+    def __init__(self, study: DesignStudy, evaluate: Evaluate, otherwise: Slopes) -> None:
+        self.study, self.evaluate, self.otherwise = study, evaluate, otherwise
+        self.reasons: list[str] = []
+
+    def __call__(self, at: Evaluated) -> Mapping[str, Array]:
+        """See `Slopes`."""
+        if not _has_slopes(self.study, at):
+            at = self.evaluate.add_slopes(at)
+        for row in at.rows:
+            if row.get(NO_SLOPES):
+                self.reasons.append(f'mode "{row["mode"]}": {row[NO_SLOPES]}')
+                return self.otherwise(at)
+        return exact_slopes(self.study, at)
+
+
+def relative_noise(study: DesignStudy, evaluate: Evaluate, at: Evaluated) -> float:
+    """Largest noise of a metric that counts, as a part of its value: from designs close together on a line."""
+    middle = study.unit(at.design)
+    # Along the diagonal, inwards; as far in all as the least difference reaches.
+    along = np.where(middle > 0.5, -1.0, 1.0) * 2.0 * _LEAST_STEP
+    done = evaluate([study.design(middle + share * along) for share in np.linspace(0.0, 1.0, NOISE_POINTS)])
+    complete = [each for each in done if each.complete]
+    if len(complete) < NOISE_POINTS:
+        return 0.0
+    noise = 0.0
+    for column in study.columns:
+        values = np.array([each.metric(column) for each in complete])
+        size = np.maximum(np.abs(values).max(axis=0), np.finfo(float).tiny)
+        noise = max(noise, float(np.max(noise_of(values) / size)))
+    return noise
+
+
+def differences(study: DesignStudy, evaluate: Evaluate, at: Evaluated, step: float) -> Mapping[str, Array]:
     """Central differences, all designs of them evaluated at once.
 
     The step is a share of the range: long against what the choice of time steps makes of a metric, short against the
@@ -42,7 +97,7 @@ def differences(study: DesignStudy, evaluate: Evaluate, at: Evaluated) -> Mappin
     it is zero.
     """
     middle = study.unit(at.design)
-    sides = np.clip(middle[:, None] + study.search.difference * np.array([-1.0, 1.0]), 0.0, 1.0)
+    sides = np.clip(middle[:, None] + step * np.array([-1.0, 1.0]), 0.0, 1.0)
     done = evaluate([_moved(study, at, k, x) for k in range(middle.size) for x in sides[k]])
     columns = {column: np.zeros((study.runs, middle.size)) for column in study.columns}
     for k in range(middle.size):
@@ -63,7 +118,7 @@ def _moved(study: DesignStudy, at: Evaluated, k: int, place: float) -> tuple[flo
 
 
 def exact_slopes(study: DesignStudy, at: Evaluated) -> Mapping[str, Array]:
-    """Derivatives that the runs brought with them; see `run_with_slopes`."""
+    """Derivatives that the rows hold; see `run_slopes`."""
     scale = study.per_unit(at.design)
     return {
         column: scale * np.array([[row[slope_column(column, name)] for name in study.setting.names] for row in at.rows])
@@ -71,42 +126,55 @@ def exact_slopes(study: DesignStudy, at: Evaluated) -> Mapping[str, Array]:
     }
 
 
-def run_with_slopes(
-    columns: tuple[str, ...], setting: Setting, task: Task, watch: Callable[[float], None] | None = None
-) -> Outcome:
-    """`run_task`, and exact derivatives of some metrics in the rows that are complete.
-
-    Raises
-    ------
-    InputError
-        A metric has no exact derivative by a parameter.
-    """
-    outcome = run_task(setting, task, watch)
-    complete = [row for row in outcome.rows if row["status"] == COMPLETE]
-    if complete:
-        try:
-            found = {mode: slopes for mode, _, slopes in _metric_gradients()(setting, task)}
-        except InputError as error:
-            raise InputError(
-                f"no exact derivatives ({error})", field="search.gradients", value=EXACT, remedy='say "differences"'
-            ) from error
-        # Whatever else happens is the design's: its rows say so.
-        except Exception as error:
-            for row in complete:
-                row |= trouble(error)
-            return outcome
-        for row in complete:
-            for column in columns:
-                slopes = found[row["mode"]][column]
-                row |= {slope_column(column, name): float(x) for name, x in zip(setting.names, slopes, strict=True)}
-    return outcome
+def _has_slopes(study: DesignStudy, at: Evaluated) -> bool:
+    columns = [slope_column(column, name) for column in study.columns for name in study.setting.names]
+    return all(row.get(NO_SLOPES) or all(row.get(each) is not None for each in columns) for row in at.rows)
 
 
-def _metric_gradients() -> Callable:
+def no_exact_slopes(study: DesignStudy) -> str:
+    """Why a study has no exact derivatives; empty where it has."""
+    from paraflex.studies.sensitivities import check_differentiable_study
+
     try:
-        from paraflex.studies.sensitivities import (  # pyright: ignore[reportMissingImports]
-            metric_gradients,
-        )
-    except ImportError:
-        raise InputError("are not available here", field="search.gradients", remedy='say "differences"') from None
-    return metric_gradients
+        check_differentiable_study(study.setting, study.start, study.columns)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def run_slopes(
+    columns: tuple[str, ...],
+    sizes: tuple[float, ...],
+    setting: Setting,
+    task: Task,
+    watch: Callable[[float], None] | None = None,
+) -> Outcome:
+    """Exact derivatives of some metrics, or why there are none, a row a mode.
+
+    Parameters
+    ----------
+    columns : tuple of str
+    sizes : tuple of float
+        What steps of parameters are parts of where these are zero.
+    setting, task, watch
+        See `run_task`.
+    """
+    from paraflex.studies.sensitivities import metric_gradients
+
+    single = {mode: replace(setting, modes=(mode,)) for mode in setting.modes}
+    chosen = [size if value == 0.0 else None for size, value in zip(sizes, task.values, strict=True)]
+    rows: list[Row] = []
+    for mode, alone in single.items():
+        row: Row = {"path": task.path, "mode": mode, NO_SLOPES: None}
+        try:
+            ((_, _, slopes),) = metric_gradients(alone, task, sizes=chosen)
+            for column in columns:
+                found = [float(x) for x in slopes[column]]
+                if not np.all(np.isfinite(found)):
+                    raise NumericalError(f"the derivative of {column} is not finite")
+                row |= {slope_column(column, name): x for name, x in zip(setting.names, found, strict=True)}
+        # Whatever a strange design does, differences stand in for its derivatives.
+        except Exception as error:
+            row[NO_SLOPES] = trouble(error)["reason"]
+        rows.append(row)
+    return Outcome(task, rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any, get_args
 
@@ -30,6 +30,8 @@ from paraflex.studies.sweeps.schema import SamplingTable
 from paraflex.studies.sweeps.study import Setting, SweepStudy, make_study
 
 Array = NDArray[np.float64]
+# Step of differences in an optimisation, as a share of a range.
+_DIFFERENCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -46,10 +48,10 @@ class Search:
     seed : int
     tolerance : float or None
         Relative change at which it ends.
-    gradients : str
-        "differences" or "exact".
-    difference : float
-        Step of differences as a share of a parameter's range.
+    gradients : str or None
+        "differences" or "exact"; None for exact ones where an identification has them, else differences.
+    difference : float or None
+        Step of differences as a share of a parameter's range; None for one chosen against noise.
     """
 
     method: str | None = None
@@ -57,13 +59,14 @@ class Search:
     samples: int = 0
     seed: int = 0
     tolerance: float | None = None
-    gradients: str = "differences"
-    difference: float = 1e-3
+    gradients: str | None = None
+    difference: float | None = None
 
     def __post_init__(self) -> None:
         if self.method is not None:
             quantities.known(self.method, get_args(MethodName), "search.method", "method")
-        quantities.known(self.gradients, get_args(GradientsName), "search.gradients", "kind of derivatives")
+        if self.gradients is not None:
+            quantities.known(self.gradients, get_args(GradientsName), "search.gradients", "kind of derivatives")
 
 
 @dataclass(frozen=True)
@@ -189,7 +192,10 @@ def _optimisation(table: StudyTable, folder: FilePath) -> DesignStudy:
     columns |= {f"objective.at_most.{k}.metric": each.metric for k, each in enumerate(table.objective.at_most)}
     base = _base(table, folder, columns)
     objective = _objective(table.objective, base)
-    return DesignStudy(base, objective, (), _search(table.search))
+    search = _search(table.search)
+    if search.difference is None:
+        search = replace(search, difference=_DIFFERENCE)
+    return DesignStudy(base, objective, (), search)
 
 
 def _identification(table: StudyTable, folder: FilePath) -> DesignStudy:
@@ -328,7 +334,7 @@ def _search(table: SearchTable) -> Search:
             raise InputError(
                 "must not be negative", field=f"search.{name}", value=getattr(table, name), remedy="leave it out"
             )
-    if table.difference > 0.1:
+    if table.difference is not None and table.difference > 0.1:
         raise InputError(
             "too large for a derivative", field="search.difference", value=table.difference, remedy="say 1e-3"
         )

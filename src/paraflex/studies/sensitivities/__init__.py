@@ -2,7 +2,7 @@
 
 from paraflex.studies.sensitivities.gradient import ModeGradients, metric_gradients, mode_gradients
 from paraflex.studies.sensitivities.metrics import SMOOTH
-from paraflex.studies.sensitivities.plans import nominal_values
+from paraflex.studies.sensitivities.plans import check_differentiable_study, nominal_values
 from paraflex.studies.sensitivities.study import (
     Sensitivities,
     SensitivityStudy,
@@ -15,6 +15,7 @@ __all__ = [
     "ModeGradients",
     "Sensitivities",
     "SensitivityStudy",
+    "check_differentiable_study",
     "load_sensitivities",
     "metric_gradients",
     "mode_gradients",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,9 @@ from paraflex.dynamics import pack_signals
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
+from paraflex.integrators.variation import check_differentiable
 from paraflex.simulate import TrackingTask
+from paraflex.studies.sensitivities.metrics import check_smooth
 from paraflex.studies.sweeps.overlay import Place, number_at
 from paraflex.studies.sweeps.run import Task
 from paraflex.studies.sweeps.study import INTEGRATION, Setting
@@ -84,6 +86,29 @@ def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> 
             remedy="give low and high, whose distance is taken for its size",
         )  # fmt: skip
     return size
+
+
+def check_differentiable_study(setting: Setting, values: Sequence[float], columns: Collection[str]) -> None:
+    """Check that metrics of a design's runs have exact derivatives by all of its parameters.
+
+    Parameters
+    ----------
+    setting : Setting
+    values : sequence of float
+        The design.
+    columns : collection of str
+        Metrics, those per motor as NAME.MOTOR.
+
+    Raises
+    ------
+    InputError
+        A metric that counts or measures what the integration did, a method without derivatives, or such a parameter.
+    """
+    check_smooth(tuple(column.partition(".")[0] for column in columns))
+    _, options = setting.design(tuple(values))
+    check_differentiable(options)
+    for k in range(len(setting.names)):
+        size_of(setting, Task(0, 0, tuple(values), setting.paths[0]), k, 1.0)
 
 
 def given(planned: TrackingTask, options: IntegrationOptions, mode: str) -> Given:

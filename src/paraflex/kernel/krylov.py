@@ -1,0 +1,161 @@
+"""Stages whose corrections do not shrink: GMRES with the exact derivative of the residuals, preconditioned as a run is.
+
+The iteration matrix of a run leaves out terms in velocities and, in linear geometry, those of axial forces. Where they
+outweigh what is kept, as beside an instability that grows within a step, corrections with it grow. The minimal residual
+method needs products with the exact matrix alone, and converges as long as that is regular (Saad and Schultz, 1986).
+"""
+
+from __future__ import annotations
+
+from math import hypot, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.kernel.arrays import apart, fill
+from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.linear import right_hand_side, solve_system
+from paraflex.kernel.records import by_reference
+from paraflex.kernel.tangent import residual_tangent
+
+# Vectors of a basis, and the part of its right-hand side to which a system is solved with one.
+MOST_VECTORS, ENOUGH = 60, 1e-12
+
+
+@by_reference
+class Krylov(NamedTuple):
+    """Room for a basis, the least-squares problem in it, and where a stage began."""
+
+    basis: NDArray[np.float64]  # (vectors + 1, n + m) orthonormal, multipliers scaled
+    hessenberg: NDArray[np.float64]  # (vectors, vectors + 1) columns as rows, made triangular by rotations
+    cosines: NDArray[np.float64]  # (vectors,) of the rotations
+    sines: NDArray[np.float64]
+    rest: NDArray[np.float64]  # (vectors + 1,) right-hand side, rotated; then the solution in the basis
+    guess_a: NDArray[np.float64]  # (n,)
+    guess_lam: NDArray[np.float64]  # (m,)
+
+
+def make_krylov(n: int, m: int) -> Krylov:
+    """Room for systems of n accelerations and m multipliers."""
+    most = min(MOST_VECTORS, n + m)
+    small = apart((most, most + 1)), apart(most), apart(most), apart(most + 1)
+    return Krylov(apart((most + 1, n + m)), *small, apart(n), apart(m))
+
+
+@inlined
+def inner(x, y):
+    """Product of two vectors."""
+    total = 0.0
+    for j in range(x.size):
+        total += x[j] * y[j]
+    return total
+
+
+@routine
+def matrix_times(p, g, b, weights, scale, q, v, a, lam, torques, unit, x, d, ws, out):
+    """Preconditioned exact matrix of a stage times x, into out; multipliers in units of `unit`."""
+    n = a.size
+    for j in range(n):
+        d.q[j], d.v[j], d.a[j] = b * x[j], g * x[j], x[j]
+    for r in range(lam.size):
+        d.lam[r] = unit * x[n + r]
+    residual_tangent(p, weights, q, v, a, lam, torques, ws.compliance, 0, p.bodies.size, d)
+    for j in range(n):
+        ws.f[j] = d.f[j]
+    for r in range(lam.size):
+        ws.rows[r] = d.rows[r]
+    right_hand_side(p, ws, scale)
+    solve_system(p, ws, ws.x, ws.mu)
+    # Solutions of a run are corrections: less the residual.
+    for j in range(n):
+        out[j] = -ws.x[j]
+    for r in range(lam.size):
+        out[n + r] = -ws.mu[r] / unit
+
+
+@inlined
+def rotate(space, k):
+    """Make column k of the least-squares problem triangular; what is left of the right-hand side."""
+    column = space.hessenberg[k]
+    for i in range(k):
+        c, s = space.cosines[i], space.sines[i]
+        column[i], column[i + 1] = c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]
+    length = hypot(column[k], column[k + 1])
+    c, s = (column[k] / length, column[k + 1] / length) if length > 0.0 else (1.0, 0.0)
+    space.cosines[k], space.sines[k] = c, s
+    column[k], column[k + 1] = length, 0.0
+    space.rest[k], space.rest[k + 1] = c * space.rest[k], -s * space.rest[k]
+    return abs(space.rest[k + 1])
+
+
+@inlined
+def orthogonalise(space, k):
+    """Make vector k + 1 orthogonal to those before it, twice, and of unit length; False where nothing is left."""
+    new, column = space.basis[k + 1], space.hessenberg[k]
+    fill(column, 0.0)
+    for _ in range(2):
+        for i in range(k + 1):
+            part = inner(new, space.basis[i])
+            column[i] += part
+            for j in range(new.size):
+                new[j] -= part * space.basis[i, j]
+    length = sqrt(inner(new, new))
+    column[k + 1] = length
+    if length > 0.0:
+        for j in range(new.size):
+            new[j] /= length
+    return length > 0.0
+
+
+@inlined
+def combine(space, count, unit, ws):
+    """The solution in ws.x and ws.mu: back substitution, and the sum of the basis vectors."""
+    for i in range(count - 1, -1, -1):
+        for k in range(i + 1, count):
+            space.rest[i] -= space.hessenberg[k, i] * space.rest[k]
+        space.rest[i] = space.rest[i] / space.hessenberg[i, i] if space.hessenberg[i, i] != 0.0 else 0.0
+    fill(ws.x, 0.0)
+    fill(ws.mu, 0.0)
+    for k in range(count):
+        for j in range(ws.x.size):
+            ws.x[j] += space.rest[k] * space.basis[k, j]
+        for r in range(ws.mu.size):
+            ws.mu[r] += unit * space.rest[k] * space.basis[k, ws.x.size + r]
+
+
+@kernel
+def exact_correction(p, g, b, weights, q, v, a, lam, torques, unit, d, space, ws):
+    """Turn the correction of a run in ws.x and ws.mu to the one that the exact matrix asks for.
+
+    Parameters
+    ----------
+    q, v, a, lam
+        Where the stage stands, with the iteration matrix factored there and `note_slopes` called.
+    unit : float
+        Of multipliers, so that they weigh as much as accelerations.
+    """
+    scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
+    n, first = a.size, space.basis[0]
+    for j in range(n):
+        first[j] = ws.x[j]
+    for r in range(lam.size):
+        first[n + r] = ws.mu[r] / unit
+    size = sqrt(inner(first, first))
+    if not size > 0.0:
+        return
+    for j in range(first.size):
+        first[j] /= size
+    fill(space.rest, 0.0)
+    space.rest[0] = size
+    count = 0
+    for k in range(space.cosines.size):
+        matrix_times(
+            p, g, b, weights, scale, q, v, a, lam, torques, unit, space.basis[k], d, ws, space.basis[k + 1]
+        )  # fmt: skip
+        more = orthogonalise(space, k)
+        left = rotate(space, k)
+        count = k + 1
+        if left <= ENOUGH * size or not more:
+            break
+    combine(space, count, unit, ws)

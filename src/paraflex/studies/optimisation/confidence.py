@@ -1,0 +1,189 @@
+"""How well targets fix the parameters of a fit, and whether that can be said at all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.studies.optimisation.evaluate import Evaluated
+from paraflex.studies.optimisation.fit import residuals
+from paraflex.studies.optimisation.study import DesignStudy
+
+Array = NDArray[np.float64]
+# Beyond this condition of the Jacobian, parameters as shares of their ranges, its weakest direction is not known.
+ILL_CONDITIONED = 1e3
+# Residuals along a direction may change by this part otherwise than the Jacobian says.
+_AGREES = 0.5
+# Probability within one standard deviation of a normal distribution.
+ONE_DEVIATION = math.erf(math.sqrt(0.5))
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """How well targets fix the parameters, to first order about the design found.
+
+    Attributes
+    ----------
+    deviations : mapping of str to float or None
+        Half the widths of intervals that hold the parameters with a probability of 68.27 %, in their units: standard
+        errors, from the residuals that are left, times the factor of Student's distribution. None where `reasons` says
+        why there are none.
+    errors : mapping of str to float or None
+        Standard errors alone, the square roots of the diagonal of s^2 (J^T J)^-1.
+    reasons : mapping of str to str
+        Why a parameter has no deviation.
+    freedom : int
+        Targets less free parameters.
+    correlation : (free, free) array
+        Of the parameters that are not at a bound.
+    free : tuple of str
+        Their names.
+    condition : float
+        Of the Jacobian, parameters as shares of their ranges.
+    weakest : mapping of str to float
+        The direction of unit length, in shares of the ranges, that changes residuals least.
+    """
+
+    deviations: Mapping[str, float | None]
+    errors: Mapping[str, float | None]
+    reasons: Mapping[str, str]
+    freedom: int
+    correlation: Array = field(repr=False)
+    free: tuple[str, ...]
+    condition: float
+    weakest: Mapping[str, float]
+
+    @property
+    def telling(self) -> bool:
+        """Whether the targets tell the parameters apart."""
+        return self.condition < ILL_CONDITIONED
+
+    def figures(self) -> dict[str, Any]:
+        """In plain values: JSON has no infinity and no numbers that are none."""
+        return {
+            "deviations": dict(self.deviations),
+            "errors": dict(self.errors),
+            "reasons": dict(self.reasons),
+            "freedom": self.freedom,
+            "free": list(self.free),
+            "correlation": [[x if math.isfinite(x) else None for x in row] for row in self.correlation.tolist()],
+            "condition": self.condition if math.isfinite(self.condition) else None,
+            "weakest": dict(self.weakest),
+            "telling": self.telling,
+        }
+
+    def withheld(self, reason: str) -> Confidence:
+        """The same without deviations."""
+        none = dict.fromkeys(self.deviations)
+        reasons = {name: self.reasons[name] if name not in self.free else reason for name in none}
+        return replace(self, deviations=none, errors=none, reasons=reasons)
+
+
+def student_factor(freedom: int) -> float:
+    """Half the width of an interval of 68.27 % in standard errors that are estimated with so many degrees of freedom.
+
+    1.84 of one, 1.32 of two, 1 of infinitely many: Student's distribution.
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.5 * (1.0 + ONE_DEVIATION)))
+
+
+def confidence(study: DesignStudy, design: Evaluated, jacobian: Array, bound: Mapping[str, str]) -> Confidence:
+    """What a Jacobian says of a design found.
+
+    Parameters
+    ----------
+    study : DesignStudy
+    design : Evaluated
+    jacobian : (targets, parameters) array
+        By the place in the unit cube.
+    bound : mapping of str to str
+        Parameters at a bound, and at which: these are taken as known.
+    """
+    names = study.setting.names
+    free = [k for k, name in enumerate(names) if name not in bound]
+    _, stretches, directions = np.linalg.svd(jacobian[:, free], full_matrices=True)
+    stretches = np.concatenate([stretches, np.zeros(len(free) - stretches.size)])
+    sharp = bool(free) and stretches[-1] > np.finfo(float).eps * stretches[0]
+    freedom = len(study.targets) - len(free)
+    none: dict[str, float | None] = dict.fromkeys(names)
+    found = Confidence(
+        deviations=none,
+        errors=none,
+        reasons={name: f"at its {side} bound" for name, side in bound.items()},
+        freedom=freedom,
+        correlation=np.full((len(free), len(free)), np.nan),
+        free=tuple(names[k] for k in free),
+        condition=float(stretches[0] / stretches[-1]) if sharp else np.inf if free else 1.0,
+        weakest={names[k]: float(x) for k, x in zip(free, directions[-1], strict=True)} if free else {},
+    )
+    if not free:
+        return found
+    spread = np.full(len(free), np.nan)
+    if sharp:
+        covariance = directions.T @ np.diag(stretches**-2.0) @ directions
+        spread = np.sqrt(np.diag(covariance))
+        found = replace(found, correlation=covariance / np.outer(spread, spread))
+    if freedom <= 0:
+        return found.withheld(f"{len(study.targets)} targets leave nothing to judge {len(free)} free parameters by")
+    if not found.telling:
+        return found.withheld("the targets cannot tell the parameters apart")
+    left = _standard_deviation(study, design, freedom)
+    scaled = left * spread * study.per_unit(design.design)[free]
+    errors = none | {names[k]: float(x) for k, x in zip(free, scaled, strict=True)}
+    factor = student_factor(freedom)
+    return replace(
+        found, errors=errors, deviations={name: None if x is None else factor * x for name, x in errors.items()}
+    )
+
+
+def checked(
+    study: DesignStudy,
+    evaluate: Callable[[Sequence[tuple[float, ...]]], list[Evaluated]],
+    design: Evaluated,
+    jacobian: Array,
+    found: Confidence,
+) -> Confidence:
+    """Withhold deviations where residuals do not change by them as the Jacobian says.
+
+    Along every principal direction of the Jacobian two designs lie one standard error to both sides. Residuals change
+    from one to the other by twice their own standard deviation where the Jacobian is right and they are straight; noise
+    of the runs, slopes that are but noise and bends all show as a difference.
+    """
+    if all(value is None for value in found.deviations.values()):
+        return found
+    free = [study.setting.names.index(name) for name in found.free]
+    _, stretches, directions = np.linalg.svd(jacobian[:, free], full_matrices=False)
+    middle = study.unit(design.design)
+    steps = np.zeros((len(free), middle.size))
+    steps[:, free] = directions * (_standard_deviation(study, design, found.freedom) / stretches)[:, None]
+    for step in steps:
+        # Within the bounds, to both sides alike.
+        room = np.minimum(middle, 1.0 - middle) / np.maximum(np.abs(step), np.finfo(float).tiny)
+        step *= min(1.0, float(room[free].min()))
+    done = evaluate([study.design(middle + sign * step) for step in steps for sign in (-1.0, 1.0)])
+    for k, step in enumerate(steps):
+        sides = done[2 * k : 2 * k + 2]
+        along = ", ".join(f"{1e2 * step[j]:+.2g} % {study.setting.names[j]}" for j in free)
+        if not all(each.complete for each in sides):
+            return found.withheld(f"a design one standard error away does not run (along {along} of the ranges)")
+        change = 0.5 * (residuals(study.targets, sides[1]) - residuals(study.targets, sides[0]))
+        said = jacobian @ step
+        off = float(np.linalg.norm(change - said) / np.linalg.norm(said))
+        if not off <= _AGREES:
+            return found.withheld(
+                f"one standard error along {along} of the ranges changes the residuals by {1e2 * off:.0f} % otherwise "
+                "than their derivatives say: noise of the runs, or no straight line"
+            )
+    return found
+
+
+def _standard_deviation(study: DesignStudy, design: Evaluated, freedom: int) -> float:
+    """Of the residuals, from what is left of them."""
+    return float(np.sqrt(np.sum(residuals(study.targets, design) ** 2) / freedom))
