@@ -123,7 +123,7 @@ def _cell(value: object) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("method", nargs="*", default=list(METHODS), choices=list(RANGES), metavar="method")
+    parser.add_argument("method", nargs="*", default=list(METHODS), help=f"of {', '.join(RANGES)}")
     parser.add_argument("--runs", type=int, default=RUNS, help="of each method")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--target", nargs="*", help="processors, say generic haswell znver4")

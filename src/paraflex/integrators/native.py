@@ -32,7 +32,9 @@ from paraflex.kernel.run_state import (
     POSITION,
     PROJECTION,
     REJECTED,
+    ROOT,
     SAMPLE,
+    SLOPE,
     STEP,
     STEPS,
     TIME,
@@ -55,6 +57,10 @@ ROUNDING_PART = 1e-13
 # A run takes a handful of steps near each singular position, where shorter ones are not more exact: together they may
 # have an error of about this fraction of the tolerance.
 NEAR_ERROR = 0.01
+# It is not below what rounding makes of multipliers that have a pole [m].
+LEAST_NEAR_ERROR = 2e-11
+# A singular position is near that could be reached in this fraction of the time since the start.
+_AHEAD = 0.2
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
 _GAIN = 0.1
 _TREATMENTS = {
@@ -80,6 +86,15 @@ class NativeRun:
     def dependent_rows(self) -> int:
         """See `Run`."""
         return self.controls.dependent_rows
+
+    @property
+    def singular_ahead(self) -> float | None:
+        """See `Run`."""
+        root, slope = self.state.clock[ROOT], self.state.clock[SLOPE]
+        elapsed = self.state.clock[TIME] - self.problem.initial.time
+        if self.controls.treatment != POSITION or not slope < 0.0 or root > _AHEAD * elapsed * -slope:
+            return None
+        return float(self.state.clock[TIME] - root / slope)
 
     @property
     def attempts(self) -> int:
@@ -180,7 +195,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         treatment=treatment,
         fixed_step=options.step or 0.0,
         max_step=options.max_step,
-        near_error=NEAR_ERROR * options.tolerance,
+        near_error=max(NEAR_ERROR * options.tolerance, LEAST_NEAR_ERROR),
         dependent_part=ROUNDING_PART,
         dependent_rows=_mark_redundant(system, initial.q, workspace),
     )

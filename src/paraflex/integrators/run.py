@@ -115,6 +115,11 @@ class Run(Protocol):
         ...
 
     @property
+    def singular_ahead(self) -> float | None:
+        """Where an index-3 method is about to come to a singular position, when [s]."""
+        ...
+
+    @property
     def attempts(self) -> int:
         """Steps attempted."""
         ...

@@ -20,12 +20,14 @@ from paraflex.kernel.run_state import (
     BALANCE,
     BAUMGARTE,
     DPHI_MAX,
+    DRIFTED,
     ENERGY_0,
     ENTERS,
     ERROR_TEST,
     FACTOR_B,
     FAILURES,
     FINISHED,
+    HELD_END,
     LAST_ERROR,
     LAST_STEP,
     NEAR,
@@ -54,6 +56,8 @@ SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
 BY_ERROR, BY_LAST_ERROR, SMALLEST_ERROR = 0.7, 0.4, 1e-3
 # A new step this close to the old one is not worth a new factorisation.
 KEEP_ABOVE, KEEP_BELOW = 0.92, 1.2
+# A run comes near a singular position no further off the constraints than this many times the error allowed there.
+ENTRY = 100.0
 # Near a singular position the change in a step, of the root of what the row nearest to dependence has left.
 LEAST_PACE = 3e-3
 # There a step with an error so small, as part of what is allowed, may be twice as long.
@@ -160,7 +164,7 @@ def enter(p, signals, t, controls, m, ws):
     for j in range(m.q.size):
         ws.x[j] = m.q[j] - m.eq[j]
     m.counts[PREPARED] = 1
-    if not mass_norm(p, ws, ws.x) <= controls.near_error:
+    if not mass_norm(p, ws, ws.x) <= ENTRY * controls.near_error:
         copy(m.eq, m.q)
         copy(m.ev, m.v)
         m.counts[PREPARED] = -1
@@ -234,6 +238,7 @@ def accept(p, signals, tableau, controls, t, h, m, ws, out):
     m.power[0] = m.power[last]
     m.counts[STEPS] += 1
     m.counts[FAILURES] = 0
+    m.counts[DRIFTED] = m.counts[HELD_END]
     if m.counts[NEAR] == 0:
         m.counts[PREPARED] = 0
     kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)

@@ -18,7 +18,18 @@ from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.linear import solve_system
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.projection import CLOSED, least_change
-from paraflex.kernel.run_state import LAST_STEP, NEAR, PASSAGES, ROOT, ROOT_STEP, SLOPE, STEPS, WIDEST
+from paraflex.kernel.run_state import (
+    DRIFTED,
+    HELD_END,
+    LAST_STEP,
+    NEAR,
+    PASSAGES,
+    ROOT,
+    ROOT_STEP,
+    SLOPE,
+    STEPS,
+    WIDEST,
+)
 
 # A run is near a singular position where it could be there within so many steps, or where the root of what some row
 # has left is less than this of the most that rows had left; in either case what it has left is less than this part.
@@ -28,7 +39,8 @@ NEAR_STEPS, NEAR_ROOT, NEAR_PART = 8.0, 0.02, 0.1
 HELD, LEAST_HELD, MOST_HELD = 3.0, 0.5, 0.3
 # How fast what is known of a row's speed is forgotten, by step.
 FORGETTING = 0.9
-# Where a step begins that close, what has gathered until its end counts by this fraction.
+# What has gathered in a step that ended that close no shorter one takes back: at the end of the next ones that distance
+# counts by this fraction.
 LEAVING = 0.03
 # Corrections of position, and of velocity, towards the constraints.
 PASSES = 2
@@ -129,17 +141,17 @@ def damp_rows(p, ws, held, rows, scratch):
 def return_to_constraints(p, signals, t, held, m, ws):
     """Bring the end of a step near a singular position back to the constraints; how far it was from them [m].
 
-    Only as far as rows are trusted: of the others that distance is told by no more than they are.
+    Only as far as rows are trusted. Where they are not, what they are off by, and its rate times the time it takes to
+    where they are, still tell of that distance.
     """
     last = m.stage_q.shape[0] - 1
-    q, v, distance = m.stage_q[last], m.stage_v[last], 0.0
+    q, v = m.stage_q[last], m.stage_v[last]
     constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
-    if largest(ws.rows) > CLOSED:
-        damp_rows(p, ws, held, ws.rows, ws.mu)
-        least_change(p, ws.rows, ws)
-        distance = mass_norm(p, ws, ws.x)
-        if m.clock[ROOT] < held and ws.least[0] > held * held:
-            distance *= LEAVING
+    distance = damped_distance(p, ws.rows, held, ws)
+    if m.clock[SLOPE] != 0.0:
+        constraint_values(p, signals, t, q, v, ws.scratch, ws.mu, ws.rows)
+        distance = max(distance, held / abs(m.clock[SLOPE]) * damped_distance(p, ws.rows, held, ws))
+    m.counts[HELD_END] = 1 if ws.least[0] < held * held else 0
     for _ in range(PASSES):
         constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
         if largest(ws.rows) > CLOSED:
@@ -152,7 +164,17 @@ def return_to_constraints(p, signals, t, held, m, ws):
             hold_rows(p, ws, held, 0.0, ws.rows, ws.mu)
             least_change(p, ws.rows, ws)
             add(ws.x, v)
-    return distance
+    return distance * LEAVING if m.counts[DRIFTED] > 0 else distance
+
+
+@routine
+def damped_distance(p, rows, held, ws):
+    """How far constraints of these values are from being met [m], rows not trusted counting as far as they are."""
+    if largest(rows) <= CLOSED:
+        return 0.0
+    damp_rows(p, ws, held, rows, ws.mu)
+    least_change(p, rows, ws)
+    return mass_norm(p, ws, ws.x)
 
 
 @routine

@@ -32,6 +32,8 @@ NEAR = 12
 ROOT_STEP = 13
 # Whether the start of a step has been brought back to the constraints for that; -1 where it cannot be.
 PREPARED = 14
+# Whether rows were not trusted at the end of the last step attempted, and of the last one taken.
+HELD_END, DRIFTED = 15, 16
 
 
 # What keeps the constraints, as integers for kernels; index 3 is POSITION.
@@ -126,7 +128,7 @@ def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGA
     stage_v = apart((stages, n))
     return March(
         clock=apart(15),
-        counts=apart(15, np.int64),
+        counts=apart(17, np.int64),
         q=apart(n),
         v=apart(n),
         stage_t=apart((2, stages)),

@@ -38,6 +38,7 @@ from paraflex.kernel.run_state import (
     FACTORS,
     FRESH,
     GGL,
+    HELD_END,
     IMPATIENT,
     ITERATIONS,
     NEAR,
@@ -190,7 +191,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     at_singular = ws.least[0] < SINGULAR_PART
     note_root(m, ws)
     perhaps_near = ws.least[0] < NEAR_PART * m.clock[WIDEST] and m.counts[PREPARED] >= 0
-    m.counts[NEAR] = 0
+    m.counts[NEAR], m.counts[HELD_END] = 0, 0
     if perhaps_near and comes_near(h, m):
         if m.counts[PREPARED] == 0:
             return ENTERS, 0.0
