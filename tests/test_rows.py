@@ -2,8 +2,11 @@
 
 import dataclasses
 import json
+import re
+import sys
 import tomllib
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,12 +14,16 @@ from scipy.integrate import solve_ivp
 
 import paraflex as pf
 from paraflex.dynamics import build_system, start_state
-from paraflex.errors import InputError
+from paraflex.errors import InputError, SingularPositionError
 from paraflex.files import generator_names, library_text, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Motor, Start, chain_of_segments, four_bars_in_a_row
 from paraflex.motion import simulate_motion
 from test_cli import paraflex
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+
+from singular_passages import passage
 
 MOVING = Start(angular={"crank0": -1.0})
 
@@ -95,6 +102,57 @@ def test_two_four_bars_to_1e_7_by_the_method_of_order_4():
     ).solution
     phi = run.q[-1, system.body("crank0").angle]
     np.testing.assert_allclose([np.cos(phi), np.sin(phi)], [0.328458111539, 0.944518538179], rtol=0, atol=1e-7)
+
+
+# Runs that ended at a singular position, or had a thousand times the tolerance, while rows that depend on others were
+# dropped there for a whole step; on one processor or another.
+ONCE_LOST = [
+    ("esdirk5", 2, 2.9614743996024773, 2.1416488619190514e-9),
+    ("esdirk5", 2, 1.0, 6.0402435866691772e-10),
+    ("esdirk4", 2, 1.4637997569242769, 1.6227040078768909e-9),
+    ("esdirk5", 2, 1.0, 3.6e-9),
+    ("esdirk3", 2, 2.0, 2.4e-4),
+]
+
+
+@pytest.mark.parametrize(("method", "n", "speed", "tolerance"), ONCE_LOST)
+def test_a_passage_keeps_the_tolerance(method, n, speed, tolerance):
+    run = passage(method, n, speed, tolerance)
+    assert run.ratio is not None, run.failure
+    assert run.ratio < 10.0
+
+
+@pytest.mark.parametrize("method", ["tr-bdf2", "trapezoidal", "esdirk3", "esdirk4", "esdirk5"])
+def test_passages_keep_the_tolerance_wherever_steps_fall(method):
+    """Speeds, tolerances and numbers of loops at random; `benchmarks/singular_passages.py` does so a thousand times."""
+    rng = np.random.default_rng(7)
+    for _ in range(12):
+        n, speed, tolerance = int(rng.integers(1, 4)), rng.uniform(1.0, 3.0), 10.0 ** rng.uniform(-5.0, -2.0)
+        run = passage(method, n, speed, tolerance, duration=4.0)
+        assert run.ratio is not None, run.failure
+        assert run.ratio < 10.0
+
+
+def test_a_passage_takes_a_handful_of_steps():
+    """Steps that shrank towards ten positions in line, and hardly grew again, were 76 thousand."""
+    run = passage("esdirk5", 2, 1.0, 1e-6)
+    assert run.steps < 5000
+
+
+def test_an_index_3_method_says_which_position_it_does_not_pass():
+    """All links are in line 0.7144 s after the start."""
+    system, start = started(four_bars_in_a_row(2))
+    with pytest.raises(SingularPositionError, match=r"singular position lies ahead.*newmark.*esdirk4") as caught:
+        simulate_motion(
+            system.mechanism, 10.0, samples=2, start=start, method="newmark",
+            options=IntegrationOptions(tolerance=1e-3),
+        )  # fmt: skip
+    found = re.search(r"about t = ([\d.]+) s", str(caught.value))
+    assert found
+    assert caught.value.moment
+    ahead = float(found.group(1))
+    assert np.cos(2 * crank_angle(2, np.array([0.0, ahead]))[-1]) == pytest.approx(1.0, abs=1e-3)
+    assert caught.value.moment.time < 0.7144
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5])

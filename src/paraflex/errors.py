@@ -27,6 +27,7 @@ __all__ = [
     "OutputError",
     "ParaflexError",
     "SingularActuationError",
+    "SingularPositionError",
     "StiffnessWarning",
     "UnreachablePathError",
     "ValidityWarning",
@@ -175,6 +176,10 @@ class SingularActuationError(ActuationError):
 
 class IntegrationError(NumericalError):
     """Forward simulation stopped before its end: singular constraints, no convergence, or too many steps."""
+
+
+class SingularPositionError(IntegrationError):
+    """A run came to a singular position, where constraints depend on one another, and did not pass it."""
 
 
 class ConstraintDriftError(IntegrationError):

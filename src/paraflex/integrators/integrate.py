@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, redundant_rows
-from paraflex.errors import ConstraintDriftError, IntegrationError, Moment
+from paraflex.errors import ConstraintDriftError, IntegrationError, Moment, SingularPositionError
 from paraflex.integrators import native, outside
 from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.gauges import make_gauges
@@ -76,6 +76,9 @@ def integrate(
         The run cannot go on; it carries the partial solution.
     ConstraintDriftError
         Constraints are left further than errors of integration explain; it carries the partial solution as well.
+    SingularPositionError
+        It cannot pass a singular position: the mechanism is driven beyond its reach there, or its method is one of
+        the Newmark family.
     InputError
         Times that do not ascend from the start; events that the mechanism cannot have, or a start beyond one.
     """
@@ -110,10 +113,12 @@ def integrate(
     now = run.now()
     # Near a singular position it may be Newton or the error test that gives up first.
     lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and not (bent or drift) else []
-    if len(lost) > run.dependent_rows:
-        cause = f"the constraints lose rank, a singular position ({', '.join(lost)})"
-    moment = Moment(now.t, solution.steps)
     error = ConstraintDriftError if drift and not bent else IntegrationError
+    if len(lost) > run.dependent_rows:
+        error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)})"
+    elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
+        error, cause = SingularPositionError, _before_singular(options.method, run.singular_ahead)
+    moment = Moment(now.t, solution.steps)
     raise error(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
 
 
@@ -129,6 +134,13 @@ def _cause(code: int, options: IntegrationOptions) -> str:
     if code == PAUSED:
         return f"no end after {options.max_steps} steps"
     return _NOT_IN_PARTS if code == NO_CONVERGENCE and options.step is not None else _CAUSES[code]
+
+
+def _before_singular(method: str, time: float) -> str:
+    return (
+        f"a singular position lies ahead, at about t = {time:.4g} s, which {method} on index-3 equations cannot be "
+        "relied on to pass: choose an ESDIRK method, say tr-bdf2 or esdirk4"
+    )
 
 
 def _solution(

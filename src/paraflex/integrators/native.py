@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from paraflex.dynamics import System
 from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.newmark import newmark_numbers, newmark_scheme
 from paraflex.integrators.options import IntegrationOptions
@@ -30,7 +32,9 @@ from paraflex.kernel.run_state import (
     POSITION,
     PROJECTION,
     REJECTED,
+    ROOT,
     SAMPLE,
+    SLOPE,
     STEP,
     STEPS,
     TIME,
@@ -48,6 +52,15 @@ from paraflex.kernel.run_state import (
 _NEWTON_MEMORY = 0.02
 
 
+# A row not redundant at the start with less than this of its square left depends on others but for rounding.
+ROUNDING_PART = 1e-13
+# A run takes a handful of steps near each singular position, where shorter ones are not more exact: together they may
+# have an error of about this fraction of the tolerance.
+NEAR_ERROR = 0.01
+# It is not below what rounding makes of multipliers that have a pole [m].
+LEAST_NEAR_ERROR = 2e-11
+# A singular position is near that could be reached in this fraction of the time since the start.
+_AHEAD = 0.2
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
 _GAIN = 0.1
 _TREATMENTS = {
@@ -73,6 +86,15 @@ class NativeRun:
     def dependent_rows(self) -> int:
         """See `Run`."""
         return self.controls.dependent_rows
+
+    @property
+    def singular_ahead(self) -> float | None:
+        """See `Run`."""
+        root, slope = self.state.clock[ROOT], self.state.clock[SLOPE]
+        elapsed = self.state.clock[TIME] - self.problem.initial.time
+        if self.controls.treatment != POSITION or not slope < 0.0 or root > _AHEAD * elapsed * -slope:
+            return None
+        return float(self.state.clock[TIME] - root / slope)
 
     @property
     def attempts(self) -> int:
@@ -144,6 +166,15 @@ def _scheme(options: IntegrationOptions) -> Tableau:
     return newmark_scheme(newmark_numbers(options.method, options.all_parameters))
 
 
+def _mark_redundant(system: System, q: NDArray[np.float64], workspace: Workspace) -> int:
+    """Note the rows that follow from others at a pose; their number."""
+    packed = system.packed
+    count = int(factor_system(packed, 0.0, q, workspace))
+    dependent = workspace.schur[packed.rows["start"] + np.arange(system.m) - packed.rows["first"]] == 0.0
+    workspace.redundant[dependent] = DEPENDENT_PART
+    return count
+
+
 def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     """Set up a run."""
     system, initial, span = problem.system, problem.initial, problem.span
@@ -164,8 +195,9 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         treatment=treatment,
         fixed_step=options.step or 0.0,
         max_step=options.max_step,
-        dependent_part=DEPENDENT_PART,
-        dependent_rows=int(factor_system(system.packed, 0.0, initial.q, workspace)),
+        near_error=max(NEAR_ERROR * options.tolerance, LEAST_NEAR_ERROR),
+        dependent_part=ROUNDING_PART,
+        dependent_rows=_mark_redundant(system, initial.q, workspace),
     )
     return NativeRun(
         problem=problem,

@@ -50,6 +50,11 @@ class OutsideRun:
         )
 
     @property
+    def singular_ahead(self) -> float | None:
+        """See `Run`: none is of index 3."""
+        return None
+
+    @property
     def attempts(self) -> int:
         """See `Run`."""
         return self._steps + self._stepper.effort().rejected if self._steps else 0

@@ -22,8 +22,8 @@ FIRST_STEP = 1e-6
 # A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average: by the error
 # times this fraction of the run.
 MEMORY = 0.25
-# Constraint rows with less than this of their squares left depend on the others for the moment and keep their
-# multipliers: small enough that this lasts a thousandth of a radian, large enough for good conditioning elsewhere.
+# Constraint rows with less than this of their squares left depend on the others: those that did at the start, whatever
+# errors leave of them; and for solvers of others any, small enough that this lasts a thousandth of a radian.
 DEPENDENT_PART = 1e-7
 
 
@@ -112,6 +112,11 @@ class Run(Protocol):
 
     def now(self) -> Instant:
         """Where it stands."""
+        ...
+
+    @property
+    def singular_ahead(self) -> float | None:
+        """Where an index-3 method is about to come to a singular position, when [s]."""
         ...
 
     @property

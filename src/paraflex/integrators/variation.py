@@ -220,6 +220,7 @@ class _Varied:
         self.march = make_march(system.n, system.m, stages, len(system.mechanism.motors))
         self.march.q[:], self.march.v[:] = initial.q, initial.v
         self.workspace, self.samples = system.workspace(), empty_samples(problem.times, system)
+        self.workspace.redundant[:] = run.workspace.redundant
         self.tangent, self.space = make_tangent(system.packed), make_krylov(system.n, system.m)
         self.moved = [
             (_moved(system.packed, direction.packed), _moved(problem.signals, direction.signals))

@@ -19,6 +19,10 @@ from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 # A pivot smaller than this fraction of its diagonal entry marks a constraint row that depends on those before it.
 DEPENDENT_ROW = 1e-12
+# Where any row has less than this of its square left a position is singular.
+SINGULAR_PART = 1e-10
+# A row redundant at the start that has this part left is so no longer: the start was a singular position.
+INDEPENDENT = 1e-3
 
 
 @inlined
@@ -99,6 +103,7 @@ def factor_schur(p, ws, dependent_part):
     the pseudo-inverse (Eq. 59) as long as the constraints are consistent.
     """
     dependent = 0
+    ws.least[0] = 1.0
     for i in range(p.rows.size):
         first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
         for j in range(first, i):
@@ -112,7 +117,11 @@ def factor_schur(p, ws, dependent_part):
         pivot = diagonal
         for k in range(first, i):
             pivot -= ws.schur[start + k] * ws.schur[start + k]
-        if pivot > dependent_part * diagonal:
+        if ws.redundant[i] > 0.0 and pivot > INDEPENDENT * diagonal:
+            ws.redundant[i] = 0.0
+        if ws.redundant[i] == 0.0 and pivot < ws.least[0] * diagonal:
+            ws.least[0], ws.least[1] = pivot / diagonal, i
+        if pivot > max(dependent_part, ws.redundant[i]) * diagonal:
             ws.schur[start + i] = 1.0 / sqrt(pivot)
         else:
             ws.schur[start + i] = 0.0

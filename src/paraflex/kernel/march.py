@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil
+from math import ceil, sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
@@ -10,7 +10,9 @@ from paraflex.kernel.compiling import inlined, lasting, routine, seldom
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
-from paraflex.kernel.linear import orient, right_hand_side, solve_system
+from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_system
+from paraflex.kernel.metric import mass_norm
+from paraflex.kernel.near import note_crossing
 from paraflex.kernel.newmark import restart_algorithmic
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.projection import project
@@ -18,25 +20,33 @@ from paraflex.kernel.run_state import (
     BALANCE,
     BAUMGARTE,
     DPHI_MAX,
+    DRIFTED,
     ENERGY_0,
+    ENTERS,
     ERROR_TEST,
     FACTOR_B,
     FAILURES,
     FINISHED,
+    HELD_END,
     LAST_ERROR,
     LAST_STEP,
+    NEAR,
     PART,
     PART_END,
     PAUSED,
     PHI_MAX,
+    PREPARED,
     PROJECTION,
     REJECTED,
+    ROOT_STEP,
     SAMPLE,
+    SLOPE,
     STEP,
     STEPS,
     STOP,
     TIME,
     WEIGHT_0,
+    WIDEST,
     WORK,
 )
 from paraflex.kernel.stage import equations
@@ -48,6 +58,12 @@ SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
 BY_ERROR, BY_LAST_ERROR, SMALLEST_ERROR = 0.7, 0.4, 1e-3
 # A new step this close to the old one is not worth a new factorisation.
 KEEP_ABOVE, KEEP_BELOW = 0.92, 1.2
+# A run comes near a singular position no further off the constraints than this many times the error allowed there.
+ENTRY = 100.0
+# Near a singular position the change in a step, of the root of what the row nearest to dependence has left.
+LEAST_PACE = 3e-3
+# There a step with an error so small, as part of what is allowed, may be twice as long.
+GROWING = 0.05
 # The smallest step, as a fraction of the time span.
 MIN_STEP = 1e-12
 # A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
@@ -125,10 +141,12 @@ def first_stage(p, signals, t, controls, m, ws):
     note_friction(p, m.q, m.v, ws.mu, ws.compliance)
     factor_bodies(p, 0.0, m.q, ws)
     orient(p, m.q, ws, controls.dependent_part)
+    m.clock[FACTOR_B] = -1.0
+    if ws.least[0] < SINGULAR_PART and m.counts[STEPS] > 0:
+        return
     weights = INDEX_1
     if controls.treatment == BAUMGARTE and controls.gain == 0.0:
         weights = (1.0, 2.0 * controls.alpha, controls.beta * controls.beta)
-    m.clock[FACTOR_B] = -1.0
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
     for _ in range(2):
         equations(p, signals, t, weights, m.q, m.v, a, lam, m.torques, ws)
@@ -136,6 +154,29 @@ def first_stage(p, signals, t, controls, m, ws):
         solve_system(p, ws, ws.x, ws.mu)
         add(ws.x, a)
         add(ws.mu, lam)
+
+
+@routine
+def enter(p, signals, t, controls, m, ws):
+    """Where a run comes near a singular position: bring it back to the constraints, what is left of them would grow.
+
+    Where there is no place on them so near by the mechanism is driven beyond its reach, and cannot pass.
+    """
+    copy(m.q, m.eq)
+    copy(m.v, m.ev)
+    project(p, signals, t, m.q, m.v, ws)
+    for j in range(m.q.size):
+        ws.x[j] = m.q[j] - m.eq[j]
+    m.counts[PREPARED] = 1
+    if not mass_norm(p, ws, ws.x) <= ENTRY * controls.near_error:
+        copy(m.eq, m.q)
+        copy(m.ev, m.v)
+        m.counts[PREPARED] = -1
+        return
+    copy(m.q, m.stage_q[0])
+    copy(m.v, m.stage_v[0])
+    copy(m.v, m.stage_d[0])
+    first_stage(p, signals, t, controls, m, ws)
 
 
 @seldom
@@ -151,6 +192,7 @@ def start(p, signals, tableau, controls, m, ws, out):
     copy(a, m.algorithmic[0])
     m.clock[LAST_STEP], m.clock[LAST_ERROR] = 0.0, 1.0
     m.clock[PART_END] = t
+    m.clock[SLOPE], m.counts[ROOT_STEP] = 0.0, -1
     m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques, ws)
     kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)
     strain += spring_energy(p, lam) + line_energy(p, m.q, m.v)[0]
@@ -179,7 +221,9 @@ def note_constraints(p, signals, t, m, ws):
 def accept(p, signals, tableau, controls, t, h, m, ws, out):
     """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1
-    if controls.treatment == PROJECTION:
+    if m.counts[NEAR] > 0:
+        note_crossing(p, t, h, m, ws)
+    if controls.treatment == PROJECTION and m.counts[NEAR] == 0:
         project(p, signals, t + h, m.stage_q[last], m.stage_v[last], ws)
     write_samples(p, tableau, t, h, m, ws, out)
     copy(m.stage_q[last], m.q)
@@ -199,6 +243,9 @@ def accept(p, signals, tableau, controls, t, h, m, ws, out):
     m.power[0] = m.power[last]
     m.counts[STEPS] += 1
     m.counts[FAILURES] = 0
+    m.counts[DRIFTED] = m.counts[HELD_END]
+    if m.counts[NEAR] == 0:
+        m.counts[PREPARED] = 0
     kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)
     strain += spring_energy(p, m.stage_lam[0]) + line_energy(p, m.q, m.v)[0]
     done = m.clock[WORK] + weight_work(p, m.q, ws.scratch) - m.clock[WEIGHT_0]
@@ -242,11 +289,20 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
         elif left < 2.0 * h and controls.fixed_step == 0.0:
             h = 0.5 * left
         cause, error = attempt(p, signals, tableau, controls, t, h, m, ws, slow)
+        if cause == ENTERS:
+            enter(p, signals, t, controls, m, ws)
+            continue
         if cause == PAUSED and error <= 1.0:
             after_failure = m.counts[FAILURES] > 0
             accept(p, signals, tableau, controls, t, h, m, ws, out)
             m.clock[TIME] = end if landing else t + h
             if controls.fixed_step > 0.0:
+                continue
+            # Near a singular position steps are of one length, and not so short that rounding tells.
+            if m.counts[NEAR] > 0:
+                pace = abs(m.clock[SLOPE]) * h
+                if pace < LEAST_PACE * sqrt(m.clock[WIDEST]) and error < GROWING and not after_failure:
+                    m.clock[STEP] = MAX_FACTOR * h
                 continue
             error = max(error, SMALLEST_ERROR) / SAFETY**tableau.order
             factor = error ** (-BY_ERROR * exponent) * m.clock[LAST_ERROR] ** (BY_LAST_ERROR * exponent)

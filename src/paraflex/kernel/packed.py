@@ -266,6 +266,8 @@ class Workspace(NamedTuple):
     response: NDArray[np.float64]
     blocks: NDArray[np.float64]  # J M^-1 J^T of every body, in its frame
     schur: NDArray[np.float64]  # envelope of the Schur complement, then its Cholesky factor
+    redundant: NDArray[np.float64]  # (m,) of rows redundant since the start: the part below which one is dependent
+    least: NDArray[np.float64]  # (2,) the smallest part of its square left of any other row, and which row
     # Where there is `PackedSystem.bending`, of bodies with a dense iteration matrix, else None:
     mass: NDArray[np.float64] | None  # M of every body, (3 + nf)^2
     dense: NDArray[np.float64] | None  # the factor of M + b (K + K_g)
@@ -301,6 +303,8 @@ def make_workspace(p: PackedSystem) -> Workspace:
         response=apart(lanes),
         blocks=apart(int(np.sum(p.bodies["parts"] * p.bodies["lanes"]))),
         schur=apart(envelope),
+        redundant=apart(m),
+        least=apart(2),
         mass=None if p.bending is None else apart(dense),
         dense=None if p.bending is None else apart(dense),
         inverse=None if p.bending is None else apart(inverse),

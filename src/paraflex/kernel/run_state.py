@@ -14,15 +14,28 @@ from paraflex.kernel.records import by_reference
 MOST_PASSAGES = 1000
 # Why `march` returned.
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
+# Why `attempt` did so besides: the step comes near a singular position, and its start is to be prepared.
+ENTERS = 5
 # March.clock
 TIME, STEP, WORK, FACTOR_B, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(12)
 # and of a fixed step in which Newton's iteration did not converge: when it ends, and how long its parts are.
 PART_END, PART = range(15, 17)
+# and of the row nearest to dependence: the root of the part of its square left, how fast that changes [1/s], and the
+# largest part so far.
+ROOT, SLOPE, WIDEST = range(12, 15)
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
 # and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
 # new one each.
 FRESH, EXCESS, REUSED, IMPATIENT = range(8, 12)
+# Near a singular position: one more than the row nearest to dependence at the start of the step.
+NEAR = 12
+# The step at whose start ROOT was taken.
+ROOT_STEP = 13
+# Whether the start of a step has been brought back to the constraints for that; -1 where it cannot be.
+PREPARED = 14
+# Whether rows were not trusted at the end of the last step attempted, and of the last one taken.
+HELD_END, DRIFTED = 15, 16
 
 
 # What keeps the constraints, as integers for kernels; index 3 is POSITION.
@@ -65,6 +78,7 @@ class Controls(NamedTuple):
     treatment: int
     max_step: float
     fixed_step: float  # zero where steps are chosen by their errors
+    near_error: float  # error allowed in a step near a singular position, where that is more [m]
     dependent_rows: int
     dependent_part: float  # a row with less than this of its diagonal left when others are eliminated depends on them
 
@@ -94,6 +108,7 @@ class March(NamedTuple):
         np.float64
     ]  # (2, n) acceleration that the Newmark family carries, of the last step and of this
     passages: NDArray[np.float64]  # (2, MOST_PASSAGES) from when to when more rows were dependent than at the start
+    opening: NDArray[np.float64]  # (n,) near a singular position: what opens the row nearest to dependence by one unit
     guess_t: NDArray[np.float64]  # (3,) times of the stages a guess is extrapolated from
     guess_s: NDArray[np.int64]  # (3, 2) and where they stand in stage_a
 
@@ -115,7 +130,7 @@ def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGA
     stage_v = apart((stages, n))
     return March(
         clock=apart(17),
-        counts=apart(12, np.int64),
+        counts=apart(17, np.int64),
         q=apart(n),
         v=apart(n),
         stage_t=apart((2, stages)),
@@ -133,6 +148,7 @@ def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGA
         torques=apart(motors),
         algorithmic=apart((2, n)),
         passages=apart((2, MOST_PASSAGES)),
+        opening=apart(n),
         guess_t=apart(3),
         guess_s=apart((3, 2), np.int64),
     )

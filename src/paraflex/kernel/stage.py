@@ -20,6 +20,7 @@ from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.bodies import begin_body
 from paraflex.kernel.compiling import inlined, routine, seldom
 from paraflex.kernel.constraints import constraint_values
+from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import (
     add_efforts,
     add_joints,
@@ -29,15 +30,16 @@ from paraflex.kernel.joints import (
     start_compliant_rows,
     start_rows,
 )
-from paraflex.kernel.linear import right_hand_side, solve_system
+from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_system
 from paraflex.kernel.metric import mass_norm
+from paraflex.kernel.near import hold_rows
 from paraflex.kernel.projection import least_change
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.sums import hand_on
 
-MAX_ITERATIONS = 8
+MAX_ITERATIONS, NEAR_ITERATIONS = 8, 24
 # SLOW: it still contracts after so many iterations.
-CONVERGED, DIVERGED, SLOW = 0, 1, 3
+CONVERGED, DIVERGED, SINGULAR, SLOW = range(4)
 # The slowest contraction worth going on with, assumed of a new factor until one is measured.
 WORST_RATE = 0.5
 # After a guess that was right but for a direction that the norm hardly sees, the second change may be larger than the
@@ -85,7 +87,10 @@ def residuals(p, signals, t, weights, q, v, a, lam, torques, ws):
 
 
 @routine
-def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, tolerance, time_scale, rate, ws):
+def solve_stage(
+    p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, tolerance, time_scale, rate, dependent_part,
+    renew, held, lag, ws,
+):  # fmt: skip
     """Newton iteration for one stage; a and lam are starting guesses and then the solution.
 
     Parameters
@@ -99,6 +104,12 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
         Largest error left in q, in the mass norm; in v it is tolerance / time_scale.
     rate : float
         Contraction measured in earlier stages with this factor.
+    dependent_part : float
+        See `factor_schur`.
+    renew : bool
+        Whether every iteration factors the matrix where it stands, as near a singular position.
+    held, lag : float
+        There what rows say is trusted as far as these tell: see `hold_rows`.
 
     Returns
     -------
@@ -108,10 +119,17 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     previous = 0.0
     note_torques(signals, t, torques)
-    for iteration in range(1, MAX_ITERATIONS + 1):
+    for iteration in range(1, (NEAR_ITERATIONS if renew else MAX_ITERATIONS) + 1):
         place(qs, vs, g, b, a, shift, ws)
+        if renew:
+            factor_bodies(p, b, ws.q, ws)
+            orient(p, ws.q, ws, dependent_part)
+            if ws.least[0] < SINGULAR_PART:
+                return SINGULAR, iteration, rate
         residuals(p, signals, t, weights, ws.q, ws.v, a, lam, torques, ws)
         right_hand_side(p, ws, scale)
+        if renew:
+            hold_rows(p, ws, held, lag, ws.mu, ws.rows)
         solve_system(p, ws, ws.x, ws.mu)
         add(ws.x, a)
         add(ws.mu, lam)
@@ -120,6 +138,8 @@ def solve_stage(p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, to
         if shift.size > 0:
             place(qs, vs, g, b, a, shift, ws)
             constraint_values(p, signals, t, ws.q, ws.v, ws.scratch, ws.rows, ws.mu)
+            if renew:
+                hold_rows(p, ws, held, 0.0, ws.rows, ws.mu)
             least_change(p, ws.rows, ws)
             add(ws.x, shift)
             change = max(change, mass_norm(p, ws, ws.x))

@@ -17,29 +17,44 @@ from paraflex.kernel.constraints import dissipated_power, note_friction
 from paraflex.kernel.error import embedded_error, filtered_error, history_error
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
-from paraflex.kernel.linear import orient
+from paraflex.kernel.linear import SINGULAR_PART, orient
+from paraflex.kernel.near import (
+    NEAR_PART,
+    begin_near,
+    comes_near,
+    note_passage,
+    note_position,
+    note_root,
+    return_to_constraints,
+    share_of_passage,
+    trust,
+)
 from paraflex.kernel.newmark import newmark_end, newmark_start
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
+    ENTERS,
     EXCESS,
     FACTOR_B,
     FACTORS,
     FRESH,
     GGL,
+    HELD_END,
     IMPATIENT,
     ITERATIONS,
+    NEAR,
     NO_CONVERGENCE,
     NOT_FINITE,
     PART_END,
-    PASSAGES,
     PAUSED,
     POSITION,
+    PREPARED,
     PROJECTION,
     RATE,
     REUSED,
+    WIDEST,
 )
 from paraflex.kernel.signals import evaluate_signal
-from paraflex.kernel.stage import CONVERGED, SLOW, WORST_RATE, solve_stage
+from paraflex.kernel.stage import CONVERGED, SINGULAR, SLOW, WORST_RATE, place, solve_stage
 
 # A new factor costs about as much as this many iterations: it pays once the old one has cost so many more.
 # Of second-order geometry it costs more.
@@ -127,19 +142,6 @@ def note_excess(p, iterations, fresh, m):
 
 
 @routine
-def note_passage(t, h, m):
-    """Keep from when to when a run is at a singular position; steps that touch are of one."""
-    last = m.counts[PASSAGES] - 1
-    if last >= 0:
-        if t <= m.passages[1, last]:
-            m.passages[1, last] = max(t + h, m.passages[1, last])
-            return
-    if last + 1 < m.passages.shape[1]:
-        m.passages[0, last + 1], m.passages[1, last + 1] = t, t + h
-        m.counts[PASSAGES] += 1
-
-
-@routine
 def stage_start(tableau, i, t, h, m):
     """Explicit parts of stage i into m.qs and m.vs; its time, g and b."""
     g = tableau.A[i, i] * h
@@ -189,27 +191,50 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     if fresh:
         renew_factor(p, b, m, ws)
     rubs = note_friction(p, m.q, m.v, ws.mu, ws.compliance)
-    # Rows that depend on others here keep their multipliers: so a singular position is passed.
-    if orient(p, m.q, ws, controls.dependent_part) > controls.dependent_rows:
-        note_passage(t, h, m)
-    tolerance = controls.newton_fraction * controls.rate * h
+    orient(p, m.q, ws, controls.dependent_part)
+    at_singular = ws.least[0] < SINGULAR_PART
+    note_root(m, ws)
+    perhaps_near = ws.least[0] < NEAR_PART * m.clock[WIDEST] and m.counts[PREPARED] >= 0
+    m.counts[NEAR], m.counts[HELD_END] = 0, 0
+    if perhaps_near and comes_near(h, m):
+        if m.counts[PREPARED] == 0:
+            return ENTERS, 0.0
+        begin_near(p, m, ws)
+    tolerance, allowed = controls.newton_fraction * controls.rate * h, controls.rate * h
     before = m.counts[ITERATIONS]
     i, rounds = 1, 0
     while i < stages:
         if not one_stage:
             x, g, b = stage_start(tableau, i, t, h, m)
         m.stage_t[1, i] = t + tableau.c[i] * h
+        held, lag = trust(weights, g, b, x - t, m)
         if rounds == 0:
             predict(i, x, h, m)
             copy(m.stage_lam[i - 1], m.stage_lam[i])
             fill(m.shift, 0.0)
         status, iterations, rate = solve_stage(
             p, signals, x, g, b, weights, m.qs, m.vs, m.stage_a[1, i], m.stage_lam[i], m.shift,
-            m.torques, tolerance, controls.newton_memory, m.clock[RATE], ws,
+            m.torques, tolerance, controls.newton_memory, m.clock[RATE],
+            controls.dependent_part, m.counts[NEAR] > 0, held, lag, ws,
         )  # fmt: skip
         m.counts[ITERATIONS] += iterations
         m.clock[RATE] = rate
-        if status != CONVERGED:
+        if status == SINGULAR:
+            if at_singular:
+                note_passage(t, h, m)
+                m.counts[NEAR], perhaps_near, rounds = 0, False, 0
+                continue
+            note_position(m.stage_t[1, i], t, h, m)
+            # Constraints do not say what the accelerations are here, but those before do.
+            predict(i, x, h, m)
+            place(m.qs, m.vs, g, b, m.stage_a[1, i], m.shift, ws)
+        elif status != CONVERGED:
+            if fresh and perhaps_near and m.counts[NEAR] == 0 and not at_singular:
+                if m.counts[PREPARED] == 0:
+                    return ENTERS, 0.0
+                begin_near(p, m, ws)
+                rounds = 0
+                continue
             goes_on = rubs or (status == SLOW and controls.fixed_step > 0.0)
             if fresh and (rounds == ROUNDS or not goes_on):
                 return NO_CONVERGENCE, 0.0
@@ -234,6 +259,10 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
         m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques, ws)
         i += 1
     note_excess(p, m.counts[ITERATIONS] - before, fresh, m)
+    moved = 0.0
+    if m.counts[NEAR] > 0:
+        m.clock[FACTOR_B] = -1.0
+        moved = return_to_constraints(p, signals, t + h, held, m, ws) / controls.near_error
     error = 0.0
     if controls.fixed_step == 0.0:
         if tableau.error.size > 0:
@@ -241,7 +270,9 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
         else:
             history_error(h, m)
         error_q, error_v = filtered_error(p, b**0.5, rates, controls.memory, m, ws, slow)
-        error = max(error_q, error_v) / (controls.rate * h)
+        if m.counts[NEAR] > 0:
+            allowed = max(allowed, controls.near_error * share_of_passage(h, m))
+        error = max(max(error_q, error_v) / allowed, moved)
     if not isfinite(error):
         return NOT_FINITE, 0.0
     return PAUSED, error
