@@ -232,7 +232,7 @@ def test_an_identification_and_indices(tmp_path: Path) -> None:
     found = IdentificationResult(
         folder=tmp_path, table=tmp_path / "t", values={"x": 1.5}, start={"x": 1.0}, residual=0.05, start_residual=0.5,
         targets=(Reached(target, 2.1, 1.0, 0.05),), confidence=None, bounds={}, evaluations=7, fresh=0, failed=0,
-        reasons=(), stopped="converged", interrupted=False, seconds=1.0,
+        reasons=(), derivatives="exact", stopped="converged", interrupted=False, seconds=1.0,
     )  # fmt: skip
     shown = read(identification_html(found))
     assert row(shown, "x")[:3] == ["x", "1", "1.5"]

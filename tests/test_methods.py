@@ -268,7 +268,7 @@ def test_newtons_failure_at_a_fixed_step_is_typed_and_keeps_what_was_computed(me
     """A step in which the crank would turn several times."""
     problem = study.started()
     options = IntegrationOptions(method=method, step=0.5)
-    torque = study.smooth_torque()._replace(coefficients=200.0 * study.smooth_torque().coefficients)
+    torque = study.smooth_torque()._replace(coefficients=2000.0 * study.smooth_torque().coefficients)
     with pytest.raises(IntegrationError) as caught:
         integrate(problem[0], torque, problem[1], np.array([0.0, 1.0]), options=options)
     assert "Newton" in caught.value.cause

@@ -35,13 +35,11 @@ class StudyRequest:
 
 def with_frames(mechanism: Mechanism, reference: str | None, curvature: str | None) -> Mechanism:
     """The mechanism with all beams in the frames and of the curvature asked for; None leaves them as they are."""
-    for name, value in (("reference", reference), ("curvature", curvature)):
-        if value is not None:
-            try:
-                mechanism = mechanism.with_beams(**{name: value})
-            except InputError as error:
-                raise InputError(error.problem, field=f"--{name}", value=value, remedy=error.remedy) from None
-    return mechanism
+    try:
+        return mechanism.with_beams(reference=reference, curvature=curvature)
+    except InputError as error:
+        flag = f"--{error.field.rpartition('.')[2]}"
+        raise InputError(error.problem, field=flag, value=error.value, remedy=error.remedy) from None
 
 
 def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:

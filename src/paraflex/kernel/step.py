@@ -202,7 +202,7 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
         begin_near(p, m, ws)
     tolerance, allowed = controls.newton_fraction * controls.rate * h, controls.rate * h
     before = m.counts[ITERATIONS]
-    i, rounds = 1, 0
+    i, rounds, held = 1, 0, 0.0
     while i < stages:
         if not one_stage:
             x, g, b = stage_start(tableau, i, t, h, m)
