@@ -13,11 +13,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import paraflex as pf
-from paraflex.dynamics import build_system, start_state
+from paraflex.dynamics import build_system, consistent_state, start_state
 from paraflex.errors import InputError, SingularPositionError
 from paraflex.files import generator_names, library_text, load
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import Motor, Start, chain_of_segments, four_bars_in_a_row
+from paraflex.kernel.linear import factor_system
+from paraflex.kernel.near import NEAR_PART
+from paraflex.kernel.packed import CONSTRAINT
+from paraflex.mechanism import Motor, Start, chain_of_segments, finite_segments, four_bars_in_a_row
 from paraflex.motion import simulate_motion
 from test_cli import paraflex
 
@@ -223,6 +226,19 @@ def test_many_segments_approach_the_cable():
         tips.append(q[last.position] + np.array([np.cos(phi), np.sin(phi)]) / n)
     coarse, fine = (np.linalg.norm(b - a) for a, b in pairwise(tips))
     assert 3.0 < coarse / fine < 5.0
+
+
+def test_rows_of_stiff_springs_are_not_taken_for_a_singular_position():
+    # The longer a step, the less a spring between segments gives beside their inertia; it always gives something.
+    system = build_system(finite_segments(pf.raparm_i(), 16).mechanism)
+    q = consistent_state(system, system.mechanism.assembly()).q
+    least = []
+    for b in (1e-14, 1e-8):
+        workspace = system.workspace()
+        factor_system(system.packed, b, q, workspace)
+        least.append(workspace.least[0])
+        assert system.packed.rows["kind"][int(workspace.least[1])] == CONSTRAINT
+    assert least[1] > NEAR_PART * least[0]
 
 
 @pytest.mark.parametrize(("name", "make"), [("four_bars:3", four_bars_in_a_row), ("chain:3", chain_of_segments)])

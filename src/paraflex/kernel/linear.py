@@ -119,7 +119,9 @@ def factor_schur(p, ws, dependent_part):
             pivot -= ws.schur[start + k] * ws.schur[start + k]
         if ws.redundant[i] > 0.0 and pivot > INDEPENDENT * diagonal:
             ws.redundant[i] = 0.0
-        if ws.redundant[i] == 0.0 and pivot < ws.least[0] * diagonal:
+        # Springs give: their rows never depend on others.
+        counts = p.rows[i].kind == CONSTRAINT and ws.redundant[i] == 0.0
+        if counts and pivot < ws.least[0] * diagonal:
             ws.least[0], ws.least[1] = pivot / diagonal, i
         if pivot > max(dependent_part, ws.redundant[i]) * diagonal:
             ws.schur[start + i] = 1.0 / sqrt(pivot)
