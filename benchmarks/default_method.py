@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from statistics import median
 from typing import Any
 
+import numpy as np
 from common import markdown, single_thread, write_json
 
 from paraflex import load
@@ -22,7 +23,7 @@ from paraflex.dynamics import build_system, consistent_state, start_state
 from paraflex.errors import IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import Model
-from paraflex.mechanism import Curvature, FlexibleBeam, Geometry, JointFriction, Mechanism
+from paraflex.mechanism import Curvature, FlexibleBeam, Geometry, JointFriction, Mechanism, PiecewiseLaw
 from paraflex.simulate import plan_tracking
 from paraflex.studies import Case, ComparisonOptions, compare_methods, motion_case, tracking_case
 
@@ -61,6 +62,38 @@ def free(model: Model, mechanism: Mechanism) -> Case:
     )
 
 
+def stepped(model: Model, mechanism: Mechanism) -> Case:
+    """Constant torques from rest on."""
+    system = build_system(mechanism)
+    start = consistent_state(system, mechanism.assembly(model.study.assembly))
+    torques = {mechanism.motors[0].name: 0.2, mechanism.motors[1].name: -0.1}
+    return motion_case(mechanism, 0.3, samples=301, torques=torques, start=start)
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """An angle of constant acceleration: angle and rate at a time [rad, rad/s, s], acceleration [rad/s^2]."""
+
+    angle: float
+    rate: float
+    acceleration: float
+    since: float
+    knots: tuple[float, ...] = ()
+
+    def evaluate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Value, rate and acceleration at times t."""
+        x = t - self.since
+        angle = self.angle + x * (self.rate + 0.5 * self.acceleration * x)
+        return angle, self.rate + self.acceleration * x, np.full_like(t, self.acceleration)
+
+
+def jerked(mechanism: Mechanism) -> Mechanism:
+    """Turned faster, evenly, slower and not at all, each for 4 s or more: the acceleration jumps."""
+    pieces = Quadratic(0, 0, 0.5, 0), Quadratic(4, 2, 0, 4), Quadratic(12, 2, -0.5, 8), Quadratic(16, 0, 0, 12)
+    spin = replace(mechanism.prescribed[0], law=PiecewiseLaw(pieces, (4.0, 8.0, 12.0)))
+    return replace(mechanism, prescribed=(spin,))
+
+
 def cases() -> Iterator[tuple[str, Callable[[], Case]]]:
     """All of them by name."""
     for name in TRACKED:
@@ -73,6 +106,8 @@ def cases() -> Iterator[tuple[str, Callable[[], Case]]]:
     five = load("five_bar")
     rubbing = replace(right(five.mechanism), frictions=(JointFriction("rub", "A1", limit=0.4, speed=0.3),))
     yield "five_bar with friction", lambda: tracked(five, rubbing, "++")
+    yield "five_bar under steps of torque", lambda: stepped(five, right(five.mechanism))
+    yield "spin_up in jerks", lambda: free(load("spin_up"), right(jerked(load("spin_up").mechanism)))
     sticking = replace(right(five.mechanism), frictions=(JointFriction("rub", "A1", limit=0.4, speed=0.01),))
     yield "five_bar with sharp friction", lambda: tracked(five, sticking, "++")
 
