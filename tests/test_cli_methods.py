@@ -34,7 +34,7 @@ def test_events_are_read(text, event):
         ({"method": "trbdf2"}, '--method: unknown method .*did you mean "tr-bdf2"'),
         ({"method": "newmark", "parameters": ["gamma=0.2"]}, "--method-parameter: outside the range .*got 'gamma=0.2'"),
         ({"method": "newmark", "parameters": ["gam=0.6"]}, '--method-parameter: .*did you mean "gamma"'),
-        ({"parameters": ["gamma=0.6"]}, "--method-parameter: no parameter of tr-bdf2 .*none to choose from"),
+        ({"parameters": ["gamma=0.6"]}, "--method-parameter: no parameter of esdirk5 .*none to choose from"),
         ({"parameters": ["gamma"]}, "--method-parameter: not NAME=VALUE"),
         ({"parameters": ["gamma=x"]}, '--method-parameter: "x" is not a number'),
         ({"method": "radau", "step": 1e-4}, "--step: radau chooses its steps itself"),
@@ -106,7 +106,7 @@ def test_methods_lists_what_there_is():
     newmark = next(row for row in rows if row["name"] == "newmark")
     assert newmark["parameters"]["gamma"]["low"] == 0.5
     assert newmark["constraints"] == ["position"]
-    assert [row["name"] for row in rows if row["default"]] == ["tr-bdf2"]
+    assert [row["name"] for row in rows if row["default"]] == ["esdirk5"]
 
 
 def test_a_motion_stopped_by_an_event_is_a_success(tmp_path):
@@ -118,7 +118,7 @@ def test_a_motion_stopped_by_an_event_is_a_success(tmp_path):
     figures = json.loads((tmp_path / "summary.json").read_text())
     assert (figures["status"], figures["event"]) == ("stopped", "joint pivot")
     run = figures["parameters"]["run"]
-    assert (run["method"], run["constraints"], run["step"]) == ("tr-bdf2", "baumgarte", None)
+    assert (run["method"], run["constraints"], run["step"]) == ("esdirk5", "baumgarte", None)
     assert run["stop_at"] == ["joint:pivot=-0.3.."]
     data = load_results(tmp_path / "results.nc")
     assert data["time"].values[-1] == pytest.approx(figures["event_time"])

@@ -70,7 +70,7 @@ def test_errors_fall_with_the_tolerance_and_the_reference_says_how_certain_it_is
     assert comparison.reference.tolerance < 1e-4
     # All of it can be written down.
     figures = json.loads(json.dumps(comparison.figures()))
-    assert figures["methods"]["tr-bdf2"]["runs"][1]["error"] == tight.error
+    assert figures["methods"]["esdirk5"]["runs"][1]["error"] == tight.error
     assert figures["versions"]["numpy"] == np.__version__
 
 
@@ -190,26 +190,26 @@ def comparison(**curves: list[tuple[float, float]]) -> MethodComparison:
 
 
 def test_times_for_an_error_lie_on_lines_in_logarithms():
-    found = comparison(tr_bdf2=[(1e-3, 0.1), (1e-5, 1.0)], radau=[(1e-4, 2.0), (1e-6, 3.0)])
-    assert found.time_to_reach("tr-bdf2", 1e-4) == pytest.approx(10.0**-0.5)
+    found = comparison(esdirk5=[(1e-3, 0.1), (1e-5, 1.0)], radau=[(1e-4, 2.0), (1e-6, 3.0)])
+    assert found.time_to_reach("esdirk5", 1e-4) == pytest.approx(10.0**-0.5)
     assert found.time_to_reach("radau", 1e-5) == pytest.approx(6.0**0.5)
     assert found.relative_time("radau", 1e-5) == pytest.approx(6.0**0.5)
     # Closer already with the loosest; and never so close.
     assert found.time_to_reach("radau", 1e-2) == pytest.approx(2.0)
-    assert found.time_to_reach("tr-bdf2", 1e-6) is None
-    assert [found.fastest(level) for level in (1e-3, 1e-5, 1e-6, 1e-7)] == ["tr-bdf2", "tr-bdf2", "radau", None]
+    assert found.time_to_reach("esdirk5", 1e-6) is None
+    assert [found.fastest(level) for level in (1e-3, 1e-5, 1e-6, 1e-7)] == ["esdirk5", "esdirk5", "radau", None]
 
 
 def test_a_run_that_is_slower_and_less_close_counts_for_nothing():
     found = comparison(tr_bdf2=[(1e-3, 0.1), (2e-3, 0.5), (1e-5, 1.0)])
-    assert found.time_to_reach("tr-bdf2", 1e-4) == pytest.approx(10.0**-0.5)
+    assert found.time_to_reach("esdirk5", 1e-4) == pytest.approx(10.0**-0.5)
     # An error below what the reference can tell is that much.
     below = comparison(tr_bdf2=[(1e-3, 0.1), (1e-12, 1.0)])
     assert below.time_to_reach("tr-bdf2", 1e-9) is None
 
 
 def test_the_figure_has_a_line_a_method_in_the_units_it_names():
-    found = comparison(tr_bdf2=[(1e-3, 0.1), (1e-5, 1.0)], radau=[(1e-4, 2.0), (1e-9, 3.0)])
+    found = comparison(esdirk5=[(1e-3, 0.1), (1e-5, 1.0)], radau=[(1e-4, 2.0), (1e-9, 3.0)])
     steps = replace(found.measurements[0], tolerance=None, step=1e-4, error=2e-3)
     figure = plots.work_precision(replace(found, measurements=(*found.measurements, steps)).figures())
     for panel, values in zip(figure.axes, ([0.1, 1.0], [100, 1000]), strict=True):
@@ -267,16 +267,16 @@ SHORT = ["--mechanism", "pendulum", "--duration", "0.05", "--samples", "6", "--t
 
 def test_compare_methods_prints_and_saves(tmp_path):
     out = tmp_path / "deep" / "comparison"
-    done = paraflex("compare-methods", *SHORT, "--method", "tr-bdf2", "--out", str(out))
+    done = paraflex("compare-methods", *SHORT, "--method", "esdirk5", "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert "Error, time, violation of constraints, imbalance of energy" in done.stdout
-    assert "Fastest: 0.001 m tr-bdf2" in done.stdout
+    assert "Fastest: 0.001 m esdirk5" in done.stdout
     # Whole numbers at eighty columns, none cut short.
     assert "…" not in done.stdout
     assert {file.name for file in (out / "figures").iterdir()} == {"work_precision.png", "work_precision.svg"}
     figures = json.loads((out / "compare-methods.json").read_text())
-    assert [run["tolerance"] for run in figures["methods"]["tr-bdf2"]["runs"]] == [1e-3, 1e-4]
-    assert figures["methods"]["tr-bdf2"]["relative_time"] == pytest.approx(1.0)
+    assert [run["tolerance"] for run in figures["methods"]["esdirk5"]["runs"]] == [1e-3, 1e-4]
+    assert figures["methods"]["esdirk5"]["relative_time"] == pytest.approx(1.0)
     assert figures["machine"]["processors"] == os.cpu_count()
     assert figures["parameters"]["run"]["mechanism"] == "pendulum.toml"
 

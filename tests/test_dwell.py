@@ -30,7 +30,7 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.results import summary, tracking_dataset
-from paraflex.simulate import After, plan_tracking
+from paraflex.simulate import Ending, plan_tracking
 from paraflex.studies import run_study, verify
 from test_cli import paraflex
 
@@ -166,7 +166,7 @@ def test_held_motors_stand_still_and_energy_is_accounted_for(geometry, mode):
 
 @pytest.mark.parametrize("method", ["tr-bdf2", "esdirk4", "hht-alpha", "newmark", "radau", "generalised-alpha"])
 def test_every_method_holds(method):
-    task = plan_tracking(PAPER, SIDE, duration=1.5 * SIDE.duration, samples=31, after=After.HOLD)
+    task = plan_tracking(PAPER, SIDE, duration=1.5 * SIDE.duration, samples=31, after=Ending.HOLD)
     reference = task.simulate("++++", options=IntegrationOptions(method="esdirk5", tolerance=1e-7))
     run = task.simulate("++++", options=IntegrationOptions(method=method, tolerance=1e-5))
     a, b = (tracking_dataset([each])["end_effector"].values for each in (run, reference))
@@ -272,9 +272,9 @@ def test_names_are_checked():
         lambda: task.simulate("++++", after="brake"),
         lambda: dataclasses.replace(task, after="brake"),
     ):
-        with pytest.raises(InputError, match=r"after: unknown choice \(got 'brake'\)"):
+        with pytest.raises(InputError, match=r"after: unknown ending \(got 'brake'\)"):
             make()
-    assert dataclasses.replace(task, after="hold").after is After.HOLD
+    assert dataclasses.replace(task, after="hold").after is Ending.HOLD
 
 
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
@@ -308,7 +308,7 @@ def test_the_model_file_and_the_command_line_say_so(tmp_path):
     assert "motors held by brakes" in page
     done = paraflex(*asked, "--after", "brake", cwd=tmp_path)
     assert done.returncode == 2
-    assert "--after: unknown choice (got 'brake')" in done.stderr
+    assert "--after: unknown ending (got 'brake')" in done.stderr
     done = paraflex("run", "-m", "raparm_i", "--ked", "--after", "hold", cwd=tmp_path)
     assert "--after: means nothing with --ked" in done.stderr
     done = paraflex("run", "-m", "pendulum", "--after", "hold", cwd=tmp_path)

@@ -390,7 +390,7 @@ def test_a_dataset_of_a_stopped_motion_ends_at_the_event(tmp_path):
     assert data["time"].values[-1] == run.solution.event_time
     assert data["angle"].values[-1, 0] == pytest.approx(-0.5)
     assert data.attrs["stop_at"] == "joint pin"
-    assert data.attrs["integration_method"] == "tr-bdf2"
+    assert data.attrs["integration_method"] == "esdirk5"
     assert data.attrs["constraints_treatment"] == "baumgarte"
     figures = motion_summary(data)
     assert (figures["status"], figures["event"]) == ("stopped", "joint pin")

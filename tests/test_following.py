@@ -122,7 +122,7 @@ def test_the_model_file_says_which_error_ranks_modes(paper_run):
     told = summary(tracking_dataset(paper_run, error="whole"))
     assert (told["error"], told["after"], told["part"]) == ("whole", "free", None)
     assert summary(tracking_dataset(paper_run))["error"] == "motion"
-    with pytest.raises(InputError, match=r"error: unknown span \(got 'path'\)"):
+    with pytest.raises(InputError, match=r"error: unknown error span \(got 'path'\)"):
         tracking_dataset(paper_run, error="path")
 
 

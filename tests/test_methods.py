@@ -223,7 +223,7 @@ def test_methods_agree_on_the_path_of_the_end_effector(raparm, converged_path, m
 
 def test_newton_needs_few_iterations_and_few_factors(raparm):
     """TR-BDF2 on the study: guesses are extrapolated, factors reused while they serve."""
-    _, solution = paths(raparm, tolerance=1e-4)
+    _, solution = paths(raparm, method="tr-bdf2", tolerance=1e-4)
     attempts = solution.steps + solution.rejected
     assert solution.newton_iterations < 2.5 * 2 * attempts
     assert solution.factorisations < 0.6 * attempts

@@ -29,12 +29,12 @@ from paraflex.simulate import plan_tracking
 NOTICE = "Compiling the kernels: once after an installation, about half a minute."
 
 
-def are_compiled(geometry: Geometry | str = Geometry.LINEAR) -> bool:
+def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:
     """Whether the kernels for beams of this geometry stand in the cache on disk."""
     return _stamp(as_enum(Geometry, geometry, "geometry")).exists()
 
 
-def compile_kernels(geometry: Geometry | str = Geometry.LINEAR, announce: Callable[[str], None] = print) -> None:
+def compile_kernels(geometry: Geometry | str = Geometry.SECOND_ORDER, announce: Callable[[str], None] = print) -> None:
     """Compile the kernels for beams of a geometry unless that has been done.
 
     Parameters

@@ -22,7 +22,7 @@ from paraflex.dynamics import (
     static_equilibrium,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
-from paraflex.errors import InputError, IntegrationError, suggestion
+from paraflex.errors import InputError, IntegrationError, as_enum
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.kinematics import Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
@@ -32,7 +32,7 @@ from paraflex.validity import Following, Validity, assess, warn
 _SAME_TIME = 1e-9
 
 
-class After(Enum):
+class Ending(Enum):
     """What the active motors do after the path.
 
     FREE
@@ -44,21 +44,6 @@ class After(Enum):
 
     FREE = "free"
     HOLD = "hold"
-
-
-def parse_after(after: After | str) -> After:
-    """What the motors do after the path by its name, "free" or "hold".
-
-    Raises
-    ------
-    InputError
-        Neither of the two.
-    """
-    try:
-        return After(after)
-    except ValueError:
-        names = [known.value for known in After]
-        raise InputError("unknown choice", field="after", value=after, remedy=suggestion(str(after), names)) from None
 
 
 @dataclass(frozen=True)
@@ -83,7 +68,7 @@ class TrackingTask:
     carriers : mapping
         For each finite segment the beam it was cut from, and how far along that it starts [m]; empty where nothing
         was cut.
-    after : After
+    after : Ending
         What the active motors do after the path; a name is taken for it.
     """
 
@@ -96,15 +81,15 @@ class TrackingTask:
     start: State
     whole: TrackingTask | None = None
     carriers: Mapping[str, tuple[str, float]] = field(default_factory=dict)
-    after: After = After.FREE
+    after: Ending = Ending.FREE
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "after", parse_after(self.after))
+        object.__setattr__(self, "after", as_enum(Ending, self.after, "after"))
 
     @property
     def holds(self) -> bool:
         """Whether brakes engage in its runs: they are asked for, and the runs go on after the path."""
-        return self.after is After.HOLD and self.motion.t[-1] > self.path.duration * (1.0 + _SAME_TIME)
+        return self.after is Ending.HOLD and self.motion.t[-1] > self.path.duration * (1.0 + _SAME_TIME)
 
     def mode(self, mode: str | ActuationMode) -> ActuationMode:
         """An actuation mode by name, signs or motor names."""
@@ -179,7 +164,7 @@ class TrackingTask:
         *,
         method: str | None = None,
         options: IntegrationOptions | None = None,
-        after: After | str | None = None,
+        after: Ending | str | None = None,
         warning: bool = True,
     ) -> TrackingRun:
         """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""
@@ -250,7 +235,7 @@ def plan_tracking(
     samples: int = 701,
     assembly: str | None = None,
     orientation: float = 0.0,
-    after: After | str = After.FREE,
+    after: Ending | str = Ending.FREE,
 ) -> TrackingTask:
     """Plan a motion of the end-effector: joint motion of the rigid mechanism and what it asks of the motors.
 
@@ -266,7 +251,7 @@ def plan_tracking(
         Which way the mechanism is put together; the first by default.
     orientation : float
         Angle of the end-effector where it is a task coordinate and the path does not say it [rad].
-    after : After or str
+    after : Ending or str
         What the active motors do after the path: "free" or "hold".
 
     Raises
@@ -292,7 +277,7 @@ def plan_tracking(
         effort=required_effort(motion),
         plan=plan_torques(follow, path_knots(path, end)),
         start=_start(system, motion, _in_place(system)),
-        after=parse_after(after),
+        after=as_enum(Ending, after, "after"),
     )
 
 
@@ -302,7 +287,7 @@ def simulate(
     *,
     method: str | None = None,
     options: IntegrationOptions | None = None,
-    after: After | str | None = None,
+    after: Ending | str | None = None,
     on_progress: Callable[[float], None] | None = None,
     warning: bool = True,
 ) -> TrackingRun:
@@ -316,7 +301,7 @@ def simulate(
     method : str, optional
         Of integration: that of the options by default; see `paraflex.METHODS`.
     options : IntegrationOptions, optional
-    after : After or str, optional
+    after : Ending or str, optional
         What the active motors do after the path, "free" or "hold": as the task says by default. Held, the joints of the
         active motors are locked where they are when the path ends: see `dynamics.brake`.
     on_progress : callable, optional
@@ -336,7 +321,7 @@ def simulate(
         The run could not be finished; it carries a TrackingRun with what was computed.
     """
     if after is not None:
-        task = replace(task, after=parse_after(after))
+        task = replace(task, after=after)
     options = choose(method, options)
     title = options.description.title
     torques = task.torques(mode)

@@ -169,7 +169,7 @@ _ALL = (
     ),
 )  # fmt: skip
 METHODS: Mapping[str, Method] = MappingProxyType({method.name: method for method in _ALL})
-DEFAULT_METHOD = "tr-bdf2"
+DEFAULT_METHOD = "esdirk5"
 
 
 def find_method(name: str) -> Method:

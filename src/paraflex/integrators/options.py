@@ -55,7 +55,7 @@ class IntegrationOptions:
         overlooked: where limits are grazed bound the step.
     """
 
-    tolerance: float = 1e-4
+    tolerance: float = 1e-5
     alpha: float = 20.0
     beta: float = 20.0
     max_step: float = math.inf

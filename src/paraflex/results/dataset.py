@@ -10,12 +10,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, as_enum
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import length_fraction
 from paraflex.mechanism import Mechanism
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
-from paraflex.results.metrics import ErrorSpan, parse_error_span, peak_torque, rms_torque, tracking_variables
+from paraflex.results.metrics import ErrorSpan, peak_torque, rms_torque, tracking_variables
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
 from paraflex.results.storage import SCHEMA
@@ -185,7 +185,7 @@ def tracking_dataset(
         if units == "N":
             out[name].attrs["long_name"] = out[name].attrs["long_name"].replace("torque", "force")
     out.attrs = _provenance(records[0], options or IntegrationOptions(), parameters or {})
-    out.attrs["error"] = parse_error_span(error).value
+    out.attrs["error"] = as_enum(ErrorSpan, error, "error").value
     return out
 
 

@@ -13,8 +13,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError, suggestion
-
 # A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
 _SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
@@ -34,21 +32,6 @@ class ErrorSpan(Enum):
 
     MOTION = "motion"
     WHOLE = "whole"
-
-
-def parse_error_span(span: ErrorSpan | str) -> ErrorSpan:
-    """A span by its name, "motion" or "whole".
-
-    Raises
-    ------
-    InputError
-        Neither of the two.
-    """
-    try:
-        return ErrorSpan(span)
-    except ValueError:
-        names = [known.value for known in ErrorSpan]
-        raise InputError("unknown span", field="error", value=span, remedy=suggestion(str(span), names)) from None
 
 
 # The metric that ranks runs, and what it is called.

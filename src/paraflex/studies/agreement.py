@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.results.metrics import ErrorSpan, during_motion, parse_error_span
+from paraflex.errors import as_enum
+from paraflex.results.metrics import ErrorSpan, during_motion
 from paraflex.results.record import Record
 from paraflex.simulate import TrackingTask
 from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model
@@ -24,7 +25,7 @@ def agreement(verification: Verification, error: ErrorSpan | str = ErrorSpan.MOT
         What tracking errors are of: the "motion", or the "whole" run, dwell included. Distances between models are of
         the whole run.
     """
-    task, span = verification.task, parse_error_span(error)
+    task, span = verification.task, as_enum(ErrorSpan, error, "error")
     reference = reference_model(verification.models)
     return {
         "mechanism": task.mechanism.name,

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, as_enum, suggestion
 from paraflex.files import Model, library_names, load_data, model_from
 from paraflex.files.generators import is_generated
 from paraflex.files.read import read_toml, validate
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import parse_mode
-from paraflex.results.metrics import HEADLINE, ErrorSpan, parse_error_span
+from paraflex.results.metrics import HEADLINE, ErrorSpan
 from paraflex.studies.sweeps.metrics import METRICS, VALIDITY
 from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
 from paraflex.studies.sweeps.samples import Varied, check_varied, designs
@@ -337,7 +337,7 @@ def metrics_of(names: Sequence[str], error: ErrorSpan | str) -> tuple[str, ...]:
     for name in names:
         if name not in METRICS:
             raise InputError("unknown metric", field="metrics", value=name, remedy=suggestion(name, list(METRICS)))
-    return tuple(dict.fromkeys([*(names or [HEADLINE[parse_error_span(error)], *METRICS]), VALIDITY]))
+    return tuple(dict.fromkeys([*(names or [HEADLINE[as_enum(ErrorSpan, error, "error")], *METRICS]), VALIDITY]))
 
 
 def _integration(table: SweepTable) -> dict[str, Any]:
