@@ -9,8 +9,7 @@ def main() -> dict[str, float]:
     robot = pf.load("4rrr")
     path = robot.paths["circle"]
     task = pf.plan_tracking(robot.mechanism.with_geometry("second-order"), path, samples=301)
-    options = pf.IntegrationOptions(method="esdirk5", tolerance=1e-5)
-    data = pf.tracking_dataset([task.simulate(mode.name, options=options) for mode in robot.mechanism.modes])
+    data = pf.tracking_dataset([task.simulate(mode.name) for mode in robot.mechanism.modes])
     print(" mode   error   peak torque   worst condition")
     for mode in data["tracking_rms_motion"].sortby(data["tracking_rms_motion"])["mode"].values:
         one = data.sel(mode=mode)

@@ -59,7 +59,7 @@ def main() -> dict[str, float]:
 
     circle = pf.Circle(centre=(0.0, 0.280), radius=0.030, max_acceleration=30.0)
     task = pf.plan_tracking(mechanism, circle, duration=0.5)
-    run = task.simulate("++", options=pf.IntegrationOptions(tolerance=1e-5))
+    run = task.simulate("++")
     data = pf.tracking_dataset([run])
     error, torque = float(data["tracking_rms_motion"][0]), float(data["peak_torque"].max())
     print(f"circle of 30 mm: error {1e3 * error:.3f} mm, torque up to {torque:.2f} N m")

@@ -13,9 +13,7 @@ from paraflex.results import motion_dataset
 
 def main() -> dict[str, float]:
     spin = pf.load("spin_up")
-    options = pf.IntegrationOptions(method="esdirk5", tolerance=1e-4)
-
-    run = simulate_motion(spin.mechanism.with_geometry("second-order"), 16.0, samples=1601, options=options)
+    run = simulate_motion(spin.mechanism.with_geometry("second-order"), 16.0, samples=1601)
     data = motion_dataset(run)
     deepest = float(data["tip_transverse"].min())
     turning = data["time"] > 15.0
@@ -24,7 +22,7 @@ def main() -> dict[str, float]:
 
     try:
         linear = spin.mechanism.with_geometry("linear").with_beams(reference="cantilever")
-        simulate_motion(linear, 16.0, options=options)
+        simulate_motion(linear, 16.0)
     except pf.NumericalError as error:
         print(f"linear: {str(error).splitlines()[0]}")
     return {"deepest": deepest, "stretch": stretch}

@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from paraflex.files import load
+from paraflex.kinematics import length_fraction
 from paraflex.results import load_results
 from test_cli import FAST, paraflex
 
@@ -20,6 +22,7 @@ def test_verify_prints_and_saves_how_models_agree(tmp_path):
     done = paraflex("verify", "--model", "linear", "--model", "second-order", "--engine", "mujoco", *SHORT,
                     "--out", str(out))  # fmt: skip
     assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("warning: only a part of the path was run: 0.02 of 0.532 s")
     assert "mode ++++: tracking error" in done.stdout
     assert "Largest distance between the paths of two models [m]" in done.stdout
     assert "RMS difference of each link's angular velocity [rad/s] from 2nd-ord." in done.stdout
@@ -31,6 +34,7 @@ def test_verify_prints_and_saves_how_models_agree(tmp_path):
     assert list(models) == ["linear", "second-order", "mujoco"]
     assert figures["parameters"]["run"]["path"] == "square"
     assert figures["complete"]
+    assert figures["part"]["length"] == pytest.approx(length_fraction(load("raparm_i").paths["square"], 0.02))
     data = load_results(out / "verify.nc")
     kept = float(data["tracking_rms"].sel(model="linear", mode="++++"))
     # Sums of the same squares, in another order.

@@ -9,7 +9,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from paraflex.cli.request import COMPLETE, INTERRUPTED, study_folder
 from paraflex.cli.search import plain_table
-from paraflex.cli.tables import number, plain_console
+from paraflex.cli.tables import number, plain_console, warn_of_parts
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
 from paraflex.studies import IndicesResult, SweepProgress, load_indices, sobol_indices
@@ -53,6 +53,7 @@ def indices_command(request: IndicesRequest) -> int:
     if request.json:
         print(json.dumps(result.figures(), indent=2))
     else:
+        warn_of_parts(plain_console(), study.sweep.setting.parts())
         _report(result)
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)
     return COMPLETE

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, study_folder
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import plain_console, warn_of_parts
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
 from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
@@ -54,6 +54,7 @@ def search_command(
     if request.json:
         print(json.dumps(result.figures() | {"folder": str(result.folder), "fresh": result.fresh}, indent=2))
     else:
+        warn_of_parts(plain_console(), study.base.setting.parts())
         report(result)
         _say_end(console, result, request.folder)
     if result.interrupted:

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from paraflex.cli.request import COMPLETE, study_folder
-from paraflex.cli.tables import number, plain_console
+from paraflex.cli.tables import number, plain_console, warn_of_parts
 from paraflex.errors import InputError, OutputError
 from paraflex.plots import save_elasticities
 from paraflex.studies import Sensitivities, load_sensitivities, sensitivities
@@ -58,6 +58,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     if request.json:
         print(json.dumps(figures, indent=2))
         return COMPLETE
+    warn_of_parts(console, setting.parts())
     for row in range(len(found.rows)):
         _print(console, found, row)
     console.print(f"{folder / RESULTS}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)

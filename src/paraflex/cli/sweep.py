@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, study_folder
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import plain_console, warn_of_parts
 from paraflex.compilation import compile_kernels_for
 from paraflex.studies import SweepProgress, SweepResult, load_sweep, sweep
 from paraflex.studies.sweeps import SweepStudy
@@ -43,8 +43,10 @@ def sweep_command(request: SweepRequest) -> int:
     result = _sweep(console, study, folder, request)
     told = request.report and bool(result.done) and _write_report(console, folder)
     if request.json:
-        print(json.dumps(_figures(result), indent=2))
+        parts = {path: part.figures() for path, part in study.setting.parts().items()}
+        print(json.dumps(_figures(result) | {"part": parts}, indent=2))
     else:
+        warn_of_parts(plain_console(), study.setting.parts())
         _report(console, result)
         if told:
             console.print(f"report: {folder / REPORT}", soft_wrap=True)

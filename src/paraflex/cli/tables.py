@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -10,6 +11,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
+    from paraflex.results.metrics import Part
     from paraflex.simulate import TrackingTask
     from paraflex.studies import StudyResult
 
@@ -22,10 +24,21 @@ def plain_console(*, stderr: bool = False) -> Console:
     return Console(highlight=False, markup=False, stderr=stderr)
 
 
+def warn_of_part(console: Console, part: Mapping[str, Any] | None) -> None:
+    """Say which part of a path was run, where it was not the whole."""
+    if part is not None:
+        console.print(f"warning: {part['message']}", soft_wrap=True)
+
+
+def warn_of_parts(console: Console, parts: Mapping[str, Part]) -> None:
+    """The same of a study's paths."""
+    for path, part in parts.items():
+        console.print(f'warning: path "{path}": {part}', soft_wrap=True)
+
+
 def print_study(console: Console, figures: dict[str, Any], task: TrackingTask, model: str) -> None:
     """What every mode came to in a model: tables, and a line for each mode that an event stopped."""
-    if figures["part"] is not None:
-        console.print(f"warning: {figures['part']['message']}", soft_wrap=True)
+    warn_of_part(console, figures["part"])
     console.print(_study_table(figures, task, model))
     if any(mode.get("tracking_rms_after") is not None for mode in figures["modes"].values()):
         console.print(_after_table(figures, task))

@@ -24,7 +24,7 @@ from paraflex.cli.request import (
     with_frames,
     write_json,
 )
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import plain_console, warn_of_part
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
@@ -81,6 +81,7 @@ def verify_command(request: VerifyRequest) -> int:
         print(json.dumps(figures, indent=2))
     else:
         out = plain_console()
+        warn_of_part(out, figures["part"])
         for mode in figures["modes"]:
             print_agreement(out, figures, mode)
         console.print(f"{time.perf_counter() - began:.1f} s; numbers, figures{report_too(request)} in {folder}")

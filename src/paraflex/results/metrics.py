@@ -13,6 +13,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.kinematics import Path, length_fraction
+
 # A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
 _SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
@@ -197,9 +199,20 @@ class Part:
             "of its length; errors are of that part"
         )
 
+    def figures(self) -> dict[str, float | str]:
+        """As plain numbers, and in words."""
+        return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
+
+
+def part_of(path: Path, end: float) -> Part | None:
+    """What runs that end then [s] do of a path that they are too short for; None where they are not."""
+    if end >= path.duration * (1.0 - _SAME_TIME):
+        return None
+    return Part(end, path.duration, length_fraction(path, end))
+
 
 def part_run(data: xr.Dataset) -> Part | None:
-    """What the runs of a dataset were to do of a path that they were too short for; None where they were not."""
+    """The same of the runs of a dataset."""
     end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
     if "path_length_run" not in data.attrs or end >= path * (1.0 - _SAME_TIME):
         return None

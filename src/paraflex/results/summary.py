@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.results.metrics import FOLLOWING, ErrorSpan, Part, part_run
+from paraflex.results.metrics import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.validity import validity_summary
 
 _COUNTS = ("steps", "rejected", "newton_iterations", "factorisations")
@@ -41,7 +41,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         which of the errors ranks the modes; `after`, what the motors do after the path; `part`, how much of the path a
         run did that was too short for all of it, else None; `parameters`; `version`. A figure not reached is None.
     """
-    modes: dict[str, Any] = {}
+    modes, part = {}, part_run(data)
     for name in data["mode"].values:
         run = data.sel(mode=name)
         figures: dict[str, Any] = {"status": str(run["status"].item())}
@@ -66,17 +66,11 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         "mechanism": data.attrs["mechanism"],
         "error": data.attrs.get("error", ErrorSpan.WHOLE.value),
         "after": data.attrs.get("after", "free"),
-        "part": _part(part_run(data)),
+        "part": None if part is None else part.figures(),
         "modes": modes,
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }
-
-
-def _part(part: Part | None) -> dict[str, float | str] | None:
-    if part is None:
-        return None
-    return {"duration": part.duration, "path": part.path, "length": part.length, "message": str(part)}
 
 
 def finite_or_none(value: float) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import as_enum
-from paraflex.results.metrics import ErrorSpan, during_motion
+from paraflex.results.metrics import ErrorSpan, during_motion, part_of
 from paraflex.results.record import Record
 from paraflex.simulate import TrackingTask
 from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model
@@ -27,10 +27,12 @@ def agreement(verification: Verification, error: ErrorSpan | str = ErrorSpan.MOT
     """
     task, span = verification.task, as_enum(ErrorSpan, error, "error")
     reference = reference_model(verification.models)
+    part = part_of(task.path, float(task.motion.t[-1]))
     return {
         "mechanism": task.mechanism.name,
         "duration": float(task.motion.t[-1]),
         "samples": int(task.motion.t.size),
+        "part": None if part is None else part.figures(),
         "reference": reference,
         "error": span.value,
         "links": [body.name for body in task.mechanism.bodies],

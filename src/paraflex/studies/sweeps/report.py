@@ -144,6 +144,7 @@ def _notes(study: StudyFolder, studied: Studied, differ: Sequence[int]) -> list[
     notes = []
     if not studied.table.complete.any():
         notes.append("No run is complete: there is nothing to draw. The reasons stand below.")
+    notes += [f'Path "{path}": {part}.' for path, part in study.setting.parts().items()]
     beyond = int(np.sum(studied.table.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
     if beyond:
         notes.append(f"{beyond_limits(beyond)}.")

@@ -20,7 +20,7 @@ from paraflex.files.generators import is_generated
 from paraflex.files.read import read_toml, validate
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import parse_mode
-from paraflex.results.metrics import HEADLINE, ErrorSpan
+from paraflex.results.metrics import HEADLINE, ErrorSpan, Part, part_of
 from paraflex.studies.sweeps.metrics import METRICS, VALIDITY
 from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
 from paraflex.studies.sweeps.samples import Varied, check_varied, designs
@@ -110,6 +110,15 @@ class Setting:
         chosen = {str(place[1]): number for place, number in numbers if place[0] == INTEGRATION}
         model = model_from(overlaid(dict(self.data), inside), self.source)
         return model, self.options(model, chosen)
+
+    def parts(self) -> dict[str, Part]:
+        """Of the paths that runs are too short for, which part they do: of the design that the file describes."""
+        model = model_from(dict(self.data), self.source)
+        found = {}
+        for name in self.paths:
+            path = model.path(name)
+            found[name] = part_of(path, model.duration(name, path) if self.duration is None else self.duration)
+        return {name: part for name, part in found.items() if part is not None}
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
         """How the runs of a design are integrated: as the design chooses, then as the study says, else as its file.
