@@ -8,6 +8,7 @@ import pytest
 from paraflex.errors import ActuationError, IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
+from paraflex.integrators.tableaux import TABLEAUX
 from paraflex.kinematics import Circle, Line, PointPath, Polygon
 from paraflex.mechanism import Curvature, FlexibleBeam, Material, raparm_i
 from paraflex.mechanism.raparm import TABLE_1
@@ -61,7 +62,7 @@ def test_four_coordinates_a_node_make_104(task):
     [("++++", 6.292e-4), ("+++-", 3.765e-4), ("+-+-", 4.796e-2)],
 )
 def test_tracking_error_of_the_reference_set(task, mode, known):
-    run = simulate(task, mode, options=IntegrationOptions(tolerance=2e-5))
+    run = simulate(task, mode, options=IntegrationOptions(tolerance=2e-6))
     assert error_of(run) == pytest.approx(known, rel=2e-3)
 
 
@@ -80,7 +81,8 @@ def test_second_order_geometry_meets_geometrically_exact_beams(mode, exact, with
 def test_second_order_geometry_runs_in_every_mode(mode):
     task = plan_tracking(raparm_i().with_geometry("second-order"), SQUARE, duration=0.1, samples=21)
     run = simulate(task, mode, options=IntegrationOptions(tolerance=1e-4))
-    assert run.solution.newton_iterations < 3.5 * 2 * run.solution.steps
+    stages = TABLEAUX[run.solution.method].c.size - 1
+    assert run.solution.newton_iterations < 3.5 * stages * run.solution.steps
     energy = run.solution.kinetic_energy + run.solution.strain_energy
     assert run.solution.energy_balance_max < 0.02 * energy.max()
 
@@ -201,7 +203,8 @@ def test_failed_run_is_kept_and_marked(task):
 def test_dataset_is_consistent():
     """Velocities are derivatives of positions; energy is work; torques are the plan's."""
     task = plan_tracking(raparm_i(), SQUARE, duration=0.05, samples=2001)
-    run = simulate(task, "-+-+", options=IntegrationOptions(tolerance=1e-6))
+    # Positions may be off by the tolerance from sample to sample, 25 microseconds apart.
+    run = simulate(task, "-+-+", options=IntegrationOptions(tolerance=1e-7))
     data = tracking_dataset([run]).isel(mode=0)
     dt = float(data["time"][1])
     for name, rate in (
