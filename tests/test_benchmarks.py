@@ -122,7 +122,8 @@ def test_choices_are_timed_and_told(task):
 
 
 def test_our_run_is_the_study_itself(task):
-    solution = models.PAPER.task(task).simulate("++++", method="tr-bdf2").solution
+    options = pf.IntegrationOptions(method="tr-bdf2", tolerance=1e-4)
+    solution = models.PAPER.task(task).simulate("++++", options=options).solution
     found = peers.run_paraflex(task, models.PAPER, peers.Tolerance("tr-bdf2", 1e-4))
     assert found.steps == solution.steps
 

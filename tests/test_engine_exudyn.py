@@ -163,7 +163,7 @@ def test_a_coupler_of_two_sections_moves_as_with_second_order_geometry(bar):
 def test_a_rigid_linkage_follows_the_plan():
     """Nothing bends: angles, rates, accelerations and joint forces to second order in the step."""
     task = plan(four_bar().rigid(), samples=26)
-    motion, ours = task.motion, record(task.simulate("+++", options=IntegrationOptions(tolerance=1e-7)))
+    motion, ours = task.motion, record(task.simulate("+++", options=IntegrationOptions(tolerance=1e-8)))
     errors = []
     for step in (2e-4, 1e-4):
         theirs = simulate_exudyn(task, "+++", ExudynOptions(step=step, tolerance=1e-8))

@@ -30,7 +30,7 @@ def data(raparm, square):
     task = pf.plan_tracking(raparm, square, duration=0.1, samples=21)
     whole = task.simulate("++++", options=IntegrationOptions(tolerance=1e-4))
     with pytest.raises(pf.NumericalError) as caught:
-        task.simulate("+--+", options=IntegrationOptions(tolerance=1e-4, max_steps=200))
+        task.simulate("+--+", options=IntegrationOptions(tolerance=1e-4, max_steps=40))
     return pf.tracking_dataset([whole, caught.value.partial])
 
 

@@ -11,7 +11,7 @@ from paraflex.results import tracking_dataset
 from paraflex.simulate import plan_tracking
 
 # Steps that damp the axial vibrations of links, which segments do not have.
-FINE = IntegrationOptions(tolerance=1e-4, step=5e-4)
+FINE = IntegrationOptions(method="tr-bdf2", tolerance=1e-4, step=5e-4)
 
 
 def study(mechanism, path, segments=None):

@@ -43,8 +43,8 @@ from paraflex.mechanism import Geometry
 factor_dense(np.eye(2), np.zeros(2, int))
 print(factor_dense.cache_path)
 print(compilation.are_compiled())
-compilation._stamp(Geometry.LINEAR).touch()
-print(compilation.are_compiled(), compilation.are_compiled(Geometry.SECOND_ORDER))
+compilation._stamp(Geometry.SECOND_ORDER).touch()
+print(compilation.are_compiled(), compilation.are_compiled(Geometry.LINEAR))
 """
 
 

@@ -100,7 +100,7 @@ def test_the_dataset_has_all_models_and_survives_a_file(verification, tmp_path):
     assert data.sizes == sizes | {"station": 8 * 17}
     assert data.attrs["reference"] == "second-order"
     assert [str(method).split()[0].strip(",") for method in data["method"].values] == [
-        "TR-BDF2", "KED", "TR-BDF2", "TR-BDF2", "TR-BDF2", "Exudyn", "MuJoCo",
+        "ESDIRK", "KED", "ESDIRK", "ESDIRK", "ESDIRK", "Exudyn", "MuJoCo",
     ]  # fmt: skip
     np.testing.assert_array_equal(data["torque"].sel(model="mujoco"), data["torque"].sel(model="rigid"))
     # Every model tells where the same material points of the links are.
@@ -224,6 +224,7 @@ def test_refinements_are_of_each_model_what_they_say(square):
     steps = {name: [run.figures["steps"] for run in model.records.values()] for name, model in runs.items()}
     assert steps["ked"][1] == 2 * steps["ked"][0] == 2 * steps["ked"][2]
     for name in ("linear", "segments"):
-        assert steps[name][1] > 1.4 * steps[name][0]
+        # A quarter of the tolerance, by a method of order 5.
+        assert steps[name][1] > 1.2 * steps[name][0]
     refined = raparm_i().refined(2)
     assert [body.elements for body in refined.bodies[:4]] == [6, 2, 6, (2, 4)]

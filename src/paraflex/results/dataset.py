@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError, as_enum
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import length_fraction
+from paraflex.kinematics import Path, length_fraction
 from paraflex.mechanism import Mechanism
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
-from paraflex.results.metrics import ErrorSpan, peak_torque, rms_torque, tracking_variables
+from paraflex.results.metrics import SAME_TIME, ErrorSpan, Part, peak_torque, rms_torque, tracking_variables
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
 from paraflex.results.storage import SCHEMA
@@ -227,6 +227,13 @@ def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.floating]
 def end_effector_point(mechanism: Mechanism) -> dict[str, str]:
     """Which point is followed, for drawings."""
     return {} if mechanism.end_effector is None else {"end_effector_point": str(mechanism.end_effector.point)}
+
+
+def part_of(path: Path, end: float) -> Part | None:
+    """What runs that end then [s] do of a path that they are too short for; None where they are not."""
+    if end >= path.duration * (1.0 - SAME_TIME):
+        return None
+    return Part(end, path.duration, length_fraction(path, end))
 
 
 def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> dict:

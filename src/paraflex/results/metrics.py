@@ -13,10 +13,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.kinematics import Path, length_fraction
-
 # A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
-_SAME_TIME = 1e-9
+SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
 _DRIFT_DEGREE = 2
 # Fewer samples after the motion do not tell a vibration from a drift.
@@ -44,7 +42,7 @@ SPAN_WORDS = {ErrorSpan.MOTION: "during the motion", ErrorSpan.WHOLE: "over the 
 def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
     """Which samples at times t (k,) are of the motion, its end among them [s]; the others are after it."""
     end = np.real(motion_end)
-    return np.real(t) <= end + _SAME_TIME * abs(end)
+    return np.real(t) <= end + SAME_TIME * abs(end)
 
 
 def rms(values: NDArray[Any]) -> Any:
@@ -204,17 +202,10 @@ class Part:
         return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
 
 
-def part_of(path: Path, end: float) -> Part | None:
-    """What runs that end then [s] do of a path that they are too short for; None where they are not."""
-    if end >= path.duration * (1.0 - _SAME_TIME):
-        return None
-    return Part(end, path.duration, length_fraction(path, end))
-
-
 def part_run(data: xr.Dataset) -> Part | None:
-    """The same of the runs of a dataset."""
+    """What the runs of a dataset were to do of a path that they were too short for; None where they were not."""
     end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
-    if "path_length_run" not in data.attrs or end >= path * (1.0 - _SAME_TIME):
+    if "path_length_run" not in data.attrs or end >= path * (1.0 - SAME_TIME):
         return None
     return Part(end, path, float(data.attrs["path_length_run"]))
 

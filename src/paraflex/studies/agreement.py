@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import as_enum
-from paraflex.results.metrics import ErrorSpan, during_motion, part_of
+from paraflex.results.dataset import part_of
+from paraflex.results.metrics import ErrorSpan, during_motion
 from paraflex.results.record import Record
 from paraflex.simulate import TrackingTask
 from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model

@@ -20,7 +20,8 @@ from paraflex.files.generators import is_generated
 from paraflex.files.read import read_toml, validate
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import parse_mode
-from paraflex.results.metrics import HEADLINE, ErrorSpan, Part, part_of
+from paraflex.results.dataset import part_of
+from paraflex.results.metrics import HEADLINE, ErrorSpan, Part
 from paraflex.studies.sweeps.metrics import METRICS, VALIDITY
 from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
 from paraflex.studies.sweeps.samples import Varied, check_varied, designs
