@@ -216,7 +216,7 @@ def test_a_model_that_is_none():
 
 
 def test_refinements_are_of_each_model_what_they_say(square):
-    task = plan_tracking(raparm_i(), square, duration=0.02, samples=3)
+    task = plan_tracking(raparm_i(), square, duration=0.1, samples=3)
     options = VerificationOptions(tolerance=1e-5, segments=2)
     runs = verify(task, ["++++"], models=("linear", "segments", "ked"), options=options).runs["++++"]
     for model in runs.values():
