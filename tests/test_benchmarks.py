@@ -22,6 +22,7 @@ sys.path.append(str(BENCHMARKS))
 import batch  # noqa: E402
 import common  # noqa: E402
 import cost_model  # noqa: E402
+import default_method  # noqa: E402
 import engines  # noqa: E402
 import four_bars  # noqa: E402
 import iteration  # noqa: E402
@@ -122,7 +123,8 @@ def test_choices_are_timed_and_told(task):
 
 
 def test_our_run_is_the_study_itself(task):
-    solution = models.PAPER.task(task).simulate("++++", method="tr-bdf2").solution
+    options = pf.IntegrationOptions(method="tr-bdf2", tolerance=1e-4)
+    solution = models.PAPER.task(task).simulate("++++", options=options).solution
     found = peers.run_paraflex(task, models.PAPER, peers.Tolerance("tr-bdf2", 1e-4))
     assert found.steps == solution.steps
 
@@ -200,6 +202,14 @@ def test_measurements_keep_their_conditions(tmp_path):
     start = startup.timed("python", ["-c", "pass"], 1)
     assert 0.0 < start.least == start.median
     assert start.processor > 0.0
+
+
+def test_the_default_method_is_shown_by_all_its_cases():
+    found = json.loads((common.MEASURED / "default_method.json").read_text(encoding="utf-8"))
+    again = default_method.summary(found["cases"])
+    assert {name: found[name] for name in again} == again
+    assert set(found["cases"]) == {name for name, _ in default_method.cases()}
+    assert not again["failed"]
 
 
 def measured(path, mode):
