@@ -1,6 +1,6 @@
 """Do all methods find the same motion? RAParM-I, ++++, all 104 coordinates, each at tight settings.
 
-    python benchmarks/agreement.py [METHOD ...]
+    python benchmarks/agreement.py [--write] [METHOD ...]
 
 The largest distance of the end-effector's path from a converged one, found by ESDIRK 5(4) and held against ESDIRK 4(3).
 Takes about ten minutes, most of them for Newmark of order 1 and the explicit methods.
@@ -8,11 +8,10 @@ Takes about ten minutes, most of them for Newmark of order 1 and the explicit me
 
 from __future__ import annotations
 
-import sys
 import warnings
 
 import numpy as np
-from common import single_thread, write_json
+from common import command_line, single_thread, write_json
 from numpy.typing import NDArray
 
 import paraflex as pf
@@ -42,6 +41,9 @@ SETTINGS = {
 
 
 def main() -> None:
+    parser = command_line(__doc__)
+    parser.add_argument("method", nargs="*", default=list(SETTINGS))
+    given = parser.parse_args()
     single_thread()
     model = pf.load("raparm_i")
     case = tracking_case(pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7), "++++")
@@ -53,7 +55,6 @@ def main() -> None:
     def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
         return float(np.max(np.linalg.norm(a - b, axis=-1)))
 
-    chosen = sys.argv[1:] or list(SETTINGS)
     warnings.simplefilter("ignore", StiffnessWarning)
     converged, _ = run(method="esdirk5", tolerance=1e-8)
     check, _ = run(method="esdirk4", tolerance=1e-8)
@@ -61,7 +62,7 @@ def main() -> None:
     print(f"converged path, two methods apart {apart:.1e} m")
     print(f"{'method':>20} {'tolerance':>10} {'distance':>9} {'energy':>9} {'steps':>8} {'time':>9}")
     rows = []
-    for name in chosen:
+    for name in given.method:
         settings = SETTINGS[name]
         path, solution = run(method=name.split(",")[0], **settings)
         row = {
@@ -78,10 +79,10 @@ def main() -> None:
             f"{solution.steps:8d} {solution.wall_time:7.1f} s",
             flush=True,
         )
-    missing = sorted(set(METHODS) - {name.split(",")[0] for name in chosen})
+    missing = sorted(set(METHODS) - {name.split(",")[0] for name in given.method})
     if missing:
         print(f"not run: {', '.join(missing)}")
-    write_json("agreement", {"apart": apart, "methods": rows})
+    write_json("agreement", {"apart": apart, "methods": rows}, given.folder)
 
 
 if __name__ == "__main__":

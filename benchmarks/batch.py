@@ -1,6 +1,6 @@
 """A thousand designs: RAParM-I with links of other stiffness, every design planned and run, on all processors.
 
-    python benchmarks/batch.py [--designs N] [--sample N] [--processes N] [--target METRES] [--out DIR]
+    python benchmarks/batch.py [--designs N] [--sample N] [--processes N] [--target METRES] [--write]
 
 Young's modulus of every link varies by a fifth from design to design, so that torques stay and motions differ. Each
 engine runs a design from the mechanism on: planning, building the model, integrating ++++ for 0.7 s, at settings that
@@ -11,7 +11,6 @@ with like are second order and the other engines; the paper's linear beams stand
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
 import sys
@@ -21,7 +20,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from common import single_thread, table, write_json
+from common import command_line, single_thread, table, write_json
 from engines import ExudynSetting, MuJoCoSetting, distance, run_exudyn, run_mujoco, tracking_problem
 from models import PAPER, SECOND_ORDER
 from numpy.typing import NDArray
@@ -126,12 +125,11 @@ def measure(way: Way, designs: int, run: int, checked: int, pool: Any, processes
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--designs", type=int, default=DESIGNS)
     parser.add_argument("--sample", type=int, default=SAMPLE, help="designs that other engines run")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--target", type=float, default=TARGET, help="deviation from converged paths [m]")
-    parser.add_argument("--out", help="folder for batch.json")
     given = parser.parse_args()
     single_thread()
     _start_worker()
@@ -152,7 +150,7 @@ def main() -> None:
     heading = f"{given.designs} designs, {given.processes} processes"
     print(table([heading, "off by [m]", "", "run", "time [s]", "ratio"], rows))
     write_json("batch", {"designs": given.designs, "processes": given.processes, "target": given.target,
-                         "rows": found}, given.out)  # fmt: skip
+                         "rows": found}, given.folder)  # fmt: skip
 
 
 if __name__ == "__main__":

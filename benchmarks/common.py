@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import re
@@ -27,6 +28,15 @@ def single_thread() -> None:
     if any(os.environ.get(name) != "1" for name in _THREADS):
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         os.execv(sys.executable, [sys.executable, *sys.argv])
+
+
+def command_line(description: str | None) -> argparse.ArgumentParser:
+    """What all benchmarks take: `--write` puts their JSON where the documentation shows it."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "--write", dest="folder", action="store_const", const=MEASURED, help="into benchmarks/measured, for the docs"
+    )
+    return parser
 
 
 def conditions() -> dict[str, Any]:

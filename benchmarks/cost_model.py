@@ -1,6 +1,6 @@
 """What does a run cost, and a million? Measures, fits and extrapolates; writes the tables of docs/cost-model.md.
 
-    python benchmarks/cost_model.py [--quick] [--write] [--out DIR]
+    python benchmarks/cost_model.py [--quick] [--write]
 
 Measured are the time of a Newton iteration over bodies, loops and modes, and the number of iterations over tolerance
 and duration; each is fitted by a formula whose worst misfit is told. A study of a million runs of RAParM-I is
@@ -10,7 +10,6 @@ the same. With --write the part of docs/cost-model.md between its two marks is r
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
 import statistics
@@ -22,7 +21,7 @@ from typing import Any
 
 import iteration
 import numpy as np
-from common import conditions, growth, markdown, single_thread, write_json, write_page
+from common import command_line, conditions, growth, markdown, single_thread, write_json, write_page
 from numpy.typing import NDArray
 from scaling import MOVING, fastest
 
@@ -33,7 +32,7 @@ from paraflex.integrators import IntegrationOptions, Solution
 from paraflex.mechanism import Geometry, Start, chain_of_segments, four_bars_in_a_row, loops
 from paraflex.simulate import TrackingTask
 
-MODE, TOLERANCE = "++++", 1e-4
+MODE, METHOD, TOLERANCE = "++++", "tr-bdf2", 1e-4
 PAGE = Path(__file__).parents[1] / "docs" / "cost-model.md"
 ROWS, CHAINS, MODES = (2, 5, 10, 20, 50, 100), (5, 10, 20, 50, 100, 200), (1, 2, 3, 4, None)
 TOLERANCES, DURATIONS = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5), (0.2, 0.35, 0.7, 1.4)
@@ -119,7 +118,7 @@ def over_modes(task: TrackingTask, modes: Sequence[int | None]) -> list[dict[str
         for count in modes:
             mechanism = task.mechanism.with_beams(modes=count).with_geometry(geometry)
             changed = task.remodelled(mechanism)
-            solution = quickest(changed, tolerance=TOLERANCE)
+            solution = quickest(changed, method=METHOD, tolerance=TOLERANCE)
             sizes = [body.nf for body in changed.system.bodies]
             out.append(
                 {
@@ -133,13 +132,13 @@ def over_modes(task: TrackingTask, modes: Sequence[int | None]) -> list[dict[str
 
 
 def over_tolerances(task: TrackingTask, tolerances: Sequence[float]) -> list[dict[str, Any]]:
-    """Iterations and seconds of a run by the default method and by the recommended one."""
-    return [_work(task, method, tolerance) for method in ("tr-bdf2", "esdirk5") for tolerance in tolerances]
+    """Iterations and seconds of a run by the method of the study and by the default one."""
+    return [_work(task, method, tolerance) for method in (METHOD, "esdirk5") for tolerance in tolerances]
 
 
 def over_durations(durations: Sequence[float]) -> list[dict[str, Any]]:
     """The same over duration; the square takes 0.53 s, the end-effector then rests and vibrates."""
-    return [_work(plan(duration), "tr-bdf2", TOLERANCE) for duration in durations]
+    return [_work(plan(duration), METHOD, TOLERANCE) for duration in durations]
 
 
 def _work(task: TrackingTask, method: str, tolerance: float) -> dict[str, Any]:
@@ -157,7 +156,8 @@ def _plan_and_run(geometry: str) -> tuple[float, float]:
     task = task.remodelled(task.mechanism.with_geometry(Geometry(geometry)))
     task.torques(MODE)
     planned = time.perf_counter() - began
-    return planned, task.simulate(MODE, options=IntegrationOptions(tolerance=TOLERANCE)).solution.wall_time
+    options = IntegrationOptions(method=METHOD, tolerance=TOLERANCE)
+    return planned, task.simulate(MODE, options=options).solution.wall_time
 
 
 def _many(geometry: str, count: int) -> float:
@@ -305,10 +305,8 @@ def measure(*, quick: bool) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer and smaller cases")
-    parser.add_argument("--write", action="store_true", help="write the tables into docs/cost-model.md")
-    parser.add_argument("--out", help="folder for cost_model.json")
     given = parser.parse_args()
     single_thread()
     for geometry in Geometry:
@@ -317,9 +315,9 @@ def main() -> None:
     fitted = fits(found)
     text = tables(found, fitted, conditions())
     print(text)
-    if given.write:
+    if given.folder:
         write_page(text, PAGE)
-    write_json("cost_model", {**found, "fits": {name: asdict(fit) for name, fit in fitted.items()}}, given.out)
+    write_json("cost_model", {**found, "fits": {name: asdict(fit) for name, fit in fitted.items()}}, given.folder)
 
 
 if __name__ == "__main__":

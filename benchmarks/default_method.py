@@ -9,14 +9,13 @@ way. Each is run by the ESDIRK methods at three tolerances and compared with a c
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from statistics import median
 from typing import Any
 
 import numpy as np
-from common import markdown, single_thread, write_json
+from common import command_line, markdown, single_thread, write_json
 
 from paraflex import load
 from paraflex.dynamics import build_system, consistent_state, start_state
@@ -29,6 +28,7 @@ from paraflex.studies import Case, ComparisonOptions, compare_methods, motion_ca
 
 METHODS = ("tr-bdf2", "esdirk3", "esdirk4", "esdirk5")
 TOLERANCES = (1e-4, 1e-5, 1e-6)
+KEPT = ("method", "tolerance", "status", "reason", "error", "wall_time", "steps", "newton_iterations")
 TRACKED = ("raparm_i", "raparm_ii", "3rrr", "4rrr", "3prr", "five_bar", "slider_crank")
 FREE = ("pendulum", "four_bar", "andrews", "slider_crank_flexible", "spin_up", "chain:20", "four_bars:2", "four_bars:7")
 
@@ -121,12 +121,12 @@ def measured(case: Case, limit: float) -> dict[str, Any]:
     return {
         "coordinates": comparison.coordinates,
         "uncertainty": comparison.reference.uncertainty,
-        "runs": [asdict(run) for run in comparison.measurements],
+        "runs": [{name: getattr(run, name) for name in KEPT} for run in comparison.measurements],
     }
 
 
-def rows(found: dict[str, dict[str, Any]]) -> Iterator[list[str]]:
-    """A line a method and tolerance: failures, error over tolerance, time against TR-BDF2 at 1e-4 m, steps likewise."""
+def rows(found: dict[str, dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Of each method and tolerance: failures, error over tolerance, error and time against TR-BDF2 at 1e-4 m."""
     for method in METHODS:
         for tolerance in TOLERANCES:
             runs, base = [], []
@@ -134,34 +134,42 @@ def rows(found: dict[str, dict[str, Any]]) -> Iterator[list[str]]:
                 runs += [r for r in result["runs"] if r["method"] == method and r["tolerance"] == tolerance]
                 base += [r for r in result["runs"] if r["method"] == METHODS[0] and r["tolerance"] == TOLERANCES[0]]
             pairs = [(r, b) for r, b in zip(runs, base, strict=True) if r["status"] == b["status"] == "complete"]
-            errors = sorted(r["error"] / tolerance for r, _ in pairs)
-            yield [
-                f"{method}, {tolerance:g} m",
-                str(sum(r["status"] != "complete" for r in runs)),
-                f"{median(errors):.2f}",
-                f"{errors[-1]:.1f}",
-                f"{median(r['wall_time'] / b['wall_time'] for r, b in pairs):.2f}",
-                f"{max(r['wall_time'] / b['wall_time'] for r, b in pairs):.2f}",
-            ]
+            times = [r["wall_time"] / b["wall_time"] for r, b in pairs]
+            yield {
+                "method": method,
+                "tolerance": tolerance,
+                "failed": sum(r["status"] != "complete" for r in runs),
+                "error": median(r["error"] / tolerance for r, _ in pairs),
+                "largest_error": max(r["error"] / tolerance for r, _ in pairs),
+                "error_ratio": median(r["error"] / b["error"] for r, b in pairs),
+                "time": median(times),
+                "largest_time": max(times),
+            }
 
 
-HEADINGS = (
-    "Method, tolerance",
-    "failed",
-    "error / tolerance, median",
-    "largest",
-    "time / TR-BDF2's at 1e-4 m",
-    "largest",
-)
+def summary(found: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """What the documentation shows: the rows, and the largest error over tolerance of each method with its case."""
+    worst = {}
+    for method in METHODS:
+        runs = [(r, name) for name, case in found.items() for r in case["runs"] if r["method"] == method]
+        run, case = max(runs, key=lambda pair: (pair[0]["error"] or 0.0) / pair[0]["tolerance"])
+        worst[method] = {"case": case, "ratio": run["error"] / run["tolerance"]}
+    lines = list(rows(found))
+    return {
+        "number": len(found),
+        "failed": sum(line["failed"] for line in lines),
+        "worst": worst,
+        "default": next(line for line in lines if (line["method"], line["tolerance"]) == ("esdirk5", 1e-5)),
+        "rows": lines,
+    }
 
 
 def main() -> None:
     """Run, print, write."""
     single_thread()
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--only", nargs="*", help="cases whose names begin so")
     parser.add_argument("--limit", type=float, default=30.0, help="seconds at which a run is given up")
-    parser.add_argument("--write", metavar="FOLDER", help="where default_method.json goes")
     given = parser.parse_args()
     found: dict[str, dict[str, Any]] = {}
     for name, make in cases():
@@ -178,9 +186,12 @@ def main() -> None:
                 f"{name:28} {run['method']:8} {run['tolerance']:g}: {run['status']} {figures}{run['reason']}",
                 flush=True,
             )
-    print(markdown(HEADINGS, rows(found)))
-    if given.write:
-        write_json("default_method", {"cases": found}, given.write)
+    told = summary(found)
+    lines = [
+        [f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()] for row in told["rows"]
+    ]
+    print(markdown(list(told["rows"][0]), lines))
+    write_json("default_method", {**told, "cases": found}, given.folder)
 
 
 if __name__ == "__main__":

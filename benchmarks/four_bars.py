@@ -1,6 +1,6 @@
 """Rows of n four-bars, rigid and flexible: time per n of paraflex, Exudyn and MuJoCo, each close to its own path.
 
-    python benchmarks/four_bars.py [--target METRES] [--limit S] [--repeats N] [--out DIR] [n ...]
+    python benchmarks/four_bars.py [--target METRES] [--limit S] [--repeats N] [--write] [n ...]
 
 The row of the IFToMM library (benchmark A02), cranks upright and B0 moving at 1 m/s; 0.3 s of it, before the first
 position with all links in line. Flexible links are beams of the same mass with two elements each. Compared is the place
@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from common import growth, single_thread, table, write_json
+from common import command_line, growth, single_thread, table, write_json
 from engines import ExudynSetting, MuJoCoSetting, Problem, Run, run_exudyn, run_mujoco
 from peers import Choice, Converged, Result, Tolerance, choose, timed
 
@@ -156,12 +156,11 @@ def print_rows(rows: Sequence[dict[str, Any]], names: Sequence[str], grown: dict
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("n", type=int, nargs="*", default=list(NUMBERS))
     parser.add_argument("--target", type=float, default=TARGET, help="deviation from the converged path [m]")
     parser.add_argument("--limit", type=float, default=LIMIT, help="of a run [s]")
     parser.add_argument("--repeats", type=int, default=REPEATS)
-    parser.add_argument("--out", help="folder for four_bars.json")
     given = parser.parse_args()
     single_thread()
     setattr(sys, "exudynFast", True)  # noqa: B010
@@ -179,7 +178,7 @@ def main() -> None:
                 for entry in rows
             ],
         }
-    write_json("four_bars", values, given.out)
+    write_json("four_bars", values, given.folder)
 
 
 def _told(result: Result) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Where does a Newton iteration's time go, and how much of the machine does it use? RAParM-I, ++++, 104 coordinates.
 
-    python benchmarks/iteration.py [--tolerance METRES] [--repeats N] [--out DIR]
+    python benchmarks/iteration.py [--tolerance METRES] [--repeats N] [--write]
 
 Each part of a step is called many times in a row from compiled code, at a state within a run, and multiplied by how
 often an iteration of that run calls it. What is left of the run's time is stepping: starting guesses, sampling, and
@@ -11,14 +11,13 @@ goal: 5 microseconds an iteration.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import operations
-from common import least_time, single_thread, table, write_json
+from common import command_line, least_time, single_thread, table, write_json
 from numba import njit
 
 import paraflex as pf
@@ -37,7 +36,7 @@ from paraflex.kernel.stage import equations
 from paraflex.mechanism import Geometry
 from paraflex.simulate import TrackingTask
 
-MODE, TOLERANCE, REPEATS, CALLS, GOAL = "++++", 9e-5, 5, 2000, 5.0
+MODE, METHOD, TOLERANCE, REPEATS, CALLS, GOAL = "++++", "tr-bdf2", 9e-5, 5, 2000, 5.0
 SIZES = (20, 40, 60, 80, 100)
 WEIGHTS = (1.0, 40.0, 400.0)
 
@@ -152,7 +151,7 @@ def half_way(task: TrackingTask, tolerance: float, attempts: int = 300) -> Nativ
     signals, knots = pack_signals(task.mechanism, torques.signals, float(times[-1]))
     stops = np.sort(np.concatenate([torques.knots, knots]))
     problem = make_problem(task.system, signals, task.start, times, stops)
-    run = prepare(problem, IntegrationOptions(tolerance=tolerance))
+    run = prepare(problem, IntegrationOptions(method=METHOD, tolerance=tolerance))
     run.start()
     run.march(attempts)
     return run
@@ -224,8 +223,9 @@ def report(geometry: Geometry, tolerance: float, repeats: int) -> dict[str, Any]
     """Measure and print one geometry."""
     task = plan()
     task = task.remodelled(task.mechanism.with_geometry(geometry))
-    task.simulate(MODE, options=IntegrationOptions(tolerance=tolerance))
-    runs = [task.simulate(MODE, options=IntegrationOptions(tolerance=tolerance)).solution for _ in range(repeats)]
+    options = IntegrationOptions(method=METHOD, tolerance=tolerance)
+    task.simulate(MODE, options=options)
+    runs = [task.simulate(MODE, options=options).solution for _ in range(repeats)]
     solution = min(runs, key=lambda one: one.wall_time)
     seconds = solution.wall_time
     whole = 1e6 * seconds / solution.newton_iterations
@@ -255,10 +255,9 @@ def report(geometry: Geometry, tolerance: float, repeats: int) -> dict[str, Any]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--tolerance", type=float, default=TOLERANCE, help="[m]")
     parser.add_argument("--repeats", type=int, default=REPEATS)
-    parser.add_argument("--out", help="folder for iteration.json")
     given = parser.parse_args()
     single_thread()
     values: dict[str, Any] = {"mode": MODE, "goal_microseconds": GOAL, "geometry": {}}
@@ -270,7 +269,7 @@ def main() -> None:
     rows = [[f"{row['n']} x {row['n']}", *(f"{row[name]:.2f}" for name in ("loops", "dgemv", "dgemm"))]
             for row in values["dense"]]  # fmt: skip
     print(table(["", "loops, A x", "dgemv, A x", "dgemm, A B"], rows))
-    write_json("iteration", values, given.out)
+    write_json("iteration", values, given.folder)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Other mechanisms of the library on their paths: both geometries and two reference conditions against exact beams.
 
-    python benchmarks/library_agreement.py [--mechanism NAME ...] [--out DIR]
+    python benchmarks/library_agreement.py [--mechanism NAME ...] [--write]
 
 As `model_agreement.py` does for RAParM-I: "linear, cantilever" is the paper's (shared curvature), the other three have
 separate curvature; exact beams are Exudyn's, twice as many elements and steps of 25 us. Written are tracking errors
@@ -9,10 +9,9 @@ over the whole run and the largest distances between end-effectors. Takes a few 
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
-from common import table, write_json
+from common import command_line, table, write_json
 from engines import distance
 from model_agreement import BEAMS
 from models import tracking_errors
@@ -66,14 +65,13 @@ def print_rows(rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--mechanism", action="append", choices=tuple(MODES), help="all by default")
-    parser.add_argument("--out", help="folder for library_agreement.json")
     given = parser.parse_args()
     rows = [row for name in given.mechanism or MODES for row in measure(name)]
     print_rows(rows)
     values = {"tolerance": OPTIONS.tolerance, "exudyn": {"step": EXACT.step, "refinement": EXACT.refinement}}
-    write_json("library_agreement", {**values, "rows": rows}, given.out)
+    write_json("library_agreement", {**values, "rows": rows}, given.folder)
 
 
 if __name__ == "__main__":

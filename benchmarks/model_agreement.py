@@ -1,6 +1,6 @@
 """Do the models agree? RAParM-I on its square: both geometries, two reference conditions, exact beams, segments, KED.
 
-    python benchmarks/model_agreement.py [--mode SIGNS ...] [--out DIR]
+    python benchmarks/model_agreement.py [--mode SIGNS ...] [--write]
 
 All models have the same torques and start. "linear, cantilever" is the paper's (shared curvature); the other three of
 ours have separate curvature. Exact beams are ANCF cables in Exudyn, with four times the elements of the paper's mesh
@@ -12,10 +12,9 @@ Takes a quarter of an hour, most of it Exudyn's.
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
-from common import table, write_json
+from common import command_line, table, write_json
 from engines import distance
 from models import LINEAR_PINNED, PAPER, SECOND_ORDER, SECOND_ORDER_CANTILEVER, BeamModel, tracking_errors
 
@@ -94,9 +93,8 @@ def print_rows(rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--mode", action="append", metavar="SIGNS", help="the paper's six by default")
-    parser.add_argument("--out", help="folder for model_agreement.json")
     given = parser.parse_args()
     model = pf.load("raparm_i")
     task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7)
@@ -104,7 +102,7 @@ def main() -> None:
     print_rows(rows)
     exact = [{"step": options.step, "refinement": options.refinement} for options in EXUDYN]
     values = {"path": "square", "motion_end": task.path.duration, "tolerance": OPTIONS.tolerance, "exudyn": exact}
-    write_json("model_agreement", {**values, "rows": rows}, given.out)
+    write_json("model_agreement", {**values, "rows": rows}, given.folder)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Which motors do best, path by path? RAParM-I on its three paths in all nine modes, and the paper's Table 3.
 
-    python benchmarks/paths_and_modes.py [--path NAME ...] [--mode SIGNS ...] [--skip-exudyn] [--out DIR]
+    python benchmarks/paths_and_modes.py [--path NAME ...] [--mode SIGNS ...] [--skip-exudyn] [--write]
 
 Every mode of every path runs with second-order geometry (pinned reference, separate curvature), with the paper's
 linear beams (cantilever reference, shared curvature), and as geometrically exact beams in Exudyn: same torques, same
@@ -11,12 +11,11 @@ converged the models are stands in `model_agreement.py`. Takes ten minutes, most
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable
 from typing import Any
 
-from common import table, write_json
+from common import command_line, table, write_json
 from models import PAPER, SECOND_ORDER, tracking_errors
 
 import paraflex as pf
@@ -85,16 +84,15 @@ def print_rows(rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--path", action="append", choices=PATHS, help="all by default")
     parser.add_argument("--mode", action="append", metavar="SIGNS", help="all nine by default")
     parser.add_argument("--skip-exudyn", action="store_true", help="without exact beams")
-    parser.add_argument("--out", help="folder for paths_and_modes.json")
     given = parser.parse_args()
     rows = measure(given.path or list(PATHS), given.mode, exudyn=not given.skip_exudyn)
     print_rows(rows)
     values = {"duration": DURATION, "tolerance": OPTIONS.tolerance, "exudyn_step": EXACT.step, "table_3": TABLE_3}
-    write_json("paths_and_modes", {**values, "rows": rows}, given.out)
+    write_json("paths_and_modes", {**values, "rows": rows}, given.folder)
 
 
 if __name__ == "__main__":

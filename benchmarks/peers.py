@@ -19,7 +19,6 @@ from where the documentation takes them, and into README.md between its two mark
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import math
 import statistics
@@ -31,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import MEASURED, Trial, coarsest_within, single_thread, write_json, write_page
+from common import Trial, coarsest_within, command_line, single_thread, write_json, write_page
 from engines import (
     ExudynSetting,
     MuJoCoSetting,
@@ -275,15 +274,13 @@ def plan(duration: float) -> TrackingTask:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--target", type=float, default=TARGET, help="deviation from the converged path [m]")
     parser.add_argument("--duration", type=float, default=DURATION, help="[s]")
     parser.add_argument("--repeats", type=int, default=REPEATS)
     parser.add_argument("--skip-scipy", action="store_true", help="it takes as long as all others")
-    parser.add_argument("--write", action="store_true", help="into benchmarks/measured and README.md")
-    parser.add_argument("--out", help="folder for peers.json")
     given = parser.parse_args()
-    if given.write and given.duration != DURATION:
+    if given.folder and given.duration != DURATION:
         parser.error(f"--write is for the whole study: --duration {DURATION}")
     single_thread()
     # Exudyn's build without checks.
@@ -310,9 +307,9 @@ def main() -> None:
             "results": results,
             "not_close_enough": {choice.name: choice.tried for choice in choices if choice.setting is None},
         },
-        MEASURED if given.write else given.out,
+        given.folder,
     )  # fmt: skip
-    if given.write:
+    if given.folder:
         write_page(readme_table(results, given.duration), README)
 
 

@@ -1,51 +1,70 @@
 """How does a step grow with the mechanism? Rows of rigid four-bars, and hanging chains with torsional springs.
 
-    python benchmarks/scaling.py [--chain] [n ...]
+    python benchmarks/scaling.py [--write] [n ...]
 
 For each n: time to build mechanism and system, and to close and start it; of a step and of one Newton iteration over
 the same number of attempted steps, kernels warm, the fastest of a few repeats; memory of all arrays of a run. The last
-column is the growth of a step's time with twice the n. The goal: at most 2.2.
+column is the growth of a step's time with twice the n. The goal: at most 2.2. By TR-BDF2.
 """
 
 from __future__ import annotations
 
-import sys
 import time
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
+from common import command_line, table, write_json
 
 from paraflex.dynamics import State, System, build_system, constant_signals, pack_signals, start_state
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.kernel.run_state import ITERATIONS, REJECTED, STEPS
-from paraflex.mechanism import Start, chain_of_segments, four_bars_in_a_row
+from paraflex.mechanism import Mechanism, Start, chain_of_segments, four_bars_in_a_row
 
 NUMBERS = (10, 20, 50, 100, 200, 500, 1000)
 STEPS_TIMED, REPEATS = 200, 5
+OPTIONS = IntegrationOptions(method="tr-bdf2", tolerance=1e-5)
 # Away from the first position in line, at 0.71 s.
 DURATION = 0.5
 MOVING = Start(angular={"crank0": -1.0})
 
 
 def main() -> None:
-    chain = "--chain" in sys.argv
-    numbers = [int(text) for text in sys.argv[1:] if text.isdigit()] or NUMBERS
-    make = chain_of_segments if chain else four_bars_in_a_row
-    heading = ("n", "rows", "build [s]", "start [s]", "us/step", "us/iter.", "iter./step", "MB", "ratio")
-    print("".join(f"{text:>11}" for text in heading))
-    before = None
+    parser = command_line(__doc__)
+    parser.add_argument("n", type=int, nargs="*", default=list(NUMBERS))
+    given = parser.parse_args()
+    found = {
+        "four_bars": measured(four_bars_in_a_row, MOVING, given.n),
+        "chains": measured(chain_of_segments, Start(), given.n),
+    }
+    for name, rows in found.items():
+        print(f"\n{name}")
+        cells = [["" if value is None else f"{value:.4g}" for value in row.values()] for row in rows]
+        print(table(list(rows[0]), cells))
+    write_json("scaling", found, given.folder)
+
+
+def measured(make: Callable[[int], Mechanism], start: Start, numbers: Sequence[int]) -> list[dict[str, Any]]:
+    """Times in seconds of each n, and how much longer a step takes for twice the n."""
+    rows: list[dict[str, Any]] = []
     for n in numbers:
         began = time.perf_counter()
         mechanism = make(n)
         system = build_system(mechanism)
         built = time.perf_counter()
-        start = start_state(system, MOVING if not chain else Start(), mechanism.assembly())
+        state = start_state(system, start, mechanism.assembly())
         started = time.perf_counter()
-        step, iteration, run = fastest(system, start)
-        ratio = f"{(step / before[1]) ** (1.0 / np.log2(n / before[0])):11.2f}" if before else ""
-        before = (n, step)
-        seconds = f"{built - began:11.3f}{started - built:11.3f}{1e6 * step:11.1f}{1e6 * iteration:11.1f}"
-        print(f"{n:11d}{system.m:11d}{seconds}{step / iteration:11.2f}{megabytes(run):11.2f}{ratio}", flush=True)
+        step, iteration, run = fastest(system, state)
+        before = rows[-1] if rows else None
+        rows.append(
+            {
+                "n": n, "rows": system.m, "build": built - began, "start": started - built, "step": step,
+                "iteration": iteration, "iterations_a_step": step / iteration, "megabytes": megabytes(run),
+                "ratio": (step / before["step"]) ** (1.0 / np.log2(n / before["n"])) if before else None,
+            }
+        )  # fmt: skip
+    return rows
 
 
 def fastest(system: System, start: State) -> tuple[float, float, NativeRun]:
@@ -53,7 +72,7 @@ def fastest(system: System, start: State) -> tuple[float, float, NativeRun]:
     signals, _ = pack_signals(system.mechanism, constant_signals([], DURATION), DURATION)
     best = None
     for _ in range(REPEATS):
-        run = prepare(make_problem(system, signals, start, np.array([DURATION])), IntegrationOptions(tolerance=1e-5))
+        run = prepare(make_problem(system, signals, start, np.array([DURATION])), OPTIONS)
         run.start()
         run.march(10)
         counts = run.state.counts

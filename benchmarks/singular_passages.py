@@ -1,6 +1,6 @@
 """Runs through singular positions, by hundreds: how many fail, and how their errors compare with the tolerance.
 
-    python benchmarks/singular_passages.py [--runs N] [--seed N] [--target CPU ...] [--out DIR] [method ...]
+    python benchmarks/singular_passages.py [--runs N] [--seed N] [--target CPU ...] [--write] [method ...]
 
 Four-bars in a row (one to three loops), released upright at speeds from 1 to 3 rad/s, pass a position with all links
 in line each half turn, some ten in 10 s. Tolerances are log-uniform, each method's in a range of its own that keeps a
@@ -22,7 +22,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from common import table, write_json
+from common import command_line, table, write_json
 from scipy.integrate import solve_ivp
 
 from paraflex.dynamics import System, build_system, start_state
@@ -122,25 +122,27 @@ def _cell(value: object) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("method", nargs="*", default=list(METHODS), help=f"of {', '.join(RANGES)}")
     parser.add_argument("--runs", type=int, default=RUNS, help="of each method")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--target", nargs="*", help="processors, say generic haswell znver4")
     parser.add_argument("--raw", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--out", help="folder for singular_passages.json")
     given = parser.parse_args()
     if given.raw:
         found = [run for method in given.method for run in search(method, given.runs, given.seed)]
         print(json.dumps([asdict(run) for run in found]))
         return
-    summaries, failures = [], []
+    summaries, runs = [], []
     for target in given.target or ["this machine"]:
         found = search_for(target, given.method, given.runs, given.seed) if given.target else None
         for method in given.method:
             mine = search(method, given.runs, given.seed) if found is None else [r for r in found if r.method == method]
             summaries.append(summary(target, method, mine))
-            failures += [run for run in mine if run.ratio is None or run.ratio > 10.0]
+            runs += mine
+    if len(given.target or []) > 1:
+        summaries += [summary("all", method, [run for run in runs if run.method == method]) for method in given.method]
+    failures = [run for run in runs if run.ratio is None or run.ratio > 10.0]
     heads = ("target", "method", "runs", "failed", "over_10", "median", "p90", "most")
     cells = [[_cell(line.get(key, "")) for key in heads] for line in summaries]
     print(
@@ -151,7 +153,7 @@ def main() -> None:
     )
     for run in failures:
         print(run)
-    write_json("singular_passages", {"rows": summaries, "failures": [asdict(run) for run in failures]}, given.out)
+    write_json("singular_passages", {"rows": summaries, "failures": [asdict(run) for run in failures]}, given.folder)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """How long does it take to start? Commands and imports in fresh processes, and the first compilation.
 
-    python benchmarks/startup.py [--compile] [--repeats N] [--out DIR]
+    python benchmarks/startup.py [--compile] [--repeats N] [--write]
 
 Times are of whole processes, the least and the median of several, files in the page cache and kernels compiled, and
 beside them processor time, which says more on a machine that is busy. So do an empty Python and Numba alone. With
@@ -10,7 +10,6 @@ beside them processor time, which says more on a machine that is busy. So do an 
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import statistics
@@ -20,7 +19,7 @@ import tempfile
 import time
 from dataclasses import asdict, dataclass
 
-from common import table, write_json
+from common import command_line, table, write_json
 
 GOALS = {"paraflex --help": 0.3, "paraflex info": 1.0, "compile all kernels": 20.0}
 PROCESSES = {
@@ -84,10 +83,9 @@ def compilation() -> list[Start]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--compile", action="store_true", help="measure the first compilation: minutes")
     parser.add_argument("--repeats", type=int, default=7)
-    parser.add_argument("--out", help="folder for startup.json")
     given = parser.parse_args()
     subprocess.run([sys.executable, *COMPILE], check=True)
     found = []
@@ -97,7 +95,7 @@ def main() -> None:
     if given.compile:
         found += compilation()
     print(table(["seconds", "least", "median", "processor", "goal"], [start.row for start in found]))
-    write_json("startup", {"repeats": given.repeats, "starts": [asdict(start) for start in found]}, given.out)
+    write_json("startup", {"repeats": given.repeats, "starts": [asdict(start) for start in found]}, given.folder)
 
 
 if __name__ == "__main__":

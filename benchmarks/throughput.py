@@ -1,6 +1,6 @@
 """How many runs of RAParM-I a second does a sweep do, and how much do two workers gain over one?
 
-    python benchmarks/throughput.py [--designs 64] [--modes 1] [--engine threads,processes] [--json throughput.json]
+    python benchmarks/throughput.py [--designs 64] [--modes 1] [--engine threads,processes] [--write]
 
 Designs differ in the thickness of the links by up to 2 %, so that each is planned anew; each is run along the square
 for 0.7 s in so many of the study's six modes, ++++ first, by esdirk5. The setting is the coarsest of a few steps and
@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from common import command_line, write_json
 
 from paraflex.compilation import compile_kernels
 from paraflex.errors import IntegrationError
@@ -60,7 +61,7 @@ def main() -> None:
     for mode, deviation in deviations.items():
         print(f"{mode}: largest deviation {deviation:.2e} m with {METHOD}, {told(setting, ', ')}")
     print(f"\n{'engine':>10}{'workers':>9}{'runs':>7}{'runs/s':>9}{'gain':>7}")
-    figures = []
+    rates: dict[str, dict[str, float]] = {}
     for engine in asked.engine.split(","):
         alone = None
         for workers in (1, 2):
@@ -69,18 +70,19 @@ def main() -> None:
             print(
                 f"{engine:>10}{workers:>9}{asked.designs * len(modes):>7}{rate:>9.1f}{rate / alone:>7.2f}", flush=True
             )
-            figures.append({"engine": engine, "workers": workers, "runs_per_second": rate, "gain": rate / alone})
-    if asked.json:
-        out = {"setting": setting, "modes": list(modes), "deviation": deviations, "rates": figures}
-        Path(asked.json).write_text(json.dumps(out, indent=2) + "\n", encoding="utf-8")
+            rates.setdefault(engine, {})[str(workers)] = rate
+    out = {
+        "designs": asked.designs, "setting": setting, "modes": list(modes), "within": DEVIATION,
+        "deviation": deviations, "rates": rates,
+    }  # fmt: skip
+    write_json("throughput", out, asked.folder)
 
 
 def arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--designs", type=int, default=64)
     parser.add_argument("--modes", type=int, default=1, choices=range(1, 7), help="the last of the study's six")
     parser.add_argument("--engine", default="threads,processes")
-    parser.add_argument("--json", metavar="FILE")
     return parser.parse_args()
 
 

@@ -1,6 +1,6 @@
 """Do the validity indicators tell when a model does not hold? Each against the error that it is to tell of.
 
-    python benchmarks/validity.py [--skip-engine]
+    python benchmarks/validity.py [--skip-engine] [--write]
     python benchmarks/validity.py --page     # tables of docs/validity.md from benchmarks/measured/validity.json
 
 Three parts, a few minutes: beams bent statically against the exact elastica; the library's mechanisms with every path
@@ -10,7 +10,6 @@ beams. The limits in `paraflex/validity/indicators.py` come from here.
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 from collections.abc import Iterator
@@ -18,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import markdown, single_thread, table, write_json
+from common import command_line, markdown, single_thread, table, write_json
 from cost_model import write_page
 from scipy.integrate import solve_bvp
 from scipy.stats import spearmanr
@@ -353,7 +352,7 @@ def _exact(values: dict[str, Any]) -> str:
 
 def main() -> None:
     single_thread()
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = command_line(__doc__)
     parser.add_argument("--skip-engine", action="store_true")
     parser.add_argument("--page", action="store_true")
     asked = parser.parse_args()
@@ -390,6 +389,7 @@ def main() -> None:
     write_json(
         "validity",
         {"limit": FOURTH_ORDER_LIMIT, "statics": statics, "counts": linear, "linear": finite, "second_order": exact},
+        asked.folder,
     )
 
 

@@ -22,6 +22,7 @@ sys.path.append(str(BENCHMARKS))
 import batch  # noqa: E402
 import common  # noqa: E402
 import cost_model  # noqa: E402
+import default_method  # noqa: E402
 import engines  # noqa: E402
 import four_bars  # noqa: E402
 import iteration  # noqa: E402
@@ -203,6 +204,14 @@ def test_measurements_keep_their_conditions(tmp_path):
     assert start.processor > 0.0
 
 
+def test_the_default_method_is_shown_by_all_its_cases():
+    found = json.loads((common.MEASURED / "default_method.json").read_text(encoding="utf-8"))
+    again = default_method.summary(found["cases"])
+    assert {name: found[name] for name in again} == again
+    assert set(found["cases"]) == {name for name, _ in default_method.cases()}
+    assert not again["failed"]
+
+
 def measured(path, mode):
     """What `paths_and_modes.py` found [m]."""
     rows = json.loads((common.MEASURED / "paths_and_modes.json").read_text(encoding="utf-8"))["rows"]
@@ -229,6 +238,58 @@ def test_second_order_meets_exact_beams_on_every_path_and_mode():
     for row in rows:
         assert row["second_order"] == pytest.approx(row["exact"], rel=5e-3)
     assert max(row["linear"]["run"] / row["exact"]["run"] for row in rows) > 10.0
+
+
+def test_what_trust_md_says_of_the_models_was_measured():
+    """Numbers in the list below the table of "Do the models agree?"."""
+    rows = json.loads((common.MEASURED / "model_agreement.json").read_text(encoding="utf-8"))["rows"]
+
+    def off(name):
+        return {r["mode"]: r["models"][name]["run"] / r["models"]["exact beams"]["run"] - 1.0 for r in rows}
+
+    pinned = {mode: abs(part) for mode, part in off("second order, pinned").items()}
+    assert [pinned.pop("+--+"), pinned.pop("-+-+")] == pytest.approx([4e-4, 15e-4], abs=5e-5)
+    assert max(pinned.values()) < 2.5e-4
+    assert max(map(abs, off("second order, cantilever").values())) == pytest.approx(75e-4, abs=5e-5)
+    linear = {mode: abs(part) for mode, part in off("linear, cantilever").items()}
+    assert min(linear.values()) == pytest.approx(0.04, abs=5e-3)
+    assert 1.0 + linear["+-+-"] == pytest.approx(5.6, abs=0.06)
+    assert off("linear, pinned")["+--+"] == pytest.approx(0.13, abs=5e-3)
+    assert 1.0 + off("linear, pinned")["+-+-"] == pytest.approx(0.1, abs=5e-3)
+    held = [1.0 + part for part in off("KED").values()]
+    assert [min(held), max(held)] == pytest.approx([4.0, 37.0], abs=0.6)
+    assert max(row["segments_apart"] for row in rows) == pytest.approx(0.07e-6, abs=5e-9)
+    moved = [row["models"]["56 segments"]["changes"]["mesh"] for row in rows]
+    assert [min(moved), max(moved)] == pytest.approx([0.05e-3, 0.36e-3], abs=6e-6)
+
+
+def test_what_trust_md_says_of_table_3_was_measured():
+    paper = json.loads((common.MEASURED / "paths_and_modes.json").read_text(encoding="utf-8"))["table_3"]
+    redundant = ("+++-", "++-+", "++++")
+    off = {mode: measured("square", mode)["linear"]["run"] / measured("square", mode)["exact"]["run"] for mode in paper}
+    assert sorted(1.0 - off[mode] for mode in redundant) == pytest.approx([0.04, 0.11, 0.18], abs=5e-3)
+    assert [off["+--+"], off["+-+-"]] == pytest.approx([1.8, 5.6], abs=0.06)
+    second = {mode: measured("square", mode)["second_order"]["run"] for mode in paper}
+    for errors, least, most in ((second, 5.0, 18.0), (paper, 9.0, 170.0)):
+        good, bad = ([errors[mode] for mode in paper if (mode in redundant) == kind] for kind in (True, False))
+        assert [min(bad) / max(good), max(bad) / min(good)] == pytest.approx([least, most], rel=0.07)
+
+
+def test_what_trust_md_says_of_other_mechanisms_was_measured():
+    rows = json.loads((common.MEASURED / "library_agreement.json").read_text(encoding="utf-8"))["rows"]
+
+    def off(name):
+        return {(r["mechanism"], r["mode"]): r["models"][name]["run"] / r["exact"]["run"] - 1.0 for r in rows}
+
+    for name, part, apart in (("pinned", 5e-4, 3e-6), ("cantilever", 3e-3, 18e-6)):
+        assert max(map(abs, off(f"second order, {name}").values())) < part
+        assert max(row["models"][f"second order, {name}"]["apart"] for row in rows) < apart
+    linear, pinned = off("linear, cantilever"), off("linear, pinned")
+    assert [linear["RAParM-II", mode] for mode in ("+-+-", "+--+")] == pytest.approx([1.0, 1.0], abs=0.15)
+    assert linear["4-RRR", "+++-"] == pytest.approx(3.8, abs=0.05)
+    assert sorted(pinned.values())[-2:] == pytest.approx([0.24, 0.37], abs=5e-3)
+    at_ease = next(row for row in rows if (row["mechanism"], row["mode"]) == ("RAParM-II", "++++"))
+    assert at_ease["exact"]["run"] == pytest.approx(1.4e-3, abs=5e-5)
 
 
 def test_errors_are_taken_until_the_motion_ends_and_over_the_whole_run():

@@ -85,6 +85,7 @@ def test_the_paper_s_mode_drifts_and_hardly_vibrates(paper_run):
     assert found == pytest.approx(np.sqrt(np.mean(np.sum(left**2, axis=1))), rel=0.01)
     assert found == pytest.approx(2.18e-4, rel=0.03)
     assert float(data["drift_speed"]) == pytest.approx(np.linalg.norm(line[1]), rel=1e-9)
+    assert float(data["drift_speed"]) == pytest.approx(0.14, abs=0.005)
 
 
 def test_errors_during_the_motion_and_after_it_make_up_that_of_the_whole(paper_run):

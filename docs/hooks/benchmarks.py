@@ -21,18 +21,20 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
             raise PluginError(f"{page.file.src_uri}: no table {found[1]!r}; there are {', '.join(TABLES)}")
         file, made = TABLES[found[1]]
         data = json.loads((MEASURED / f"{file}.json").read_text(encoding="utf-8"))
-        return f"{_conditions(data, timed=file in TIMED)}\n\n{made(data)}"
+        return f"{_conditions(data, file)}\n\n{made(data)}"
 
     # cost-model.md has a section of this form that its script writes.
     return re.sub(r"<!-- measured: (?!begin|end)(\w+) -->", table, markdown)
 
 
-def _conditions(data: dict[str, Any], *, timed: bool) -> str:
+def _conditions(data: dict[str, Any], file: str) -> str:
     """Command, day and versions; where times were measured, the machine and its load as well."""
-    machine, versions = data["machine"], data["versions"]
-    where = f"{machine['processor']}, {machine['processors']} processors, load {data['load'][0]:.1f}; " if timed else ""
-    engines = f"Numba {versions['numba']}, Exudyn {versions['exudyn']}, MuJoCo {versions['mujoco']}"
-    return f"`{data['command']}`, {data['date']}: {where}{engines}."
+    machine, names = data["machine"], {"numba": "Numba"}
+    where = f"{machine['processor']}, {machine['processors']} processors, load {data['load'][0]:.1f}; "
+    if file in ENGINES:
+        names |= {"exudyn": "Exudyn", "mujoco": "MuJoCo"}
+    versions = ", ".join(f"{title} {data['versions'][name]}" for name, title in names.items())
+    return f"`{data['command']}`, {data['date']}: {where if file in TIMED else ''}{versions}."
 
 
 def peers(data: dict[str, Any]) -> str:
@@ -167,6 +169,132 @@ def model_convergence(data: dict[str, Any]) -> str:
     return _table(("Model", "By the step", "By the mesh"), rows)
 
 
+def method_times(data: dict[str, Any]) -> str:
+    """Every method: its run at 1e-4 m, and times to two errors."""
+    headings = ("Error [m]", "Steps", "Newton iterations", "Imbalance of energy [J]", "Time [s]")
+    rows = []
+    for method in data["methods"].values():
+        run = next(run for run in method["runs"] if run["tolerance"] == 1e-4)
+        times = (method["time_to_reach"][level] for level in ("0.0001", "1e-05"))
+        cells = ("", "", "", "", f"over {data['limit']:g}")
+        if run["status"] == "complete":
+            numbers = (str(run["steps"]), str(run["newton_iterations"]), f"{run['energy_balance_max']:.1e}")
+            cells = (f"{run['error']:.1e}", *numbers, _seconds(run["wall_time"]))
+        rows.append((method["title"], *cells, *("" if time is None else _seconds(time) for time in times)))
+    return _table(("Method", *headings, "Time to 1e-4 m [s]", "to 1e-5 m [s]"), rows)
+
+
+def agreement(data: dict[str, Any]) -> str:
+    """Distance from a converged path and imbalance of energy of every method."""
+    return _table(
+        ("Method", "Tolerance [m]", "Distance [m]", "Energy [J]"),
+        [
+            (row["method"], f"{row['tolerance']:.0e}", f"{row['distance']:.1e}", f"{row['energy_imbalance']:.1e}")
+            for row in data["methods"]
+        ],
+    )
+
+
+def orders(data: dict[str, Any]) -> str:
+    """Median orders in positions, velocities and multipliers."""
+    names = next(iter(data["orders"].values()))
+
+    def cell(values: list[float | None]) -> str:
+        return ", ".join("rounding" if value is None else f"{value:.1f}" for value in values)
+
+    return _table(
+        ("Method", *data["orders"]),
+        [(f"`{name}`", *(cell(part[name]) for part in data["orders"].values())) for name in names],
+    )
+
+
+def default_method(data: dict[str, Any]) -> str:
+    """Errors and times of the ESDIRK methods over all cases."""
+    headings = ("Error over tolerance, median", "largest", "Time over TR-BDF2's at 1e-4 m, median", "largest")
+    numbers = ("error", "largest_error", "time", "largest_time")
+    return _table(
+        ("Method", "Tolerance [m]", "Failed", *headings),
+        [
+            (
+                f"`{row['method']}`",
+                f"{row['tolerance']:.0e}",
+                str(row["failed"]),
+                *(f"{row[name]:.2g}" for name in numbers),
+            )
+            for row in data["rows"]
+        ],
+    )
+
+
+def convergence(data: dict[str, Any]) -> str:
+    """Every mode of the paper's study at its tolerance."""
+    distance = "Largest distance from the converged path, per tolerance"
+    return _table(
+        ("Mode", "Converged tracking error [m]", "Error of it", distance),
+        [
+            (row["mode"], f"{row['converged']:.4e}", f"{100 * row['error']:.2f} %", f"{row['distance']:.2f}")
+            for row in data["shown"]
+        ],
+    )
+
+
+def real_time(data: dict[str, Any]) -> str:
+    """One run at several tolerances by two methods."""
+    return _table(
+        ("Method", "Tolerance [m]", "Error of the tracking error", "Time for 0.7 s [s]", "Real time"),
+        [
+            (
+                f"`{row['method']}`",
+                f"{row['tolerance']:.0e}",
+                f"{100 * row['relative_error']:.2f} %",
+                _seconds(row["wall_time"]),
+                f"{row['times_real_time']:.1f} x",
+            )
+            for row in data["rows"]
+        ],
+    )
+
+
+def scaling(data: dict[str, Any]) -> str:
+    """Rows of four-bars and chains: times over n."""
+    headings = ("n", "Build [s]", "Close and start [s]", "A step [ms]", "Twice the n", "Arrays [MB]")
+    return _table(
+        (*headings, "A step of a chain [ms]", "Twice the n"),
+        [
+            (
+                str(row["n"]),
+                _seconds(row["build"]),
+                _seconds(row["start"]),
+                *_step(row),
+                f"{row['megabytes']:.1f}",
+                *_step(chain),
+            )
+            for row, chain in zip(data["four_bars"], data["chains"], strict=True)
+        ],
+    )
+
+
+def _step(row: dict[str, Any]) -> tuple[str, str]:
+    return f"{1e3 * row['step']:.2g}", "" if row["ratio"] is None else f"{row['ratio']:.1f} x"
+
+
+def singular_passages(data: dict[str, Any]) -> str:
+    """Runs through singular positions by kernels of all processors: how many fail, errors over the tolerance."""
+    numbers = ("median", "p90", "most")
+    return _table(
+        ("Method", "Runs", "Failed", "Median", "Nine in ten below", "Largest"),
+        [
+            (f"`{row['method']}`", str(row["runs"]), str(row["failed"]), *(f"{row[name]:.2g}" for name in numbers))
+            for row in data["rows"]
+            if row["target"] == "all"
+        ],
+    )
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.2g}"
+
+
 def _millimetres(length: float) -> str:
     return f"{1e3 * length:#.3g}".rstrip(".")
 
@@ -183,7 +311,9 @@ def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 
 
 # Files of times; the others hold lengths, which do not depend on the machine.
-TIMED = ("peers", "batch", "startup")
+TIMED = ("peers", "batch", "startup", "method_times", "default_method", "real_time", "scaling")
+# Files with runs by other engines.
+ENGINES = ("peers", "batch", "paths_and_modes", "model_agreement", "library_agreement")
 # What a page may ask for: the file of the measurements, and what makes the table of it.
 TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
     "peers": ("peers", peers),
@@ -194,4 +324,12 @@ TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
     "model_agreement": ("model_agreement", model_agreement),
     "library_agreement": ("library_agreement", library_agreement),
     "model_convergence": ("model_agreement", model_convergence),
+    "method_times": ("method_times", method_times),
+    "agreement": ("agreement", agreement),
+    "orders": ("orders", orders),
+    "default_method": ("default_method", default_method),
+    "convergence": ("convergence", convergence),
+    "real_time": ("real_time", real_time),
+    "scaling": ("scaling", scaling),
+    "singular_passages": ("singular_passages", singular_passages),
 }
