@@ -240,6 +240,27 @@ def test_second_order_meets_exact_beams_on_every_path_and_mode():
     assert max(row["linear"]["run"] / row["exact"]["run"] for row in rows) > 10.0
 
 
+def test_what_the_readme_says_in_prose_was_measured():
+    readme = " ".join((Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8").split())
+
+    def run(mode, model="second_order", path="square"):
+        return 1e3 * measured(path, mode)[model]["run"]
+
+    study = [run(mode) for mode in ("+-+-", "-+-+", "+--+", "+++-", "++-+", "++++")]
+    assert f"between {min(study):.2f} mm and {max(study):.1f} mm on the same square" in readme
+    assert f"({run('+-+-'):.1f}, {run('-+-+'):.1f} and {run('++++'):.2f} mm)" in readme
+    linear, exact = run("+-+-", "linear"), run("+-+-", "exact")
+    assert f"give {linear:.0f} mm in the first of them, geometrically exact beams {exact:.1f} mm" in readme
+    assert f"({linear:.0f} mm instead of {exact:.1f} mm in mode +-+-;" in readme
+    batch_of = json.loads((common.MEASURED / "batch.json").read_text(encoding="utf-8"))
+    ours, theirs = (
+        next(row["seconds_of_all"] for row in batch_of["rows"] if row["way"].startswith(way))
+        for way in ("paraflex, second order", "Exudyn")
+    )
+    assert f"{batch_of['designs']} designs of other stiffness" in readme
+    assert f"take {ours:.0f} s on two cores; Exudyn takes {theirs:.0f} s for as many" in readme
+
+
 def test_what_trust_md_says_of_the_models_was_measured():
     """Numbers in the list below the table of "Do the models agree?"."""
     rows = json.loads((common.MEASURED / "model_agreement.json").read_text(encoding="utf-8"))["rows"]
