@@ -240,6 +240,33 @@ def test_second_order_meets_exact_beams_on_every_path_and_mode():
     assert max(row["linear"]["run"] / row["exact"]["run"] for row in rows) > 10.0
 
 
+def test_what_modes_md_says_of_paths_was_measured():
+    page = " ".join((Path(__file__).parents[1] / "docs" / "modes.md").read_text(encoding="utf-8").split())
+    two, more = ("+-+-", "-+-+", "+--+", "-++-"), ("+++-", "++-+", "+-++", "-+++", "++++")
+
+    def error(path, mode, part="motion", model="second_order"):
+        return 1e3 * measured(path, mode)[model][part]
+
+    def ratios(path, part):
+        few, many = ([error(path, mode, part) for mode in modes] for modes in (two, more))
+        return f"{min(few) / max(many):.2g} to {max(few) / min(many):.2g} times"
+
+    assert f"is {ratios('square', 'motion')} as large, over the whole run {ratios('square', 'run')} (each" in page
+    assert f"On the circle during the motion too ({ratios('circle', 'motion')})" in page
+    line = {mode: error("line", mode) for mode in (*two, *more)}
+    assert min(line, key=line.get) == "+-+-"
+    says = f"{line['+-+-']:.3f} mm, where ++++ strays by {line['++++']:.3f} mm and ++-+ by {line['++-+']:.3f} mm"
+    assert says in page
+    whole = f"it strays by {error('line', '+-+-', 'run'):.3f} mm and ++++ by {error('line', '++++', 'run'):.2f} mm"
+    assert whole in page
+    assert f"the circle passes: {error('circle', '+-+-'):.0f} mm there" in page
+    circle = {part: [error("circle", mode, part) for mode in ("-+++", "-++-")] for part in ("motion", "run")}
+    assert "({:.2f} against {:.2f} mm)".format(*circle["motion"]) in page
+    assert "({:.1f} against {:.1f} mm)".format(*circle["run"]) in page
+    linear = f"by {error('circle', '-++-', model='linear'):.1f} mm on the circle ({error('circle', '-++-'):.2f})"
+    assert linear in page
+
+
 def test_what_the_readme_says_in_prose_was_measured():
     readme = " ".join((Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8").split())
 
