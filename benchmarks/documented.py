@@ -15,6 +15,7 @@ import argparse
 import dataclasses
 import json
 import re
+import shutil
 import sys
 import tempfile
 import time
@@ -74,7 +75,27 @@ def search(kind: str, file: str, folder: str | Path, **changes: Any) -> dict[str
     study = load(EXAMPLES / file)
     study = dataclasses.replace(study, search=dataclasses.replace(study.search, **changes))
     result = getattr(studies, kind)(study, folder)
+    if not changes:
+        draw({"optimise": "optimisation", "identify": "identification"}[kind], result.figures())
     return {name: value for name, value in result.figures().items() if name != "history"} | {"seconds": result.seconds}
+
+
+# Pictures of the pages, by what they are of: the figure that the command writes, and its name there.
+PICTURES = {
+    "optimisation": ("convergence", "optimisation_convergence"),
+    "identification": ("targets", "identification_targets"),
+    "indices": ("indices", "sobol_indices"),
+}
+
+
+def draw(kind: str, figures: dict[str, Any]) -> None:
+    """Bring the picture on the page up to date."""
+    from paraflex.plots import save_search_figures
+
+    written, shown = PICTURES[kind]
+    with tempfile.TemporaryDirectory() as folder:
+        save_search_figures({"kind": kind} | figures, folder)
+        shutil.copyfile(Path(folder) / f"{written}.png", DOCS / "images" / f"{shown}.png")
 
 
 def optimisation() -> dict[str, Any]:
@@ -165,6 +186,7 @@ def indices() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         chosen = {"metrics": ["tracking_rms", "peak_torque_max"], "samples": 128, "seed": 1}
         result = sobol_indices(EXAMPLES / "optimisation.toml", folder, **chosen)
+        draw("indices", result.figures())
         rows = {each.metric: {row["parameter"]: dict(row) for row in each.rows()} for each in result.indices}
         return {"runs": result.sweep.total, "seconds": time.perf_counter() - began, **rows}
 
