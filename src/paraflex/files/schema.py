@@ -402,8 +402,8 @@ class StudyTable(_Table):
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
     )
-    method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
-    tolerance: Number | None = Field(default=None, description="the tolerance of the integration in m")
+    method: Text | None = Field(default=None, description="the method of integration, esdirk5 by default: paraflex methods lists them")
+    tolerance: Number | None = Field(default=None, description="the tolerance of the integration in m, 1e-5 by default")
     step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
     after: Literal["free", "hold"] = Field(
         default="free", description='what the active motors do after the path: "free" or "hold", by brakes'
