@@ -402,7 +402,9 @@ class StudyTable(_Table):
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
     )
-    method: Text | None = Field(default=None, description="the method of integration, esdirk5 by default: paraflex methods lists them")
+    method: Text | None = Field(
+        default=None, description="the method of integration, by default esdirk5: see paraflex methods"
+    )
     tolerance: Number | None = Field(default=None, description="the tolerance of the integration in m, 1e-5 by default")
     step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
     after: Literal["free", "hold"] = Field(

@@ -30,7 +30,7 @@ def run(
             help="Actuation mode: signs (+-+-) or motor names (tau1,tau5); repeatable. Default: the study's.",
         ),
     ] = None,
-    tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance of the integration; the study's, else 1e-5.")] = None,
+    tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance; the study's, else 1e-5.")] = None,
     duration: DurationOption = None,
     samples: SamplesOption = None,
     assembly: AssemblyOption = None,
