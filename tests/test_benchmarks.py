@@ -288,6 +288,17 @@ def test_what_the_readme_says_in_prose_was_measured():
     assert f"take {ours:.0f} s on two cores; Exudyn takes {theirs:.0f} s for as many" in readme
 
 
+def test_what_validity_md_says_in_prose_was_measured():
+    rows = json.loads((common.MEASURED / "validity.json").read_text(encoding="utf-8"))["linear"]
+    square = [row for row in rows if (row["mechanism"], row["path"]) == ("raparm_i", "square")]
+    between = [row["error"] for row in square if 0.145 < row["shortening"] < 0.55]
+    assert [min(between), max(between)] == pytest.approx([0.03, 0.76], abs=5e-3)
+    paper = next(row for row in square if (row["mode"], row["frame"]) == ("++++", "cantilever"))
+    assert [paper["error"], paper["tracking_error_change"]] == pytest.approx([0.055, -0.04], abs=5e-3)
+    free = [row for row in rows if not row["path"] and row["error"] is not None and row["axial_force"]]
+    assert max(row["error"] / row["axial_force"] for row in free) == pytest.approx(1.1, abs=0.05)
+
+
 def test_what_trust_md_says_of_the_models_was_measured():
     """Numbers in the list below the table of "Do the models agree?"."""
     rows = json.loads((common.MEASURED / "model_agreement.json").read_text(encoding="utf-8"))["rows"]
