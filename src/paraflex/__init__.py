@@ -13,7 +13,16 @@ from paraflex.cache_folder import ensure_cache_folder
 
 if TYPE_CHECKING:
     from paraflex import plots
-    from paraflex.errors import InputError, NumericalError, ParaflexError, StiffnessWarning, ValidityWarning
+    from paraflex.errors import (
+        InputError,
+        ModelWarning,
+        NumericalError,
+        ParaflexError,
+        ParaflexWarning,
+        ResultWarning,
+        StiffnessWarning,
+        ValidityWarning,
+    )
     from paraflex.files import Model, library_names, load, load_path
     from paraflex.integrators import METHODS, DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
@@ -44,10 +53,13 @@ _HOME = {
     "METHODS": "integrators",
     "Mechanism": "mechanism",
     "Model": "files",
+    "ModelWarning": "errors",
     "NumericalError": "errors",
     "ParaflexError": "errors",
+    "ParaflexWarning": "errors",
     "PointPath": "kinematics",
     "Polygon": "kinematics",
+    "ResultWarning": "errors",
     "SingularDistance": "integrators",
     "StiffnessWarning": "errors",
     "ValidityWarning": "errors",
@@ -86,10 +98,13 @@ __all__ = [
     "Line",
     "Mechanism",
     "Model",
+    "ModelWarning",
     "NumericalError",
     "ParaflexError",
+    "ParaflexWarning",
     "PointPath",
     "Polygon",
+    "ResultWarning",
     "SingularDistance",
     "StiffnessWarning",
     "ValidityWarning",

@@ -23,9 +23,12 @@ __all__ = [
     "InconsistentConstraintsError",
     "InputError",
     "IntegrationError",
+    "ModelWarning",
     "NumericalError",
     "OutputError",
     "ParaflexError",
+    "ParaflexWarning",
+    "ResultWarning",
     "SingularActuationError",
     "SingularPositionError",
     "StiffnessWarning",
@@ -186,9 +189,21 @@ class ConstraintDriftError(IntegrationError):
     """Joints came apart, or a prescribed motion was left, further than errors of integration explain."""
 
 
-class StiffnessWarning(UserWarning):
+class ParaflexWarning(UserWarning):
+    """Root of every warning that paraflex issues: `warnings.simplefilter("error", ParaflexWarning)` stops at each."""
+
+
+class ModelWarning(ParaflexWarning):
+    """Something in a model or a study is doubtful, though it may be meant: see `findings`."""
+
+
+class ResultWarning(ParaflexWarning):
+    """A result is far from what mass, size and speed of the mechanism make plausible: see `findings`."""
+
+
+class StiffnessWarning(ParaflexWarning):
     """An explicit method will take very many steps, by stability alone."""
 
 
-class ValidityWarning(UserWarning):
+class ValidityWarning(ParaflexWarning):
     """A run has gone beyond what its model can describe: see `validity`."""

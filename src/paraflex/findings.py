@@ -1,0 +1,183 @@
+"""What is found of a model, a study or a result: each finding has a stable code, a place, a text and a remedy.
+
+The codes are listed in `CODES`; the page "Findings" of the documentation is made from that table.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from paraflex.errors import ModelWarning, ParaflexWarning
+
+
+class Level(Enum):
+    """How much a finding weighs; a verdict takes the gravest.
+
+    SOUND
+        Nothing was found.
+    DOUBTFUL
+        It may be meant, and runs; look at it before the numbers are trusted.
+    WRONG
+        What was asked cannot be had from it.
+    """
+
+    SOUND = "sound"
+    DOUBTFUL = "doubtful"
+    WRONG = "wrong"
+
+
+@dataclass(frozen=True)
+class Code:
+    """What findings of one code have in common.
+
+    Attributes
+    ----------
+    level : Level
+    meaning : str
+        When it is found, for the documentation.
+    """
+
+    level: Level
+    meaning: str
+
+
+def _codes() -> dict[str, Code]:
+    wrong = {
+        "assembly-missing": "The model has no assembly, so that nothing says how it is put together.",
+        "assembly-open": "The loops of an assembly cannot be closed with the lengths and places given.",
+        "mode-short": "The motors of an actuation mode cannot drive all degrees of freedom.",
+        "end-effector-missing": "The study has a path and the mechanism no end-effector to follow it.",
+        "task-freedoms": "The coordinates of the end-effector that a path prescribes are not as many as the freedoms.",
+        "path-unreachable": "The end-effector cannot follow a path of the study, in the assembly of the study.",
+        "path-singular": "A mode loses control of the mechanism on the path: a Type II singular position.",
+        "drives-conflict": "Prescribed motions contradict one another, or the joints.",
+    }
+    doubtful = {
+        "special-pose": "The pose of an assembly has freedoms that its neighbours have not: a change point.",
+        "assembly-elbow": "An assembly closed far from the angles given: it may be the other elbow.",
+        "beam-thick": "A beam is nearly as thick as it is long, or thicker: a section in millimetres, or turned.",
+        "beam-thin": "A beam is thinner than a ten-thousandth of its length.",
+        "section-flat": "A beam's section is many times as wide across the plane as thick in it, or the reverse.",
+        "modulus": "Young's modulus is outside of what materials have: it is given in Pa.",
+        "density": "A density is outside of what materials have: it is given in kg/m^3.",
+        "material": "Modulus and density do not go together: no material has such a speed of sound.",
+        "mass": "A mass or inertia is out of proportion to the mechanism: it is given in kg, or kg m^2.",
+        "angle": "An angle is beyond a full turn: it is given in radians.",
+        "size": "Lengths are out of proportion: the mechanism is very large, very small, or of two units.",
+        "gravity": "Gravity is not 9.81 m/s^2 along an axis.",
+        "same-place": "Two points of a body, or two ground points, lie at one place.",
+        "unused": "A point, motor, table or parameter is named nowhere.",
+        "motor-prescribed": "A motor acts at a joint whose motion is prescribed: it does nothing.",
+        "friction-large": "Friction at a joint exceeds what the motor there gives along the path.",
+        "path-cut-short": "The run ends before the path does.",
+        "path-ill-conditioned": "A mode passes near a singular position of its motors.",
+        "modes-too-stiff": "The modes kept of a beam cannot carry a moment that comes in.",
+        "motions-grow": "Some motions about the pose grow instead of vibrating.",
+        "not-equilibrium": "A model that runs on its own starts from a pose that is no equilibrium.",
+        "slider-off-beam": "A sliding joint leaves its beam.",
+        "frequency-low": "The lowest natural frequency is far below what such links have.",
+        "torque-large": "Torques or forces are far beyond what mass, size and speed make plausible.",
+        "deflection-large": "Links bend further than such a model describes.",
+        "error-large": "The tracking error is of the size of the path.",
+        "validity": "A run went beyond what the geometry of its model can describe.",
+    }
+    return {name: Code(Level.WRONG, text) for name, text in wrong.items()} | {
+        name: Code(Level.DOUBTFUL, text) for name, text in doubtful.items()
+    }
+
+
+CODES: dict[str, Code] = _codes()
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One reason why a model is doubtful or wrong, or a result doubtful.
+
+    Attributes
+    ----------
+    code : str
+        Of the table `CODES`; it stays the same from version to version.
+    place : str
+        The table or field of the model file it is about ("body.crank.section"), or the mode of a run.
+    text : str
+        What was found, with numbers and units.
+    remedy : str
+        What to look at or to write instead.
+    """
+
+    code: str
+    place: str
+    text: str
+    remedy: str
+
+    def __post_init__(self) -> None:
+        if self.code not in CODES:
+            raise KeyError(f"no finding has the code {self.code!r}")
+
+    @property
+    def level(self) -> Level:
+        """How much it weighs."""
+        return CODES[self.code].level
+
+    def __str__(self) -> str:
+        where = f"{self.place}: " if self.place else ""
+        return f"{where}{self.text}; {self.remedy} [{self.code}]"
+
+    def to_dict(self) -> dict[str, str]:
+        """For JSON: code, level, place, text, remedy."""
+        return {"code": self.code, "level": self.level.value, **{k: getattr(self, k) for k in _TEXTS}}
+
+
+_TEXTS = ("place", "text", "remedy")
+
+
+@dataclass(frozen=True)
+class Verdict(Sequence[Finding]):
+    """What a check has found, the gravest first.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+    """
+
+    findings: tuple[Finding, ...]
+
+    def __init__(self, findings: Iterable[Finding] = ()) -> None:
+        order = [Level.WRONG, Level.DOUBTFUL, Level.SOUND]
+        object.__setattr__(self, "findings", tuple(sorted(findings, key=lambda one: order.index(one.level))))
+
+    @property
+    def level(self) -> Level:
+        """Of the gravest finding; sound where there is none."""
+        return self.findings[0].level if self.findings else Level.SOUND
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """Codes of all findings."""
+        return tuple(one.code for one in self.findings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON: `level` and `findings`."""
+        return {"level": self.level.value, "findings": [one.to_dict() for one in self.findings]}
+
+    def __getitem__(self, k: Any) -> Any:
+        return self.findings[k]
+
+    def __len__(self) -> int:
+        return len(self.findings)
+
+    def __iter__(self) -> Iterator[Finding]:
+        return iter(self.findings)
+
+    def __str__(self) -> str:
+        return "\n".join([f"{one.level.value}: {one}" for one in self.findings] or [Level.SOUND.value])
+
+
+def warn_of(findings: Iterable[Finding], category: type[ParaflexWarning] = ModelWarning, stacklevel: int = 2) -> None:
+    """Issue a warning of a class of ours for each finding."""
+    for one in findings:
+        warnings.warn(category(str(one)), stacklevel=stacklevel + 1)
