@@ -48,7 +48,7 @@ BROKEN = [
     ),
     ("length = 0.250 # m", "length = true", "body.link1.length", "give the length in m"),
     ("length = 0.250 # m", "length = inf", "body.link1.length: should be a finite number", "in m"),
-    ("length = 0.250 # m", "length =", "not valid TOML", "line 45"),
+    ("length = 0.250 # m", "length =", "not valid TOML", "line 43"),
     ('type = "beam"', 'type = "bean"', "body.link1.type: unknown type (got 'bean')", "'beam', 'rigid'"),
     ('section = "bar"', 'section = "baar"', "body.link1.section: unknown section", 'did you mean "bar"?'),
     ('material = "aluminium"', 'material = "steel"', "body.link1.material: unknown material", "aluminium"),

@@ -36,15 +36,18 @@ class Section:
         [m^2]
     second_moment : float
         Of area, about the axis normal to the plane of motion [m^4].
+    sides : (width, thickness), optional
+        Of a rectangle: out of the plane of motion and in it [m].
     """
 
     area: float
     second_moment: float
+    sides: tuple[float, float] | None = None
 
     @classmethod
     def rectangle(cls, width: float, thickness: float) -> Section:
         """A rectangle: width out of the plane of motion, thickness in it [m]."""
-        return cls(area=width * thickness, second_moment=width * thickness**3 / 12.0)
+        return cls(width * thickness, width * thickness**3 / 12.0, (width, thickness))
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def raparm_i(
         joints += [
             RevoluteJoint(a, PointRef("ground", a), PointRef(one, a)),
             RevoluteJoint(b, PointRef(one, b), PointRef(four, b)),
-            RevoluteJoint(d, PointRef("ground", d), PointRef(two, d)),
+            RevoluteJoint(d, PointRef("ground", a), PointRef(two, d)),
             RevoluteJoint(f, PointRef(two, f), PointRef(three, f)),
             RevoluteJoint(g, PointRef(three, g), PointRef(four, g)),
         ]
@@ -88,7 +88,7 @@ def raparm_i(
     return Mechanism(
         name="RAParM-I",
         geometry=Geometry.LINEAR,
-        ground={"A1": (-e, 0.0), "D1": (-e, 0.0), "A2": (e, 0.0), "D2": (e, 0.0)},
+        ground={"A1": (-e, 0.0), "A2": (e, 0.0)},
         bodies=tuple(bodies),
         joints=tuple(joints),
         motors=tuple(motors),

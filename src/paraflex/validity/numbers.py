@@ -1,0 +1,263 @@
+"""Are the numbers of a mechanism plausible? Slips of units, signs and places that no check of form can see.
+
+Each bound is wide: what lies beyond it is hardly ever meant, and where it is the finding does no harm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from paraflex.findings import Finding
+from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, RigidBody, Section
+from paraflex.mechanism.bodies import Body, Material
+
+Place = tuple[float, float]
+Beam = FlexibleBeam | AssumedModesBeam
+
+# Thickness over length of beams: beam theory ends at the first; tapes and foils are as thin as the second.
+THICK, THIN = 0.25, 5e-4
+# Thickness in the plane over width out of it, of a rectangle that would first bend out of the plane.
+TURNED = 3.0
+# Young's modulus [Pa]: of the softest rubber and of diamond, with room to spare.
+MODULUS = (1e5, 2e12)
+# Density [kg/m^3]: of light foam and of osmium.
+DENSITY = (10.0, 2.3e4)
+# Of solids as heavy as the first [kg/m^3] none has a modulus below the second [Pa].
+HEAVY, SOFT = 2000.0, 1e9
+# Lengths of a mechanism [m]: of micromechanics and of the largest machines.
+SIZE = (1e-5, 100.0)
+# The longest over the shortest link that a mechanism has.
+SPREAD = 500.0
+# Radius of gyration of a rigid body over the mechanism's size.
+GYRATION = 5.0
+# A body's mass over that of all others together, without which the others would hardly matter.
+HEAVIEST = 200.0
+# Standard gravity and how far places on Earth differ from it [m/s^2].
+GRAVITY, ON_EARTH = 9.81, 0.05
+# Points nearer one another than this part of the mechanism are at one place.
+APART = 1e-9
+_TURN = 2.0 * math.pi
+
+
+def doubtful_numbers(mechanism: Mechanism) -> list[Finding]:
+    """Findings about a mechanism's own numbers, from its description alone.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+
+    Returns
+    -------
+    list of Finding
+    """
+    size = mechanism_size(mechanism)
+    found = [*_lengths(mechanism, size), *_gravity(mechanism.gravity), *_angles(mechanism), *_drives(mechanism)]
+    for body in mechanism.bodies:
+        if isinstance(body, Beam):
+            found += _beam(body)
+        elif isinstance(body, RigidBody):
+            found += _rigid(body, size)
+    return [*found, *_heaviest(mechanism), *_one_place(mechanism, size)]
+
+
+def mechanism_size(mechanism: Mechanism) -> float:
+    """The largest length in a mechanism's description: of a body, or between ground points [m]; zero of none."""
+    return max([*map(body_length, mechanism.bodies), _extent(mechanism.ground.values())], default=0.0)
+
+
+def body_length(body: Body) -> float:
+    """Length of a beam, or the largest distance between a body's named points and its centre of mass [m]."""
+    if isinstance(body, Beam):
+        return body.length
+    if isinstance(body, ModalBody):
+        return _extent([point.position for point in body.points.values()])
+    return _extent([*body.points.values(), body.centre_of_mass])
+
+
+def _extent(places: Iterable[Sequence[float]]) -> float:
+    return max((math.dist(a, b) for a, b in combinations(list(places), 2)), default=0.0)
+
+
+def _lengths(mechanism: Mechanism, size: float) -> Iterator[Finding]:
+    least, most = SIZE
+    if size and not least <= size <= most:
+        yield Finding(
+            "size", "body" if size in map(body_length, mechanism.bodies) else "ground",
+            f"the mechanism is {size:.3g} m large", "lengths are in m: is it in mm, or in another unit?",
+        )  # fmt: skip
+    lengths = {body.name: body_length(body) for body in mechanism.bodies if isinstance(body, Beam)}
+    if lengths:
+        longest, shortest = max(lengths, key=lengths.__getitem__), min(lengths, key=lengths.__getitem__)
+        if lengths[longest] > SPREAD * lengths[shortest]:
+            yield Finding(
+                "size", f"body.{longest}.length",
+                f"{lengths[longest]:.3g} m, where {shortest} has {lengths[shortest]:.3g} m",
+                "lengths are in m: is one of them in another unit?",
+            )  # fmt: skip
+    ground = _extent(mechanism.ground.values())
+    reach = sum(map(body_length, mechanism.bodies))
+    if reach and ground > SPREAD * reach:
+        yield Finding(
+            "size", "ground", f"ground points {ground:.3g} m apart, and bodies of {reach:.3g} m together",
+            "lengths are in m: is one of them in another unit?",
+        )  # fmt: skip
+
+
+def _gravity(gravity: Place) -> Iterator[Finding]:
+    strength = math.hypot(*gravity)
+    if not strength:
+        return
+    text = f"({gravity[0]:g}, {gravity[1]:g}) m/s^2"
+    if abs(strength - GRAVITY) > ON_EARTH:
+        yield Finding("gravity", "gravity", f"{text} is {strength:.4g} m/s^2", "on Earth it is 9.81, in m/s^2")
+    elif 0.0 not in gravity:
+        yield Finding("gravity", "gravity", f"{text} is along no axis", "is the mechanism to lie on a slope?")
+    elif max(gravity) > 0.0:
+        yield Finding("gravity", "gravity", f"{text} pulls towards positive {'xy'[gravity[1] > 0.0]}", "is it -9.81?")
+
+
+def _angles(mechanism: Mechanism) -> Iterator[Finding]:
+    given = {
+        f"joint.{j.name}.{name}": getattr(j, name, 0.0) for j in mechanism.joints for name in ("direction", "angle")
+    }
+    given |= {
+        f"assembly.{assembly.name}.{body}": angle
+        for assembly in mechanism.assemblies
+        for body, angle in assembly.angles.items()
+    }
+    for place, angle in given.items():
+        if abs(angle) > _TURN:
+            turn = math.remainder(angle, _TURN)
+            yield Finding(
+                "angle", place, f"{angle:g} rad is more than a turn, and the same as {turn:.4g} rad",
+                f"angles are in radians: {angle:g} degrees are {math.radians(angle):.4g} rad",
+            )  # fmt: skip
+
+
+def _drives(mechanism: Mechanism) -> Iterator[Finding]:
+    driven = {one.joint: one.name for one in mechanism.prescribed}
+    for motor in mechanism.motors:
+        if motor.joint in driven:
+            yield Finding(
+                "motor-prescribed", f"motor.{motor.name}",
+                f"its joint {motor.joint} follows [prescribed.{driven[motor.joint]}] whatever the motor does",
+                "leave one of them out",
+            )  # fmt: skip
+    shared: dict[str, list[str]] = {}
+    for motor in mechanism.motors:
+        shared.setdefault(motor.joint, []).append(motor.name)
+    for joint, names in shared.items():
+        if len(names) > 1:
+            yield Finding(
+                "motor-shared", f"motor.{names[1]}", f"it acts at joint {joint}, as {names[0]} does",
+                "name another joint, or leave one of them out",
+            )  # fmt: skip
+
+
+def _beam(body: Beam) -> Iterator[Finding]:
+    place = f"body.{body.name}"
+    sections: tuple[Section, ...] = body.section if isinstance(body.section, tuple) else (body.section,)
+    materials: tuple[Material, ...] = body.material if isinstance(body.material, tuple) else (body.material,)
+    for section in dict.fromkeys(sections):
+        yield from _section(f"{place}.section", body.length, section)
+    for material in dict.fromkeys(materials):
+        yield from _material(f"{place}.material", material)
+
+
+def _section(place: str, length: float, section: Section) -> Iterator[Finding]:
+    # Of a rectangle of the same area and second moment.
+    thickness = math.sqrt(12.0 * section.second_moment / section.area) if section.second_moment > 0.0 else 0.0
+    if thickness > THICK * length:
+        yield Finding(
+            "beam-thick", place, f"{thickness:.3g} m thick in the plane and {length:.3g} m long: no beam",
+            "sections are in m, m^2 and m^4: is it in mm?",
+        )  # fmt: skip
+    elif 0.0 < thickness < THIN * length:
+        yield Finding(
+            "beam-thin", place,
+            f"{thickness:.3g} m thick in the plane and {length:.3g} m long: {length / thickness:.3g} times",
+            "lengths are in m, sections in m, m^2 and m^4: are all of them?",
+        )  # fmt: skip
+    if section.sides is not None and section.sides[1] > TURNED * section.sides[0]:
+        yield Finding(
+            "section-turned", place,
+            f"{section.sides[1]:.3g} m thick in the plane and only {section.sides[0]:.3g} m wide out of it: "
+            "it bends out of the plane first, which no planar model shows",
+            "width counts out of the plane of motion, thickness in it: is the section turned by 90 degrees?",
+        )  # fmt: skip
+
+
+def _material(place: str, material: Material) -> Iterator[Finding]:
+    modulus, density = material.youngs_modulus, material.density
+    if not MODULUS[0] <= modulus <= MODULUS[1]:
+        yield Finding(
+            "modulus", f"{place}.youngs_modulus", f"{modulus:.3g} Pa is that of no solid",
+            "it is in Pa: steel has 210e9, aluminium 70e9",
+        )  # fmt: skip
+    if not DENSITY[0] <= density <= DENSITY[1]:
+        yield Finding(
+            "density", f"{place}.density", f"{density:.3g} kg/m^3 is that of no solid",
+            "it is in kg/m^3: steel has 7850, aluminium 2700",
+        )  # fmt: skip
+    elif density > HEAVY and MODULUS[0] <= modulus < SOFT:
+        yield Finding(
+            "material", place, f"a modulus of {modulus:.3g} Pa and a density of {density:.3g} kg/m^3 go with no solid",
+            "modulus in Pa, density in kg/m^3: steel has 210e9 and 7850",
+        )  # fmt: skip
+
+
+def _rigid(body: RigidBody, size: float) -> Iterator[Finding]:
+    if size and body.mass > 0.0:
+        gyration = math.sqrt(max(body.inertia, 0.0) / body.mass)
+        if gyration > GYRATION * size:
+            yield Finding(
+                "mass", f"body.{body.name}.inertia",
+                f"{body.inertia:.3g} kg m^2 at {body.mass:.3g} kg is a radius of gyration of {gyration:.3g} m, "
+                f"in a mechanism of {size:.3g} m",
+                "inertia is in kg m^2, about the centre of mass",
+            )  # fmt: skip
+        if body.mass > DENSITY[1] * size**3:
+            yield Finding(
+                "mass", f"body.{body.name}.mass",
+                f"{body.mass:.3g} kg is more than a solid block of metal of the mechanism's size, {size:.3g} m",
+                "mass is in kg: is it in g?",
+            )  # fmt: skip
+
+
+def _heaviest(mechanism: Mechanism) -> Iterator[Finding]:
+    masses = {body.name: _mass(body) for body in mechanism.bodies if not isinstance(body, ModalBody)}
+    total = sum(masses.values())
+    for name, mass in masses.items():
+        if len(masses) > 1 and mass > HEAVIEST * (total - mass) > 0.0:
+            yield Finding(
+                "mass", f"body.{name}", f"its {mass:.3g} kg are {mass / (total - mass):.3g} times all others together",
+                "mass is in kg, density in kg/m^3: are all of them?",
+            )  # fmt: skip
+
+
+def _mass(body: RigidBody | Beam) -> float:
+    if isinstance(body, RigidBody):
+        return body.mass
+    lumps = sum(lump.mass for lump in body.lumps)
+    if isinstance(body, FlexibleBeam):
+        lengths = map(float, np.diff(body.mesh.knots))
+        return lumps + sum(one.mass_per_length * length for one, length in zip(body.spans, lengths, strict=True))
+    return lumps + body.material.density * body.section.area * body.length
+
+
+def _one_place(mechanism: Mechanism, size: float) -> Iterator[Finding]:
+    points: dict[str, Mapping[str, object]] = {"ground": mechanism.ground}
+    points |= {f"body.{body.name}.points": body.points for body in mechanism.bodies}
+    for table, named in points.items():
+        places = {name: tuple(at) if isinstance(at, Sequence) else (float(at), 0.0) for name, at in named.items()}  # pyright: ignore[reportArgumentType]
+        for (one, a), (other, b) in combinations(places.items(), 2):
+            if math.dist(a, b) <= APART * size:
+                where = ", ".join(f"{x:g}" for x in a)
+                yield Finding(
+                    "same-place", f"{table}.{other}", f"it lies where {one} does, at ({where}) m",
+                    "one name is enough, or one of the places is wrong",
+                )  # fmt: skip
