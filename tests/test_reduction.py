@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from paraflex.cli.inspect import describe
+from paraflex.checks import check
 from paraflex.dynamics import build_system, missed_turns
 from paraflex.fem import ReferenceCondition
 from paraflex.files import load
@@ -105,10 +105,8 @@ def test_pins_and_whole_beams_are_not_complained_of():
 def test_info_complains_of_a_beam_that_is_too_stiff_under_its_motor():
     model = load("spin_up")
     reduced = model.mechanism.with_beams(reference=PINNED, modes=2)
-    (complaint,) = describe(replace(model, mechanism=reduced))["complaints"]
-    assert complaint.startswith("body.beam: 2 modes miss 24 % of its turn under a moment at root, which the prescribed")
-    assert "leave modes out" in complaint
-    assert (
-        describe(replace(model, mechanism=model.mechanism.with_beams(reference=CANTILEVER, modes=2)))["complaints"]
-        == []
-    )
+    (finding,) = check(replace(model, mechanism=reduced))
+    assert (finding.code, finding.place) == ("modes-too-stiff", "body.beam.modes")
+    assert finding.text.startswith("2 modes miss 24 % of its turn under a moment at root, which the prescribed")
+    assert "leave modes out" in finding.remedy
+    assert not check(replace(model, mechanism=model.mechanism.with_beams(reference=CANTILEVER, modes=2)))

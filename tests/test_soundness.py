@@ -9,6 +9,7 @@ import pytest
 
 import twins
 from conftest import make_five_bar
+from paraflex.checks import check
 from paraflex.cli.frequencies import InfoRequest
 from paraflex.cli.inspect import describe, library
 from paraflex.dynamics import (
@@ -24,6 +25,7 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.errors import InputError
 from paraflex.files import library_file, library_names, load
 from paraflex.files.model import StudyDefaults
+from paraflex.findings import Level
 from paraflex.mechanism import ActuationMode, Assembly, Mechanism, Motor, PrescribedAngle, RigidBody, loops
 from paraflex.mechanism.joints import SampledAngle
 from test_cli import paraflex
@@ -220,8 +222,12 @@ def test_info_says_what_is_sound_and_what_is_not(tmp_path):
     assert facts["assembly_closes"] is not True
     assert facts["starts"][0]["gap"] == pytest.approx(0.2, rel=1e-3)
     assert facts["starts"][0]["where"] == ["C"]
-    assert facts["complaints"][0].startswith('assembly "outward": the loops do not close: a gap of 0.2 remains in C')
-    assert "not sound: assembly" in paraflex("info", str(broken)).stdout
+    assert done.returncode == 1
+    assert facts["verdict"]["level"] == "wrong"
+    finding = facts["verdict"]["findings"][0]
+    assert (finding["code"], finding["place"]) == ("assembly-open", "assembly.outward")
+    assert finding["text"].startswith("the loops do not close: a gap of 0.2 remains in C")
+    assert "wrong: assembly.outward: the loops do not close" in paraflex("info", str(broken)).stdout
 
 
 def test_info_of_an_unknown_assembly_is_refused():
@@ -274,14 +280,16 @@ def test_a_pose_that_is_no_equilibrium_is_said_to_be_none():
     assert "not an equilibrium: let go" in paraflex("info", "pendulum").stdout
 
 
-def test_special_poses_and_modes_that_do_not_reach_are_complaints():
+def test_special_poses_and_modes_that_do_not_reach_are_found():
     model = load("five_bar")
     flat = parallelogram(2, angle=0.0)
     flat_model = replace(model, mechanism=flat, paths={}, study=StudyDefaults())
-    assert "a special pose: 2 degrees of freedom at this instant, 1 a little" in describe(flat_model)["complaints"][0]
+    flat_one = next(one for one in check(flat_model) if one.code == "special-pose")
+    assert "a special pose: 2 degrees of freedom at this instant, 1 a little" in flat_one.text
     one = replace(model.mechanism, modes=(ActuationMode("left only", ("left",)),))
-    complaints = describe(replace(model, mechanism=one))["complaints"]
-    assert complaints == ['mode "left only" reaches 1 of 2 degrees of freedom']
+    (short,) = check(replace(model, mechanism=one), modes=["++"])
+    assert (short.code, short.place, short.level) == ("mode-short", "mode.left only", Level.WRONG)
+    assert short.text == "it reaches 1 of 2 degrees of freedom"
 
 
 def test_a_law_that_a_mechanism_cannot_follow_is_told_as_its_start():

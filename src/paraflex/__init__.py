@@ -13,6 +13,7 @@ from paraflex.cache_folder import ensure_cache_folder
 
 if TYPE_CHECKING:
     from paraflex import plots
+    from paraflex.checks import check
     from paraflex.errors import (
         InputError,
         ModelWarning,
@@ -64,6 +65,7 @@ _HOME = {
     "StiffnessWarning": "errors",
     "ValidityWarning": "errors",
     "chain_of_segments": "mechanism",
+    "check": "checks",
     "four_bars_in_a_row": "mechanism",
     "identify": "studies",
     "library_names": "files",
@@ -109,6 +111,7 @@ __all__ = [
     "StiffnessWarning",
     "ValidityWarning",
     "chain_of_segments",
+    "check",
     "four_bars_in_a_row",
     "identify",
     "library_names",

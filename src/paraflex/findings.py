@@ -51,10 +51,11 @@ def _codes() -> dict[str, Code]:
         "assembly-open": "The loops of an assembly cannot be closed with the lengths and places given.",
         "mode-short": "The motors of an actuation mode cannot drive all degrees of freedom.",
         "end-effector-missing": "The study has a path and the mechanism no end-effector to follow it.",
+        "mode-missing": "The study has a path and no actuation mode, or no motor, to drive the mechanism along it.",
+        "study-refused": "The study asks for something that the model does not have.",
         "task-freedoms": "The coordinates of the end-effector that a path prescribes are not as many as the freedoms.",
         "path-unreachable": "The end-effector cannot follow a path of the study, in the assembly of the study.",
         "path-singular": "A mode loses control of the mechanism on the path: a Type II singular position.",
-        "drives-conflict": "Prescribed motions contradict one another, or the joints.",
     }
     doubtful = {
         "special-pose": "The pose of an assembly has freedoms that its neighbours have not: a change point.",
@@ -74,6 +75,7 @@ def _codes() -> dict[str, Code]:
         "motor-prescribed": "A motor acts at a joint whose motion is prescribed: it does nothing.",
         "friction-large": "Friction at a joint exceeds what the motor there gives along the path.",
         "path-cut-short": "The run ends before the path does.",
+        "law-cut-short": "The run ends before the pieces or the table of a prescribed motion do.",
         "path-ill-conditioned": "A mode passes near a singular position of its motors.",
         "modes-too-stiff": "The modes kept of a beam cannot carry a moment that comes in.",
         "motions-grow": "Some motions about the pose grow instead of vibrating.",

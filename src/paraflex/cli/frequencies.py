@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.checks import BALANCED
 from paraflex.dynamics import (
     State,
     System,
@@ -26,8 +27,6 @@ from paraflex.kinematics import follow_path
 
 # Poses between the start and the time asked for, where prescribed angles lead there.
 _POSES_BETWEEN = 200
-# What a mechanism let go may start with and still be called balanced [m/s^2].
-_BALANCED = 1e-5
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ def frequencies(
         "time": state.time,
         "balanced": request.balanced,
         "acceleration": free.acceleration,
-        "is_equilibrium": free.acceleration < _BALANCED,
+        "is_equilibrium": free.acceleration < BALANCED,
         "motors_held_hz": None if held is None else hertz(held.frequencies),
         "motors_free_hz": hertz(free.frequencies),
         "growing": max(_growing(free), 0 if held is None else _growing(held)),

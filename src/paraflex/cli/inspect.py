@@ -4,38 +4,35 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from typing import Any
 
+from paraflex.checks import check, examine
 from paraflex.cli.frequencies import InfoRequest, frequencies, hertz
 from paraflex.cli.inspect_tables import print_facts, print_library
-from paraflex.dynamics import (
-    Closure,
-    Mobility,
-    Reach,
-    System,
-    build_system,
-    closure_of,
-    missed_turns,
-    mobility,
-    reach,
-)
+from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, closure_of, mobility
 from paraflex.files import Model, library_names, load
+from paraflex.findings import Level
 from paraflex.mechanism import Mechanism, loops
 
 # Loops and sets of motors listed at most.
 _LISTED = 1000
 
 
-def info_command(request: InfoRequest) -> None:
-    """Describe a mechanism, or the library."""
-    facts = library() if request.source is None else describe(load(request.source), request)
+def info_command(request: InfoRequest) -> int:
+    """Describe a mechanism, or the library; the exit code."""
+    if request.source is None:
+        facts: Any = library()
+        verdict = None
+    else:
+        facts = describe(load(request.source), request)
+        verdict = facts["verdict"]["level"]
     if request.json:
         print(json.dumps(facts, indent=2))
-    elif isinstance(facts, list):
+    elif verdict is None:
         print_library(facts)
     else:
         print_facts(facts)
+    return 1 if verdict == Level.WRONG.value else 0
 
 
 def library() -> list[dict[str, Any]]:
@@ -69,32 +66,27 @@ def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]
     """
     request = request or InfoRequest()
     mechanism = model.mechanism
-    system, rigid = build_system(mechanism), build_system(mechanism.rigid())
-    starts = [closure_of(rigid, assembly) for assembly in mechanism.assemblies]
-    chosen = None
-    if mechanism.assemblies:
-        wanted = mechanism.assembly(request.assembly or model.study.assembly)
-        chosen = next(start for start in starts if start.assembly == wanted.name)
-    found = loops(mechanism)
+    seen = examine(mechanism, request.assembly or model.study.assembly)
+    verdict = check(model, path=request.path, assembly=request.assembly, seen=seen)
+    chosen, found = seen.chosen, loops(mechanism)
     facts = {
-        **_counts(model, system, rigid),
-        "links": _links(mechanism, system),
+        **_counts(model, seen.system, seen.rigid),
+        "links": _links(mechanism, seen.system),
         "loop_count": len(found),
         "loops": [list(loop) for loop in found[:_LISTED]],
-        "starts": [_start_facts(start) for start in starts],
+        "starts": [_start_facts(start) for start in seen.starts],
         "assembly": None if chosen is None else chosen.assembly,
         "assembly_closes": None if chosen is None else (chosen.closes or chosen.problem),
-        "gruebler_count": rigid.n - rigid.n_constraints,
+        "gruebler_count": seen.rigid.n - seen.rigid.n_constraints,
+        "verdict": verdict.to_dict(),
     }
-    if chosen is None or chosen.state is None:
-        facts |= {"degrees_of_freedom": facts["gruebler_count"], "redundant_constraints": []}
-        return facts | {"complaints": _complaints(system, starts, None, None)}
-    state = chosen.state
-    free = mobility(rigid, state)
-    drives = reach(rigid, state, free.freedoms)
-    facts |= _mobility_facts(free) | {"drives": _reach_facts(drives)}
-    facts["frequencies"] = frequencies(model, system, rigid, state, chosen.assembly, request)
-    return facts | {"complaints": _complaints(system, starts, free, drives)}
+    if seen.mobility is None or seen.reach is None:
+        return facts | {"degrees_of_freedom": facts["gruebler_count"], "redundant_constraints": []}
+    assert chosen is not None
+    assert chosen.state is not None
+    facts |= _mobility_facts(seen.mobility) | {"drives": _reach_facts(seen.reach)}
+    facts["frequencies"] = frequencies(model, seen.system, seen.rigid, chosen.state, chosen.assembly, request)
+    return facts
 
 
 def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
@@ -162,33 +154,6 @@ def _reach_facts(drives: Reach) -> dict[str, Any]:
         "minimal_sets": [list(motors) for motors in drives.sets],
         "more_sets": drives.more,
     }
-
-
-def _complaints(system: System, starts: Sequence[Closure], free: Mobility | None, drives: Reach | None) -> list[str]:
-    """What is not sound, a sentence each."""
-    said = [f'assembly "{start.assembly}": {start.problem}' for start in starts if not start.closes]
-    if not starts:
-        said.append("no assembly: it cannot be seen whether the loops close")
-    if free is not None and free.special:
-        said.append(
-            f"a special pose: {free.freedoms} degrees of freedom at this instant, "
-            + (f"{free.lasting} a little further along" if free.lasting else "but no way on from it was found")
-        )
-    if drives is not None:
-        short = [name for name, reached in drives.modes.items() if reached < drives.freedoms]
-        said += [
-            f'mode "{name}" reaches {drives.modes[name]} of {drives.freedoms} degrees of freedom' for name in short
-        ]
-    return [*said, *_stiffened(system)]
-
-
-def _stiffened(system: System) -> list[str]:
-    """Bodies whose modes kept cannot carry the moments that come in."""
-    return [
-        f"body.{one.point.body}: {one.modes} modes miss {100.0 * one.part:.0f} % of its turn under a moment at "
-        f"{one.point.point}, which {one.cause} brings in: it is too stiff there; leave modes out, or keep more"
-        for one in missed_turns(system)
-    ]
 
 
 def _number(value: float) -> float | None:

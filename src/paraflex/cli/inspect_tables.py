@@ -11,6 +11,7 @@ from rich.table import Table
 
 from paraflex.cli.tables import plain_console
 from paraflex.files import generator_names
+from paraflex.findings import Level
 
 _FREQUENCIES_SHOWN = 3
 _LISTED = 12
@@ -46,11 +47,21 @@ def print_facts(facts: dict[str, Any]) -> None:
     console.print(_links(facts))
     if "frequencies" in facts:
         _print_frequencies(console, facts["frequencies"])
-    for complaint in facts["complaints"]:
-        console.print(f"not sound: {complaint}", soft_wrap=True)
-    if not facts["complaints"]:
+    print_verdict(console, facts)
+
+
+def print_verdict(console: Console, facts: dict[str, Any]) -> None:
+    """Sound, doubtful or wrong, and each reason on a line."""
+    verdict = facts["verdict"]
+    for one in verdict["findings"]:
+        console.print(f"{one['level']}: {one['place']}: {one['text']}; {one['remedy']} [{one['code']}]", soft_wrap=True)
+    if verdict["level"] == Level.SOUND.value:
         drives = ", every mode drives all that is free" if facts["modes"] else ""
-        console.print(f"sound: every assembly closes, the pose is not a special one{drives}")
+        path = ", the study's path can be followed" if facts["paths"] else ""
+        console.print(f"sound: every assembly closes, the pose is not a special one{drives}{path}", soft_wrap=True)
+    else:
+        count = len(verdict["findings"])
+        console.print(f"verdict: {verdict['level']}, for {count} reason{'s' if count > 1 else ''}")
 
 
 def _table(title: str, headings: Sequence[str], right: Sequence[int] = ()) -> Table:
@@ -153,7 +164,10 @@ def _print_frequencies(console: Console, found: dict[str, Any]) -> None:
             lowest = ", ".join(f"{f:.4g}" for f in found[key][:6])
             console.print(f"  {label}: {lowest or 'none: nothing can move'}", soft_wrap=True)
     if found["growing"]:
-        console.print(f"  {found['growing']} motion(s) grow instead of vibrating: unstable there")
+        where = (
+            "unstable there" if found["is_equilibrium"] else "the pose is no equilibrium, so that this may be its fall"
+        )
+        console.print(f"  {found['growing']} motion(s) grow instead of vibrating: {where}")
     if not found["is_equilibrium"]:
         console.print(
             f"  not an equilibrium: let go it would start with {found['acceleration']:.3g} m/s^2, root mean square "

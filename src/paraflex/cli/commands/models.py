@@ -37,13 +37,13 @@ def info(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Describe a mechanism and say whether it is sound: loops, freedoms, motors, starts, frequencies.
+    """Describe a mechanism and its study, and judge them: sound, doubtful or wrong, each reason with its remedy.
 
-    Without a name: what the library has.
+    Exit code 1 where it is wrong. Without a name: what the library has.
     """
     from paraflex.cli.inspect import InfoRequest, info_command
 
-    info_command(InfoRequest(source, assembly, path, at, balanced, json))
+    raise typer.Exit(info_command(InfoRequest(source, assembly, path, at, balanced, json)))
 
 
 def new(

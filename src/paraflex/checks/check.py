@@ -1,0 +1,60 @@
+"""All checks in one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+
+from paraflex.checks.pose import Examination, examine, pose_findings
+from paraflex.checks.study import study_findings
+from paraflex.files import Model, load
+from paraflex.findings import Finding, Verdict
+from paraflex.mechanism import Mechanism
+from paraflex.validity.numbers import doubtful_numbers
+
+
+def check(
+    model: Model | Mechanism | str | FilePath,
+    *,
+    path: str | None = None,
+    assembly: str | None = None,
+    modes: Sequence[str] | None = None,
+    seen: Examination | None = None,
+) -> Verdict:
+    """Look a model over before it runs: are its numbers plausible, does it close as meant, can it do its study?
+
+    Parameters
+    ----------
+    model : Model, Mechanism, str or Path
+        A name or file is loaded. Of a mechanism alone there is no study to look at.
+    path : str, optional
+        One of the model's paths; the study's by default.
+    assembly : str, optional
+        The study's, or the first.
+    modes : sequence of str, optional
+        Actuation modes along the path; the study's, or all of the mechanism.
+    seen : Examination, optional
+        Of the mechanism, where it has been examined.
+
+    Returns
+    -------
+    Verdict
+        Sound, doubtful or wrong, and why: a `Finding` for each reason, with code, place, text and remedy.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, or an unknown path, assembly or mode.
+    """
+    if isinstance(model, str | FilePath):
+        model = load(model)
+    mechanism = model if isinstance(model, Mechanism) else model.mechanism
+    if isinstance(model, Model):
+        assembly = assembly or model.study.assembly
+    seen = seen or examine(mechanism, assembly)
+    at_rest = not isinstance(model, Model) or model.start is None
+    found: list[Finding] = [*doubtful_numbers(mechanism), *pose_findings(seen, at_rest=at_rest)]
+    if isinstance(model, Model):
+        short = {one.place for one in found if one.code == "mode-short"}
+        found += [one for one in study_findings(model, path, assembly, modes) if one.place not in short]
+    return Verdict(found)

@@ -1,0 +1,184 @@
+"""The pose a mechanism starts from: does it close as meant, is it special, what do motors reach, what vibrates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from paraflex.dynamics import (
+    Closure,
+    Mobility,
+    Reach,
+    System,
+    build_system,
+    closure_of,
+    missed_turns,
+    mobility,
+    natural_frequencies,
+    reach,
+    undeformed,
+)
+from paraflex.dynamics.linearise import LOWEST
+from paraflex.errors import NumericalError
+from paraflex.findings import Finding
+from paraflex.mechanism import Mechanism
+from paraflex.mechanism.poses import approximate_poses
+
+# A body that closing the loops turned further than this had another angle in mind, or another elbow [rad].
+FAR = 0.5
+# What a mechanism let go may start with and still be called balanced [m/s^2].
+BALANCED = 1e-5
+# A first natural frequency below this is that of no link [Hz].
+SLOW = 0.1
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What is found of a mechanism at the pose of one of its assemblies.
+
+    Attributes
+    ----------
+    system, rigid : System
+        Flexible, and with rigid bodies.
+    starts : tuple of Closure
+        Of every assembly.
+    chosen : Closure or None
+        Of the assembly asked for; None where there is no assembly.
+    mobility : Mobility or None
+    reach : Reach or None
+        None of an assembly that does not close.
+    """
+
+    system: System
+    rigid: System
+    starts: tuple[Closure, ...]
+    chosen: Closure | None
+    mobility: Mobility | None
+    reach: Reach | None
+
+
+def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
+    """Close every assembly, and see what is free and what motors reach at the one asked for, or the first.
+
+    Raises
+    ------
+    InputError
+        An unknown assembly.
+    """
+    system, rigid = build_system(mechanism), build_system(mechanism.rigid())
+    starts = tuple(closure_of(rigid, one) for one in mechanism.assemblies)
+    if not mechanism.assemblies:
+        return Examination(system, rigid, starts, None, None, None)
+    wanted = mechanism.assembly(assembly)
+    chosen = next(start for start in starts if start.assembly == wanted.name)
+    if chosen.state is None:
+        return Examination(system, rigid, starts, chosen, None, None)
+    free = mobility(rigid, chosen.state)
+    return Examination(system, rigid, starts, chosen, free, reach(rigid, chosen.state, free.freedoms))
+
+
+def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Finding]:
+    """What is wrong or doubtful about the pose, and whether what starts there at rest would stay."""
+    if not seen.starts:
+        yield Finding(
+            "assembly-missing", "assembly", "no assembly: it cannot be seen whether the loops close",
+            "add an [assembly.NAME] table with an approximate angle of each body, in rad",
+        )  # fmt: skip
+    for start in seen.starts:
+        if not start.closes:
+            yield Finding(
+                "assembly-open", f"assembly.{start.assembly}", start.problem,
+                "correct lengths, places of points, or the angles",
+            )  # fmt: skip
+        else:
+            yield from _elbow(seen.rigid, start)
+    if seen.mobility is not None and seen.reach is not None:
+        yield from _mobility(seen.mobility, seen.reach)
+    yield from _reduced(seen.system)
+    yield from _vibration(seen, at_rest)
+
+
+def _elbow(rigid: System, start: Closure) -> Iterator[Finding]:
+    assert start.state is not None
+    assembly = rigid.mechanism.assembly(start.assembly)
+    given = approximate_poses(rigid.mechanism, assembly)
+    found = {body.name: float(start.state.q[body.angle]) for body in rigid.bodies}
+    turned = {name: abs(math.remainder(found[name] - given[name].angle, 2.0 * math.pi)) for name in found}
+    far = sorted((name for name in turned if turned[name] > FAR), key=lambda name: -turned[name])
+    if far:
+        which = ", ".join(
+            f"{name} at {_both(found[name])} where {given[name].angle:.3g} rad "
+            f"{'was given' if name in assembly.angles else 'follows from the points given'}"
+            for name in far[:3]
+        )
+        yield Finding(
+            "assembly-elbow", f"assembly.{start.assembly}",
+            f"it closed far from what was given: {which}{' and others' if len(far) > 3 else ''}",
+            "if another elbow was meant, give angles nearer to it, in rad",
+        )  # fmt: skip
+
+
+def _both(angle: float) -> str:
+    """An angle within half a turn, in radians and degrees."""
+    turned = math.remainder(angle, 2.0 * math.pi)
+    return f"{turned:.3g} rad ({math.degrees(turned):.3g} degrees)"
+
+
+def _mobility(free: Mobility, drives: Reach) -> Iterator[Finding]:
+    if free.special:
+        yield Finding(
+            "special-pose", "assembly",
+            f"a special pose: {free.freedoms} degrees of freedom at this instant, "
+            + (f"{free.lasting} a little further along" if free.lasting else "but no way on from it was found"),
+            "which way the mechanism goes on from there is left to rounding: start elsewhere",
+        )  # fmt: skip
+    for name, reached in drives.modes.items():
+        if reached < drives.freedoms:
+            yield Finding(
+                "mode-short", f"mode.{name}", f"it reaches {reached} of {drives.freedoms} degrees of freedom",
+                "add motors to the mode",
+            )  # fmt: skip
+
+
+def _reduced(system: System) -> Iterator[Finding]:
+    """Bodies whose modes kept cannot carry the moments that come in."""
+    for one in missed_turns(system):
+        yield Finding(
+            "modes-too-stiff", f"body.{one.point.body}.modes",
+            f"{one.modes} modes miss {100.0 * one.part:.0f} % of its turn under a moment at {one.point.point}, which "
+            f"{one.cause} brings in: it is too stiff there",
+            "leave modes out, or keep more",
+        )  # fmt: skip
+
+
+def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
+    """What vibrates too slowly for a link, and what grows, with motors held where they reach everything."""
+    if seen.chosen is None or seen.chosen.state is None or seen.mobility is None or seen.reach is None:
+        return
+    for body in seen.system.bodies:
+        slowest = float(np.min(body.modes.omega, initial=math.inf)) / (2.0 * math.pi)
+        if slowest < SLOW:
+            yield Finding(
+                "frequency-low", f"body.{body.name}", f"it vibrates on its own at {slowest:.2g} Hz, as no link does",
+                f"look at Young's modulus, section and length of {body.name}: Pa and m",
+            )  # fmt: skip
+    mechanism = seen.system.mechanism
+    motors = list(dict.fromkeys(motor.joint for motor in mechanism.motors))
+    state = undeformed(seen.system, seen.rigid, seen.chosen.state)
+    try:
+        vibration = natural_frequencies(seen.system, state, motors, count=LOWEST)
+    except NumericalError:
+        return
+    growing = int(np.sum(vibration.squares < 0.0))
+    # What is let go where it does not balance moves off anyway.
+    holds = seen.reach.all_motors == seen.mobility.freedoms
+    if growing and (holds or (at_rest and vibration.acceleration < BALANCED)):
+        held = " with the motors held" if motors else ""
+        yield Finding(
+            "motions-grow", "assembly",
+            f"{growing} {'motion grows' if growing == 1 else 'motions grow'} about the pose{held} instead of vibrating",
+            "is it to be unstable there? look at gravity's sign, springs and loads, or start from --balanced",
+        )  # fmt: skip

@@ -1,0 +1,149 @@
+"""The study a model will run: can it, along its path and in its modes, and is anything cut short?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from paraflex.actuation import actuation_condition
+from paraflex.errors import ActuationError, AssemblyError, InputError, NumericalError, UnreachablePathError
+from paraflex.files import Model
+from paraflex.findings import Finding
+from paraflex.kinematics import Path
+from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
+from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
+from paraflex.results.dataset import part_of
+from paraflex.simulate import TrackingTask, plan_tracking
+
+# Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
+ILL_CONDITIONED = 1e3
+# Samples at which a plan is looked at.
+_SAMPLES = 201
+_SAME_TIME = 1e-9
+
+
+def study_findings(
+    model: Model, path: str | None = None, assembly: str | None = None, modes: Sequence[str] | None = None
+) -> Iterator[Finding]:
+    """What is wrong or doubtful about the study of a model; see `check` for the arguments."""
+    yield from _laws_cut_short(model.mechanism, model.study.duration)
+    if not model.paths and path is None:
+        yield from _constant_torques(model)
+        return
+    if model.mechanism.end_effector is None:
+        yield Finding(
+            "end-effector-missing", "end_effector", "there is a path and no end-effector to follow it",
+            "add an [end_effector] table with its point",
+        )  # fmt: skip
+        return
+    chosen = model.path(path)
+    name = next(key for key, value in model.paths.items() if value is chosen)
+    duration = model.duration(name, chosen)
+    part = part_of(chosen, duration)
+    if part is not None:
+        yield Finding("path-cut-short", "study.duration", str(part), f"the path takes {chosen.duration:.4g} s")
+    try:
+        task = _planned(model, chosen, duration, assembly)
+    except UnreachablePathError as error:
+        yield Finding(
+            "path-unreachable", f"path.{name}", str(error), "move the path or the bases, or choose another assembly"
+        )
+    except AssemblyError:
+        # The pose has been found not to close.
+        return
+    except NumericalError as error:
+        yield Finding("path-unreachable", f"path.{name}", str(error), "move the path")
+    except InputError as error:
+        code = "task-freedoms" if error.field == "end_effector.coordinates" else "study-refused"
+        yield Finding(code, error.field, error.problem, error.remedy)
+    else:
+        yield from _driven(model, task, modes)
+
+
+def task_findings(task: TrackingTask, modes: Sequence[ActuationMode]) -> Iterator[Finding]:
+    """How modes drive the mechanism along a planned path: singular positions, and friction beyond the motors."""
+    for mode in modes:
+        try:
+            torques = task.torques(mode).evaluate(task.motion.t)
+        except (ActuationError, NumericalError) as error:
+            yield Finding("path-singular", f"mode.{mode.name}", str(error), "move the path, or add motors to the mode")
+            continue
+        worst = float(np.max(actuation_condition(task.effort, mode)))
+        if worst > ILL_CONDITIONED:
+            yield Finding(
+                "path-ill-conditioned", f"mode.{mode.name}",
+                f"its actuation matrix has a condition number of {worst:.3g} on the path: near a singular position",
+                "move the path, or add motors to the mode",
+            )  # fmt: skip
+        yield from _friction(task.mechanism, mode, np.max(np.abs(torques), axis=0))
+
+
+def _planned(model: Model, path: Path, duration: float, assembly: str | None) -> TrackingTask:
+    study = model.study
+    return plan_tracking(
+        model.mechanism.rigid(),
+        path,
+        duration=duration,
+        samples=_SAMPLES,
+        assembly=assembly or study.assembly,
+        orientation=study.orientation,
+        after=study.after,
+    )
+
+
+def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> Iterator[Finding]:
+    mechanism = model.mechanism
+    wanted = names or model.study.modes or [mode.name for mode in mechanism.modes]
+    if not wanted:
+        what = "no actuation mode" if mechanism.motors else "no motor"
+        yield Finding(
+            "mode-missing", "mode", f"there is a path and {what} to drive the mechanism along it",
+            "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
+        )  # fmt: skip
+    yield from task_findings(task, list(dict.fromkeys(parse_mode(mechanism, name) for name in wanted)))
+
+
+def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:
+    """Friction that takes more of a motor's torque than all else does."""
+    units = mechanism.motor_units()
+    for k, motor in enumerate(mechanism.motors):
+        limit = sum(one.limit for one in mechanism.frictions if one.joint == motor.joint)
+        if motor.name in mode.motors and 2.0 * limit > peaks[k]:
+            name = next(one.name for one in mechanism.frictions if one.joint == motor.joint)
+            yield Finding(
+                "friction-large", f"friction.{name}.limit",
+                f"{limit:.3g} {units[k]}, where motor {motor.name} gives {peaks[k]:.3g} {units[k]} at most in mode "
+                f"{mode.name}: most of it overcomes friction",
+                f"it is in {units[k]}",
+            )  # fmt: skip
+
+
+def _constant_torques(model: Model) -> Iterator[Finding]:
+    """Friction that a constant torque does not overcome."""
+    mechanism = model.mechanism
+    for motor, unit in zip(mechanism.motors, mechanism.motor_units(), strict=True):
+        torque = abs(model.study.torques.get(motor.name, 0.0))
+        for one in mechanism.frictions:
+            if one.joint == motor.joint and 0.0 < torque <= one.limit:
+                yield Finding(
+                    "friction-large", f"friction.{one.name}.limit",
+                    f"{one.limit:.3g} {unit}, where motor {motor.name} gives {torque:.3g} {unit}: it does not move",
+                    f"it is in {unit}",
+                )  # fmt: skip
+
+
+def _laws_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator[Finding]:
+    for one in mechanism.prescribed:
+        if isinstance(one.law, PiecewiseLaw):
+            end = one.law.ends[-1] if one.law.ends else 0.0
+        elif isinstance(one.law, TabulatedLaw):
+            end = one.law.times[-1]
+        else:
+            continue
+        if duration is not None and end > duration * (1.0 + _SAME_TIME):
+            yield Finding(
+                "law-cut-short", f"prescribed.{one.name}",
+                f"the run ends at {duration:.4g} s, the law goes on to {end:.4g} s",
+                "let the study last as long, in s",
+            )  # fmt: skip
