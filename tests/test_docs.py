@@ -17,7 +17,14 @@ import documented  # noqa: E402
 
 @pytest.mark.parametrize(
     ("page", "least"),
-    [("tutorial.md", 8), ("first-mechanism.md", 7), ("modes.md", 3), ("index.md", 2), ("validity.md", 1)],
+    [
+        ("tutorial.md", 8),
+        ("first-mechanism.md", 7),
+        ("modes.md", 3),
+        ("index.md", 2),
+        ("validity.md", 1),
+        ("findings.md", 2),
+    ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):
     assert run_page(DOCS / page, tmp_path, monkeypatch) >= least

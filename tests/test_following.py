@@ -200,8 +200,10 @@ def test_a_run_shorter_than_its_path_says_so(tmp_path):
     assert part_run(tracking_dataset([plan_tracking(PAPER, SQUARE, samples=11).simulate("++++")])) is None
     done = paraflex("run", "-m", "raparm_i", "--mode", "++++", "--duration", "0.3", "--tol", "1e-3", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(f"warning: {words}")
-    assert words in json.loads((tmp_path / "results" / "summary.json").read_text())["part"]["message"]
+    assert done.stdout.startswith(f"warning: study.duration: {words}")
+    figures = json.loads((tmp_path / "results" / "summary.json").read_text())
+    assert words in figures["part"]["message"]
+    assert figures["verdict"]["findings"][0]["code"] == "path-cut-short"
     assert words.removeprefix("o") in (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
 
 

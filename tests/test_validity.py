@@ -16,10 +16,12 @@ from paraflex.cli.app import app
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.errors import IntegrationError, ValidityWarning
 from paraflex.fem import ReferenceCondition
+from paraflex.findings import Finding
 from paraflex.mechanism import Assembly, Geometry, Mechanism, PointForce, PointRef, WeldJoint
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, motion_summary, summary, tracking_dataset
-from paraflex.results.validity import validity_lines, validity_summary
+from paraflex.results.doubts import doubt_lines
+from paraflex.results.validity import validity_line, validity_summary
 from paraflex.validity import FOURTH_ORDER_LIMIT, Following, Validity, assess, fourth_order
 from test_given_shapes import as_modal
 
@@ -262,15 +264,21 @@ def test_a_run_without_a_path_says_it_too():
     assert figures["validity"]["verdict"] == run.validity.verdict
 
 
-def test_lines_name_the_worst_and_the_others():
-    good, bad, worse = ({"ratio": r, "holds": r <= 1.0, "verdict": f"v{r}"} for r in (0.5, 2.0, 3.0))
-    assert validity_lines({"a": bad, "b": worse, "c": None, "d": good}) == [
-        "warning: mode b: v3.0",
-        "warning: beyond the limit as well, mode a (2 times)",
+def test_one_line_says_that_all_models_hold():
+    good, better, bad = ({"ratio": r, "holds": r <= 1.0, "verdict": f"v{r}"} for r in (0.5, 0.2, 2.0))
+    assert validity_line({"": good}) == "validity: v0.5"
+    assert validity_line({"a": better, "b": good}) == "validity: mode b: v0.5; further from its limit in the others"
+    assert validity_line({"a": good, "b": bad}) == validity_line({"a": None}) == ""
+
+
+def test_further_modes_with_the_same_doubt_share_a_line():
+    one, other, third = (Finding("validity", place, "too far", "go back") for place in ("mode a", "mode b", "mode c"))
+    gravity = Finding("gravity", "gravity", "odd", "look")
+    assert doubt_lines([one, gravity, other, third]) == [
+        "warning: mode a: too far; go back [validity]",
+        "warning: gravity: odd; look [gravity]",
+        "warning: so is mode b, c [validity]",
     ]
-    assert validity_lines({"": good}) == ["validity: v0.5"]
-    assert validity_lines({"a": good, "b": good})[0].endswith("; further from its limit in the others")
-    assert validity_lines({"a": None}) == []
 
 
 def test_the_command_line_and_the_report_say_it_once(tmp_path):

@@ -13,6 +13,8 @@ SOURCE = Path(__file__).parents[2] / "src" / "paraflex"
 # In the order of the theory; a name is told once, in the first of these that has it.
 PACKAGES = (
     "files",
+    "checks",
+    "findings",
     "mechanism",
     "kinematics",
     "actuation",

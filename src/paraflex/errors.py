@@ -190,7 +190,15 @@ class ConstraintDriftError(IntegrationError):
 
 
 class ParaflexWarning(UserWarning):
-    """Root of every warning that paraflex issues: `warnings.simplefilter("error", ParaflexWarning)` stops at each."""
+    """Root of every warning that paraflex issues: `warnings.simplefilter("error", ParaflexWarning)` stops at each.
+
+    Attributes
+    ----------
+    finding : Finding or None
+        What it is about, with code, place and remedy: see `paraflex.findings`.
+    """
+
+    finding: Any = None
 
 
 class ModelWarning(ParaflexWarning):

@@ -6,12 +6,14 @@ The codes are listed in `CODES`; the page "Findings" of the documentation is mad
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
 from paraflex.errors import ModelWarning, ParaflexWarning
+
+__all__ = ["CODES", "Code", "Finding", "Level", "Verdict", "warn_of"]
 
 
 class Level(Enum):
@@ -76,14 +78,17 @@ def _codes() -> dict[str, Code]:
         "friction-large": "Friction at a joint exceeds what the motor there gives along the path.",
         "path-cut-short": "The run ends before the path does.",
         "law-cut-short": "The run ends before the pieces or the table of a prescribed motion do.",
+        "path-fast": "A path asks for a speed or an acceleration that no such machine reaches.",
         "path-ill-conditioned": "A mode passes near a singular position of its motors.",
         "modes-too-stiff": "The modes kept of a beam cannot carry a moment that comes in.",
         "motions-grow": "Some motions about the pose grow instead of vibrating.",
         "slider-off-beam": "A sliding joint leaves its beam.",
-        "frequency-low": "The lowest natural frequency is far below what such links have.",
+        "frequency-low": "A link vibrates on its own far slower than links do.",
         "torque-large": "Torques or forces are far beyond what mass, size and speed make plausible.",
-        "deflection-large": "Links bend further than such a model describes.",
+        "deflection-large": "A link bends so far that it is more a spring than a link.",
+        "speed-large": "A body moves as fast as a bullet.",
         "error-large": "The tracking error is of the size of the path.",
+        "stability": "An explicit method takes very many steps, by stability alone.",
         "validity": "A run went beyond what the geometry of its model can describe.",
     }
     return {name: Code(Level.WRONG, text) for name, text in wrong.items()} | {
@@ -130,10 +135,13 @@ class Finding:
 
     def to_dict(self) -> dict[str, str]:
         """For JSON: code, level, place, text, remedy."""
-        return {"code": self.code, "level": self.level.value, **{k: getattr(self, k) for k in _TEXTS}}
+        texts = {"place": self.place, "text": self.text, "remedy": self.remedy}
+        return {"code": self.code, "level": self.level.value, **texts}
 
-
-_TEXTS = ("place", "text", "remedy")
+    @classmethod
+    def from_dict(cls, kept: Mapping[str, str]) -> Finding:
+        """What `to_dict` gave."""
+        return cls(kept["code"], kept["place"], kept["text"], kept["remedy"])
 
 
 @dataclass(frozen=True)
@@ -148,8 +156,8 @@ class Verdict(Sequence[Finding]):
     findings: tuple[Finding, ...]
 
     def __init__(self, findings: Iterable[Finding] = ()) -> None:
-        order = [Level.WRONG, Level.DOUBTFUL, Level.SOUND]
-        object.__setattr__(self, "findings", tuple(sorted(findings, key=lambda one: order.index(one.level))))
+        once = {(one.code, one.place, one.text): one for one in findings}.values()
+        object.__setattr__(self, "findings", tuple(sorted(once, key=lambda one: one.level is not Level.WRONG)))
 
     @property
     def level(self) -> Level:
@@ -179,6 +187,8 @@ class Verdict(Sequence[Finding]):
 
 
 def warn_of(findings: Iterable[Finding], category: type[ParaflexWarning] = ModelWarning, stacklevel: int = 2) -> None:
-    """Issue a warning of a class of ours for each finding."""
+    """Issue a warning of a class of ours for each finding, which is its `finding`."""
     for one in findings:
-        warnings.warn(category(str(one)), stacklevel=stacklevel + 1)
+        warning = category(str(one))
+        warning.finding = one
+        warnings.warn(warning, stacklevel=stacklevel + 1)

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from paraflex.display import shown
 from paraflex.dynamics import State, System, build_system, consistent_state, constant_signals, pack_signals
-from paraflex.errors import InputError, IntegrationError, suggestion
+from paraflex.errors import InputError, IntegrationError, ResultWarning, suggestion
+from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.mechanism import Mechanism
-from paraflex.validity import Validity, assess, warn
+from paraflex.validity import Validity, assess, doubtful_results, warn
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,11 @@ class MotionRun:
     def validity(self) -> Validity | None:
         """How far the run is within what its model can describe; None of rigid bodies."""
         return assess(self.system, self.solution)
+
+    @cached_property
+    def doubts(self) -> tuple[Finding, ...]:
+        """What of its results is not plausible."""
+        return tuple(doubtful_results(self.system, self.solution))
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -80,7 +86,8 @@ def simulate_motion(
     on_progress : callable, optional
         Told the time reached [s].
     warning : bool
-        Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
+        Whether a run beyond what its model can describe issues a `ValidityWarning`, and one of implausible results a
+        `ResultWarning`; its `validity` and `doubts` hold them either way.
 
     Raises
     ------
@@ -118,4 +125,5 @@ def simulate_motion(
     run = MotionRun(system, solution.t if solution.event else times, values, solution)
     if warning:
         warn(run.validity)
+        warn_of(run.doubts, ResultWarning)
     return run

@@ -22,11 +22,12 @@ from paraflex.dynamics import (
     static_equilibrium,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
-from paraflex.errors import InputError, IntegrationError, as_enum
+from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
+from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.kinematics import Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
-from paraflex.validity import Following, Validity, assess, warn
+from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn
 
 # Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
 _SAME_TIME = 1e-9
@@ -210,17 +211,41 @@ class TrackingRun:
         """How far the run is within what its model can describe; None of rigid bodies and finite segments."""
         return assess(self.task.system, self.solution, self._following())
 
-    def _following(self) -> Following | None:
-        """Deviation from the path and condition number, where torques drive the mechanism along it."""
+    @cached_property
+    def doubts(self) -> tuple[Finding, ...]:
+        """What of its results is not plausible, for mass, size and speed of the mechanism."""
+        whole = self.task.whole or self.task
+        return tuple(doubtful_results(self.task.system, self.solution, self._driven(), whole.mechanism))
+
+    def _driven(self) -> Driven | None:
+        """Path, efforts and condition number, where torques drive the mechanism along the path."""
         task, solution = self.task, self.solution
         # The state at an event is a sample more than the task's times.
         k = solution.t.size - bool(solution.event)
         effector = task.mechanism.end_effector
         if effector is None or (self.holding is not None and not task.holds) or not k:
             return None
-        place = marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0]
-        squares = np.sum((place - task.motion.desired.position[:k]) ** 2, axis=1)
-        return Following(float(np.sqrt(np.mean(squares))), float(np.max(self.condition[:k])))
+        mechanism, desired = task.mechanism, task.motion.desired
+        names = [motor.name for motor in mechanism.motors]
+        return Driven(
+            mode=self.mode.name,
+            desired=desired.position[:k],
+            actual=marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0],
+            acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
+            efforts=dict(zip(names, np.max(np.abs(self.applied), axis=0).tolist(), strict=True)),
+            units=dict(zip(names, mechanism.motor_units(), strict=True)),
+            condition=float(np.max(self.condition[:k])),
+        )
+
+    def _following(self) -> Following | None:
+        """Deviation from the path and condition number, where torques drive the mechanism along it."""
+        driven = self._driven()
+        return None if driven is None else Following(driven.deviation, driven.condition)
+
+    def warn(self) -> None:
+        """Issue a `ValidityWarning` or a `ResultWarning` for each reason to doubt the run."""
+        warn(self.validity, f"mode {self.mode.name}")
+        warn_of(self.doubts, ResultWarning)
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -307,7 +332,8 @@ def simulate(
     on_progress : callable, optional
         Told the time reached [s].
     warning : bool
-        Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
+        Whether a run beyond what its model can describe issues a `ValidityWarning`, and one of implausible results a
+        `ResultWarning`; its `validity` and `doubts` hold them either way.
 
     Returns
     -------
@@ -337,7 +363,7 @@ def simulate(
             error.partial = TrackingRun(task, torques, condition, error.partial, title)
         raise
     if warning:
-        warn(run.validity, f"mode {torques.mode.name}: ")
+        run.warn()
     return run
 
 

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path as FilePath
 
 from paraflex.checks.pose import Examination, examine, pose_findings
-from paraflex.checks.study import study_findings
+from paraflex.checks.study import study_findings, task_findings
 from paraflex.files import Model, load
 from paraflex.findings import Finding, Verdict
-from paraflex.mechanism import Mechanism
+from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.simulate import TrackingTask
 from paraflex.validity.numbers import doubtful_numbers
 
 
@@ -58,3 +59,13 @@ def check(
         short = {one.place for one in found if one.code == "mode-short"}
         found += [one for one in study_findings(model, path, assembly, modes) if one.place not in short]
     return Verdict(found)
+
+
+def check_planned(model: Model, task: TrackingTask, modes: Sequence[ActuationMode], assembly: str | None) -> Verdict:
+    """The same of a study that is planned and about to run.
+
+    Modes that cannot be driven are left to the run.
+    """
+    seen = examine(model.mechanism, assembly or model.study.assembly)
+    found = [*doubtful_numbers(model.mechanism), *pose_findings(seen), *task_findings(task, modes)]
+    return Verdict(one for one in found if one.code not in ("path-singular", "mode-short"))

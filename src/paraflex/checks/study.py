@@ -13,7 +13,6 @@ from paraflex.findings import Finding
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
-from paraflex.results.dataset import part_of
 from paraflex.simulate import TrackingTask, plan_tracking
 
 # Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
@@ -40,9 +39,13 @@ def study_findings(
     chosen = model.path(path)
     name = next(key for key, value in model.paths.items() if value is chosen)
     duration = model.duration(name, chosen)
-    part = part_of(chosen, duration)
-    if part is not None:
-        yield Finding("path-cut-short", "study.duration", str(part), f"the path takes {chosen.duration:.4g} s")
+    if duration < chosen.duration:
+        # With xarray, which descriptions of mechanisms do without.
+        from paraflex.results.dataset import part_of
+
+        part = part_of(chosen, duration)
+        if part is not None:
+            yield part.finding
     try:
         task = _planned(model, chosen, duration, assembly)
     except UnreachablePathError as error:

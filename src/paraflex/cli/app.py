@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from paraflex.cli.collected import collecting
 from paraflex.cli.commands import models, results, runs, studies
 from paraflex.errors import InputError, ParaflexError
 
@@ -56,11 +57,12 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    pass
+    context.with_resource(collecting())
 
 
 def main() -> None:

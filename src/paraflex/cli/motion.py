@@ -11,6 +11,8 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from paraflex.checks import check
+from paraflex.cli.collected import collected
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
@@ -21,7 +23,7 @@ from paraflex.cli.request import (
     results_folder,
     write_json,
 )
-from paraflex.cli.tables import FINISHED, plain_console
+from paraflex.cli.tables import FINISHED, plain_console, validity, warn_of_doubts
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, consistent_state, start_state, static_equilibrium
 from paraflex.errors import AssemblyError, InputError, IntegrationError
@@ -30,7 +32,6 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary, save_results
-from paraflex.results.validity import validity_lines
 
 # Singular positions told one by one.
 _NAMED = 4
@@ -70,9 +71,11 @@ def run_motion(
         "model": dict(model.parameters),
         "run": {"mechanism": model.source, "duration": duration, "samples": samples} | how,
     }
-    data = motion_dataset(run, options=options, parameters=parameters)
+    seen = check(model, assembly=request.assembly)
+    data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     figures = motion_summary(data)
     _write(data, figures, folder, report=request.report)
+    warn_of_doubts(console if request.json else plain_console(), figures)
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
@@ -170,8 +173,7 @@ def _report(figures: dict, data: xr.Dataset) -> None:
         f"largest violation of constraints {figures['constraint_position_max']:.1e} m, "
         f"imbalance of energy {figures['energy_balance_max']:.1e} J"
     )
-    for line in validity_lines({"": figures["validity"]}):
-        out.print(line, soft_wrap=True)
+    validity(out, {"": figures["validity"]})
 
 
 def _write(data: xr.Dataset, figures: dict, folder: Path, *, report: bool) -> None:

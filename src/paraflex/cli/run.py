@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from paraflex.checks import check_planned
+from paraflex.cli.collected import collected
 from paraflex.cli.integration import IntegrationRequest, check_stops, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
 from paraflex.cli.request import (
@@ -26,14 +29,16 @@ from paraflex.cli.request import (
     with_frames,
     write_json,
 )
-from paraflex.cli.tables import failures, plain_console, print_study, validity
+from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of_doubts
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import Model, load
+from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, finite_segments, proportional_segments
 from paraflex.results import save_results, summary
+from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
 from paraflex.studies import Simulator, StudyResult, run_study
 
@@ -77,20 +82,25 @@ def run_command(request: RunRequest) -> int:
         task = task.in_segments(proportional_segments(mechanism, request.segments))
         check_stops(task.mechanism, options, request.integration)
     parameters = _parameters(model, path_name, modes, task, how, request)
+    doubts = check_planned(model, task, modes, request.assembly)
+    method = _method(request, options)
     try:
-        result = _simulate(console, task, modes, options, parameters, _method(request, options), model.study.error)
+        result = _simulate(console, task, modes, options, parameters, method, model.study.error, doubts)
     except InputError as error:
         raise at_fault(error, model) from None
     if result.data is None:
         failures(console, result)
         return INTERRUPTED if result.interrupted else TROUBLE
+    keep_findings(result.data, collected(verdict_of(result.data)))
     _write(result, folder, report=request.report)
     figures = summary(result.data, result.failed)
     if request.json:
+        warn_of_doubts(console, figures)
         print(json.dumps(figures, indent=2))
     else:
+        warn_of_doubts(plain_console(), figures)
         print_study(plain_console(), figures, task, _model_name(request, mechanism))
-        validity(plain_console(), figures)
+        validity(plain_console(), {name: mode.get("validity") for name, mode in figures["modes"].items()})
         console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
     failures(console, result)
     if result.interrupted:
@@ -211,6 +221,7 @@ def _simulate(
     parameters: dict,
     method: Simulator | None,
     error: str,
+    doubts: Iterable[Finding],
 ) -> StudyResult:
     end = float(task.motion.t[-1])
     columns = (
@@ -234,6 +245,7 @@ def _simulate(
             method=method,
             error=error,
             warning=False,
+            findings=doubts,
         )
 
 

@@ -9,6 +9,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from paraflex.cli.collected import printed
+from paraflex.findings import Finding
+
 if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
     from paraflex.results.metrics import Part
@@ -38,7 +41,6 @@ def warn_of_parts(console: Console, parts: Mapping[str, Part]) -> None:
 
 def print_study(console: Console, figures: dict[str, Any], task: TrackingTask, model: str) -> None:
     """What every mode came to in a model: tables, and a line for each mode that an event stopped."""
-    warn_of_part(console, figures["part"])
     console.print(_study_table(figures, task, model))
     if any(mode.get("tracking_rms_after") is not None for mode in figures["modes"].values()):
         console.print(_after_table(figures, task))
@@ -97,11 +99,21 @@ def _table(title: str) -> Table:
     return table
 
 
-def validity(console: Console, figures: dict[str, Any]) -> None:
-    """Whether the model holds: of the worst mode, and which others are beyond."""
-    from paraflex.results.validity import validity_lines  # with xarray, which descriptions of mechanisms do without
+def warn_of_doubts(console: Console, figures: Mapping[str, Any]) -> None:
+    """What makes results doubtful, before a number of theirs is printed."""
+    from paraflex.results.doubts import doubt_lines  # with xarray, which descriptions of mechanisms do without
 
-    for line in validity_lines({name: mode.get("validity") for name, mode in figures["modes"].items()}):
+    findings = [Finding.from_dict(kept) for kept in figures["verdict"]["findings"]]
+    for line in doubt_lines(findings):
+        console.print(line, soft_wrap=True)
+    printed(findings)
+
+
+def validity(console: Console, verdicts: Mapping[str, Any]) -> None:
+    """That the models of all runs hold, if they do."""
+    from paraflex.results.validity import validity_line
+
+    if line := validity_line(verdicts):
         console.print(line, soft_wrap=True)
 
 

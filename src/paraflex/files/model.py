@@ -37,6 +37,7 @@ from paraflex.files.schema import (
     TorqueTable,
 )
 from paraflex.files.start import read_start
+from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
@@ -72,6 +73,7 @@ from paraflex.mechanism import (
     WeldJoint,
     parse_mode,
 )
+from paraflex.validity import doubtful_numbers
 
 
 @dataclass(frozen=True)
@@ -194,7 +196,7 @@ class Model:
 
 
 def load(name_or_file: str | FilePath) -> Model:
-    """Read a model from the library or from a TOML file.
+    """Read a model from the library or from a TOML file; numbers that are not plausible issue a `ModelWarning` each.
 
     Parameters
     ----------
@@ -210,7 +212,9 @@ def load(name_or_file: str | FilePath) -> Model:
     InputError
         Unknown name, unreadable file, or anything in it that does not fit: it names file, field, value and remedy.
     """
-    return model_from(*load_data(name_or_file))
+    model = model_from(*load_data(name_or_file))
+    warn_of(doubtful_numbers(model.mechanism))
+    return model
 
 
 def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:

@@ -13,7 +13,8 @@ from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import count, number, pairs, symbol
 from paraflex.report.tracking import energies, largest
-from paraflex.results.validity import validity_lines, validity_summary
+from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.validity import validity_line, validity_summary
 
 _ALONE = ("",)
 # Charts choose among so many points and joints; results.nc has them all.
@@ -40,8 +41,9 @@ def motion_page(data: xr.Dataset) -> Page:
         film=moving,
         no_film="" if moving else NO_SHAPES,
         notes=[
+            *doubt_lines(verdict_of(data)),
             *([] if status == "complete" else [f"{status}: {data['message'].item()}"]),
-            *validity_lines({"": validity_summary(data)}),
+            *filter(None, [validity_line({"": validity_summary(data)})]),
         ],
     )
 

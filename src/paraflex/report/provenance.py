@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 
 from paraflex.files import library_names
+from paraflex.results.doubts import FINDINGS, verdict_of
 
 # What a run takes where nothing is said.
 _FLAGS = ("rigid", "ked", "balanced")
@@ -38,7 +39,8 @@ def asked(data: xr.Dataset) -> dict[str, Any]:
 def common_facts(data: xr.Dataset) -> list[tuple[str, str]]:
     """Duration, method, tolerance and versions."""
     time, attrs = data["time"].values, data.attrs
-    facts = [("duration", f"{time[-1]:g} s, {time.size} samples")]
+    facts = [("verdict", verdict_of(data).level.value)] if FINDINGS in attrs else []
+    facts.append(("duration", f"{time[-1]:g} s, {time.size} samples"))
     method = attrs.get("method")
     if method:
         facts.append(("integration", str(method)))

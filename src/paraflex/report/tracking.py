@@ -14,8 +14,9 @@ from paraflex.report.film import NO_SHAPES, film
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
-from paraflex.results.metrics import during_motion, headline, part_run, ranked_by_motion
-from paraflex.results.validity import validity_lines, validity_summary
+from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.metrics import during_motion, headline, ranked_by_motion
+from paraflex.results.validity import validity_line, validity_summary
 
 
 def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> Page:
@@ -49,7 +50,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         selected=runs.index(default_mode(data)),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=[*_unfinished(data, failed or {}), *_validity(data)],
+        notes=[*doubt_lines(verdict_of(data)), *_unfinished(data, failed or {}), *_validity(data)],
     )
 
 
@@ -258,10 +259,8 @@ def _name(data: xr.Dataset, run: int) -> str:
 
 
 def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
-    """Which part of the path was run, if not all; why modes did not get to their ends."""
-    part = part_run(data)
-    out = [] if part is None else [f"{str(part)[0].upper()}{str(part)[1:]}."]
-    out += [f"Mode {name} could not be run: {reason}" for name, reason in failed.items()]
+    """Why modes did not get to their ends."""
+    out = [f"Mode {name} could not be run: {reason}" for name, reason in failed.items()]
     for r, name in enumerate(data["mode"].values):
         status = str(data["status"].values[r])
         if status != "complete":
@@ -270,8 +269,9 @@ def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
 
 
 def _validity(data: xr.Dataset) -> list[str]:
-    """Whether the model holds."""
-    return validity_lines({str(name): validity_summary(data.sel(mode=name)) for name in data["mode"].values})
+    """That the model holds, if it does."""
+    line = validity_line({str(name): validity_summary(data.sel(mode=name)) for name in data["mode"].values})
+    return [line] if line else []
 
 
 def _model(run: Mapping[str, object]) -> str:

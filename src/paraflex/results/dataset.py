@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.metadata import version
 
 import numpy as np
@@ -11,9 +11,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, as_enum
+from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.mechanism import Mechanism
+from paraflex.results.doubts import MODE, keep_findings
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
 from paraflex.results.metrics import SAME_TIME, ErrorSpan, Part, peak_torque, rms_torque, tracking_variables
 from paraflex.results.outlines import chord_deflections
@@ -22,6 +24,7 @@ from paraflex.results.storage import SCHEMA
 from paraflex.results.validity import UNITS as VALIDITY_UNITS
 from paraflex.results.validity import validity_variables
 from paraflex.simulate import TrackingRun
+from paraflex.validity import doubtful_numbers
 
 UNITS = {
     "time": ("time", "s"),
@@ -107,6 +110,7 @@ def tracking_dataset(
     options: IntegrationOptions | None = None,
     parameters: dict | None = None,
     error: ErrorSpan | str = ErrorSpan.MOTION,
+    findings: Iterable[Finding] = (),
 ) -> xr.Dataset:
     """One dataset of the runs of several modes of a task.
 
@@ -122,6 +126,8 @@ def tracking_dataset(
     error : ErrorSpan or str
         Which tracking error stands for a run in tables and figures: that "motion" alone, or that of the "whole" run,
         dwell included (Eq. 64). Both are in the dataset.
+    findings : iterable of Finding
+        Reasons to doubt the model, found before it ran; kept with those of its numbers and of the runs.
 
     Returns
     -------
@@ -186,7 +192,22 @@ def tracking_dataset(
             out[name].attrs["long_name"] = out[name].attrs["long_name"].replace("torque", "force")
     out.attrs = _provenance(records[0], options or IntegrationOptions(), parameters or {})
     out.attrs["error"] = as_enum(ErrorSpan, error, "error").value
+    keep_findings(out, [*findings, *_findings(records)])
     return out
+
+
+def _findings(records: Sequence[Record]) -> Iterator[Finding]:
+    """What is doubtful about the numbers of the mechanism, and about each run."""
+    task = records[0].task
+    yield from doubtful_numbers(task.mechanism)
+    part = part_of(task.path, float(task.motion.t[-1]))
+    if part is not None:
+        yield part.finding
+    beyond = [(one.validity, one.mode) for one in records if one.validity is not None and not one.validity.holds]
+    for validity, mode in sorted(beyond, key=lambda pair: -pair[0].ratio):
+        yield validity.finding(f"{MODE}{mode}")
+    for one in records:
+        yield from one.doubts
 
 
 def _frame(one: Record) -> dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]:

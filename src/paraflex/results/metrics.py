@@ -13,6 +13,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.findings import Finding
+
 # A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
 SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
@@ -196,6 +198,11 @@ class Part:
             f"only a part of the path was run: {self.duration:.3g} of {self.path:.3g} s, {100.0 * self.length:.3g} % "
             "of its length; errors are of that part"
         )
+
+    @property
+    def finding(self) -> Finding:
+        """The same, to be kept with results."""
+        return Finding("path-cut-short", "study.duration", str(self), f"the path takes {self.path:.4g} s")
 
     def figures(self) -> dict[str, float | str]:
         """As plain numbers, and in words."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from importlib.metadata import version
 from typing import Any
 
@@ -10,10 +11,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.findings import Finding
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.dataset import UNITS, describe, end_effector_point
+from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.joint_loads import joint_loads
 from paraflex.results.motion import point_motion, tip_deflection
@@ -22,6 +25,7 @@ from paraflex.results.record import FIGURES
 from paraflex.results.storage import SCHEMA
 from paraflex.results.summary import finite_or_none
 from paraflex.results.validity import validity_summary, validity_variables
+from paraflex.validity import doubtful_numbers
 
 _OWN_UNITS = {
     "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
@@ -32,7 +36,11 @@ _OWN_UNITS = {
 
 
 def motion_dataset(
-    run: MotionRun, *, options: IntegrationOptions | None = None, parameters: dict | None = None
+    run: MotionRun,
+    *,
+    options: IntegrationOptions | None = None,
+    parameters: dict | None = None,
+    findings: Iterable[Finding] = (),
 ) -> xr.Dataset:
     """A run without a path, labelled.
 
@@ -45,6 +53,8 @@ def motion_dataset(
         Kept as provenance.
     parameters : dict, optional
         Kept as provenance: the model as read, and what was asked for.
+    findings : iterable of Finding
+        Reasons to doubt the model, found before it ran; kept with those of its numbers and of the run.
 
     Returns
     -------
@@ -118,6 +128,8 @@ def motion_dataset(
         "paraflex_version": version("paraflex"),
         "schema": SCHEMA,
     }
+    beyond = [] if run.validity is None or run.validity.holds else [run.validity.finding()]
+    keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *run.doubts])
     return out
 
 
@@ -129,6 +141,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     return {
         "mechanism": data.attrs["mechanism"],
         **figures,
+        "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {

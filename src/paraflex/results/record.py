@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import Marker, System, end_markers, material_angle
+from paraflex.findings import Finding
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, drawing, system_drawing
 from paraflex.results.joint_loads import joint_loads
@@ -81,6 +82,8 @@ class Record:
         The numbers and words named in FIGURES.
     validity : Validity, optional
         How far it is within what its model can describe.
+    doubts : tuple of Finding
+        What of its results is not plausible.
     """
 
     task: TrackingTask
@@ -105,6 +108,7 @@ class Record:
     drawing: Drawing
     figures: Mapping[str, Any] = field(default_factory=dict)
     validity: Validity | None = None
+    doubts: tuple[Finding, ...] = ()
 
 
 def record(run: TrackingRun) -> Record:
@@ -150,6 +154,7 @@ def record(run: TrackingRun) -> Record:
         drawing=_drawing(task, parts, q),
         figures={name: getattr(solution, name) for name in (*FIGURES, BRAKE_ENERGY)},
         validity=run.validity,
+        doubts=run.doubts,
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from paraflex.results.doubts import verdict_of
 from paraflex.results.metrics import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.validity import validity_summary
 
@@ -38,8 +39,9 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     dict
         `modes.<mode>` with tracking errors during the motion, after it and over all, vibration and drift, peak_torque
         and rms_torque per motor, end_effector_final, the solver's figures and validity (None of rigid bodies); `error`,
-        which of the errors ranks the modes; `after`, what the motors do after the path; `part`, how much of the path a
-        run did that was too short for all of it, else None; `parameters`; `version`. A figure not reached is None.
+        which of the errors ranks the modes; `verdict`, with the level and all findings; `after`, what the motors do
+        after the path; `part`, how much of the path a run did that was too short for all of it, else None;
+        `parameters`; `version`. A figure not reached is None.
     """
     modes, part = {}, part_run(data)
     for name in data["mode"].values:
@@ -66,6 +68,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         "mechanism": data.attrs["mechanism"],
         "error": data.attrs.get("error", ErrorSpan.WHOLE.value),
         "after": data.attrs.get("after", "free"),
+        "verdict": verdict_of(data).to_dict(),
         "part": None if part is None else part.figures(),
         "modes": modes,
         "parameters": json.loads(data.attrs["parameters"]),

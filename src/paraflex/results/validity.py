@@ -33,9 +33,9 @@ def validity_variables(runs: Sequence[Validity | None]) -> dict[str, np.ndarray]
         "validity_verdict": np.array(["" if one is None else one.verdict for one in runs]),
     }
     for name in _INDICATORS:
-        told = name.removeprefix("validity_").replace("_", " ")
+        indicator = name.removeprefix("validity_").replace("_", " ")
         values = [{} if one is None else {each.name: each.value for each in one.indicators} for one in runs]
-        out[name] = np.array([value.get(told, math.nan) for value in values])
+        out[name] = np.array([value.get(indicator, math.nan) for value in values])
     return out
 
 
@@ -56,22 +56,14 @@ def validity_summary(run: xr.Dataset) -> dict[str, Any] | None:
     }
 
 
-def validity_lines(verdicts: Mapping[str, Mapping[str, Any] | None]) -> list[str]:
-    """Lines on the validity of runs by name, from their summaries: the worst, and which others are beyond.
+def validity_line(verdicts: Mapping[str, Mapping[str, Any] | None]) -> str:
+    """That the models of all runs hold, by the run nearest to its limit; empty where one does not, or nothing bends.
 
     The name of a single run may be empty.
     """
-    told = {name: one for name, one in verdicts.items() if one is not None}
-    if not told:
-        return []
-    worst = max(told, key=lambda name: told[name]["ratio"])
+    known = {name: one for name, one in verdicts.items() if one is not None}
+    if not known or not all(one["holds"] for one in known.values()):
+        return ""
+    worst = max(known, key=lambda name: known[name]["ratio"])
     whose = f"mode {worst}: " if worst else ""
-    if told[worst]["holds"]:
-        return [
-            f"validity: {whose}{told[worst]['verdict']}{'; further from its limit in the others' * (len(told) > 1)}"
-        ]
-    lines = [f"warning: {whose}{told[worst]['verdict']}"]
-    others = [f"{name} ({one['ratio']:.2g} times)" for name, one in told.items() if not one["holds"] and name != worst]
-    if others:
-        lines.append(f"warning: beyond the limit as well, mode {', '.join(others)}")
-    return lines
+    return f"validity: {whose}{known[worst]['verdict']}{'; further from its limit in the others' * (len(known) > 1)}"

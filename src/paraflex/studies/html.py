@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from paraflex.display import facts, page, sentence, table
 from paraflex.results import summary
+from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.metrics import HEADLINE, SPAN_WORDS, ErrorSpan
-from paraflex.results.validity import validity_lines
+from paraflex.results.validity import validity_line
 
 if TYPE_CHECKING:
     from paraflex.studies.comparison import MethodComparison
@@ -48,9 +49,9 @@ def study_html(result: StudyResult) -> str:
     heads = ("mode", "status", f"RMS tracking error {SPAN_WORDS[span]} [mm]", "after the motion [mm]", "drift [mm/s]",
              "residual vibration [mm]", *peaks, "steps", "Newton iterations", "wall time [s]")  # fmt: skip
     title = f"{figures['mechanism']}, {_modes_of(len(rows))}" + (", interrupted" if result.interrupted else "")
-    why += map(sentence, validity_lines({name: mode.get("validity") for name, mode in figures["modes"].items()}))
-    part = [] if figures["part"] is None else [sentence(figures["part"]["message"])]
-    return page(title, *part, table(heads, rows), *why)
+    holds = validity_line({name: mode.get("validity") for name, mode in figures["modes"].items()})
+    why += [sentence(holds)] if holds else []
+    return page(title, *map(sentence, doubt_lines(verdict_of(result.data))), table(heads, rows), *why)
 
 
 def sweep_html(result: SweepResult) -> str:

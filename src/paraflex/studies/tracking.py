@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,12 +12,12 @@ from typing import Protocol
 import xarray as xr
 
 from paraflex.errors import IntegrationError, NumericalError
+from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import tracking_dataset
 from paraflex.results.metrics import ErrorSpan
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
-from paraflex.validity import warn
 
 
 class Simulator(Protocol):
@@ -73,6 +73,7 @@ def run_study(
     method: Simulator | None = None,
     error: ErrorSpan | str = ErrorSpan.MOTION,
     warning: bool = True,
+    findings: Iterable[Finding] = (),
 ) -> StudyResult:
     """Simulate every mode; one that fails is reported and the others go on.
 
@@ -92,7 +93,10 @@ def run_study(
     error : ErrorSpan or str
         Which tracking error ranks the modes: that of the "motion", or of the "whole" run, dwell included.
     warning : bool
-        Whether runs beyond what their model can describe issue a `ValidityWarning` each.
+        Whether runs beyond what their model can describe issue a `ValidityWarning` each, those of implausible results
+        a `ResultWarning`.
+    findings : iterable of Finding
+        Reasons to doubt the model, found before; kept with the results.
 
     Returns
     -------
@@ -136,7 +140,9 @@ def run_study(
     runs = [outcome for outcome in outcomes.values() if isinstance(outcome, TrackingRun)]
     if warning:
         for run_of_mode in runs:
-            warn(run_of_mode.validity, f"mode {run_of_mode.mode.name}: ")
+            run_of_mode.warn()
     failed = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
-    data = tracking_dataset(runs, options=options, parameters=parameters, error=error) if runs else None
+    data = None
+    if runs:
+        data = tracking_dataset(runs, options=options, parameters=parameters, error=error, findings=findings)
     return StudyResult(data, failed, stop.is_set())

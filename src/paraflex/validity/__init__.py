@@ -6,11 +6,11 @@ both, and leaves out terms of fourth order in the slopes.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 from paraflex.dynamics import System
 from paraflex.errors import ValidityWarning
+from paraflex.findings import Finding, warn_of
 from paraflex.integrators import Solution
 from paraflex.validity.bending import bending_of
 from paraflex.validity.indicators import (
@@ -25,6 +25,8 @@ from paraflex.validity.indicators import (
     of_linear,
     of_second_order,
 )
+from paraflex.validity.numbers import doubtful_numbers, mechanism_size
+from paraflex.validity.plausibility import Driven, doubtful_results
 
 __all__ = [
     "AXIAL_LIMIT",
@@ -32,11 +34,15 @@ __all__ = [
     "FOURTH_ORDER_LIMIT",
     "SHORTENING_LIMIT",
     "SLOPE_LIMIT",
+    "Driven",
     "Following",
     "Indicator",
     "Validity",
     "assess",
+    "doubtful_numbers",
+    "doubtful_results",
     "fourth_order",
+    "mechanism_size",
     "warn",
 ]
 
@@ -76,6 +82,11 @@ class Validity:
             return f"{worst.geometry} geometry holds: {worst.text}"
         return f"{worst.geometry} geometry does not hold: {worst.text}; {worst.remedy}"
 
+    def finding(self, whose: str = "") -> Finding:
+        """The verdict on a run that is beyond what its model can describe."""
+        worst = self.worst
+        return Finding("validity", whose, f"{worst.geometry} geometry does not hold: {worst.text}", worst.remedy)
+
 
 def assess(system: System, solution: Solution, following: Following | None = None) -> Validity | None:
     """How far a run is within what its model can describe; None where no body is flexible.
@@ -96,6 +107,6 @@ def assess(system: System, solution: Solution, following: Following | None = Non
 
 
 def warn(validity: Validity | None, whose: str = "") -> None:
-    """Issue a `ValidityWarning` where a model does not hold; `whose` run it is stands before the verdict."""
+    """Issue a `ValidityWarning` where a model does not hold; `whose` run it is, say "mode ++", stands before it."""
     if validity is not None and not validity.holds:
-        warnings.warn(f"{whose}{validity.verdict}", ValidityWarning, stacklevel=3)
+        warn_of([validity.finding(whose)], ValidityWarning, stacklevel=3)

@@ -34,6 +34,8 @@ SIZE = (1e-5, 100.0)
 SPREAD = 500.0
 # Radius of gyration of a rigid body over the mechanism's size.
 GYRATION = 5.0
+# All masses over the cube of the mechanism's size, were it a massive block of light metal or more [kg/m^3].
+MASSIVE = 5000.0
 # A body's mass over that of all others together, without which the others would hardly matter.
 HEAVIEST = 200.0
 # Standard gravity and how far places on Earth differ from it [m/s^2].
@@ -61,7 +63,7 @@ def doubtful_numbers(mechanism: Mechanism) -> list[Finding]:
             found += _beam(body)
         elif isinstance(body, RigidBody):
             found += _rigid(body, size)
-    return [*found, *_heaviest(mechanism), *_one_place(mechanism, size)]
+    return [*found, *_masses(mechanism, size), *_one_place(mechanism, size)]
 
 
 def mechanism_size(mechanism: Mechanism) -> float:
@@ -220,17 +222,19 @@ def _rigid(body: RigidBody, size: float) -> Iterator[Finding]:
                 f"in a mechanism of {size:.3g} m",
                 "inertia is in kg m^2, about the centre of mass",
             )  # fmt: skip
-        if body.mass > DENSITY[1] * size**3:
-            yield Finding(
-                "mass", f"body.{body.name}.mass",
-                f"{body.mass:.3g} kg is more than a solid block of metal of the mechanism's size, {size:.3g} m",
-                "mass is in kg: is it in g?",
-            )  # fmt: skip
 
 
-def _heaviest(mechanism: Mechanism) -> Iterator[Finding]:
+def _masses(mechanism: Mechanism, size: float) -> Iterator[Finding]:
     masses = {body.name: _mass(body) for body in mechanism.bodies if not isinstance(body, ModalBody)}
     total = sum(masses.values())
+    if size and total > MASSIVE * size**3:
+        heaviest = max(masses, key=masses.__getitem__)
+        yield Finding(
+            "mass", f"body.{heaviest}",
+            f"{masses[heaviest]:.3g} kg, in a mechanism of {size:.3g} m and {total:.3g} kg: more than a massive block "
+            "of metal",
+            "mass is in kg, density in kg/m^3, sections in m: are all of them?",
+        )  # fmt: skip
     for name, mass in masses.items():
         if len(masses) > 1 and mass > HEAVIEST * (total - mass) > 0.0:
             yield Finding(

@@ -1,0 +1,40 @@
+"""What datasets keep of the reasons to doubt them, and what summaries and reports make of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+
+import xarray as xr
+
+from paraflex.findings import Finding, Level, Verdict
+
+# What the places of findings about single runs begin with.
+MODE = "mode "
+_WORDS = {Level.WRONG: "wrong", Level.DOUBTFUL: "warning"}
+# Attribute of a dataset that holds its findings, as JSON.
+FINDINGS = "findings"
+
+
+def keep_findings(data: xr.Dataset, findings: Iterable[Finding]) -> None:
+    """Write findings into a dataset's attributes, each once, the gravest first."""
+    data.attrs[FINDINGS] = json.dumps([one.to_dict() for one in Verdict(findings)])
+
+
+def verdict_of(data: xr.Dataset) -> Verdict:
+    """The findings of a dataset; none in files of earlier versions."""
+    return Verdict(map(Finding.from_dict, json.loads(data.attrs.get(FINDINGS, "[]"))))
+
+
+def doubt_lines(verdict: Iterable[Finding]) -> list[str]:
+    """A line for each finding; those of further modes with the same code share one."""
+    lines, further = [], {}
+    for one in verdict:
+        whose = one.place.partition(MODE)[2] if one.place.startswith(MODE) else ""
+        if whose and one.code in further:
+            further[one.code].append(whose)
+            continue
+        if whose:
+            further[one.code] = []
+        lines.append(f"{_WORDS[one.level]}: {one}")
+    return lines + [f"warning: so is mode {', '.join(names)} [{code}]" for code, names in further.items() if names]

@@ -1,0 +1,183 @@
+"""Are the results of a run plausible? What mass, size and speed of the mechanism let expect, against what came out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System
+from paraflex.findings import Finding
+from paraflex.integrators import Solution
+from paraflex.mechanism import Mechanism, PointForce
+from paraflex.validity.bending import bending_of
+from paraflex.validity.numbers import doubtful_numbers, mechanism_size
+
+Array = NDArray[np.float64]
+
+# Slope of a link in its frame beyond which it is a spring rather than a link [rad].
+BENT = 0.7
+# Tracking error over the diagonal of the path: the library's worst mode, RAParM-I's +-+-, has 0.34, dwell included.
+LOST = 0.5
+# A motor's effort over that of the whole mass at the acceleration of the path and under gravity, with all loads: the
+# library's modes take at most 1.04 times as much.
+EFFORT = 30.0
+# Speed of a body [m/s].
+FAST = 300.0
+# Condition number of the actuation matrix that explains large efforts.
+_NEAR_SINGULAR = 50.0
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What a run along a path adds.
+
+    Attributes
+    ----------
+    mode : str
+        Its actuation mode.
+    desired, actual : (k, 2) arrays
+        Of the end-effector, at the samples reached [m].
+    acceleration : float
+        Largest of the desired motion [m/s^2].
+    efforts : mapping of str to float
+        Largest torque or force of each motor [N m or N].
+    units : mapping of str to str
+        "N m" or "N", of each motor.
+    condition : float
+        Largest condition number of the actuation matrix.
+    """
+
+    mode: str
+    desired: Array
+    actual: Array
+    acceleration: float
+    efforts: Mapping[str, float]
+    units: Mapping[str, str]
+    condition: float
+
+    @property
+    def deviation(self) -> float:
+        """Root mean square distance from the path [m]."""
+        return float(np.sqrt(np.mean(np.sum((self.actual - self.desired) ** 2, axis=1))))
+
+
+class _Where(NamedTuple):
+    """What findings of a run begin with, and whose numbers may be to blame."""
+
+    place: str
+    mechanism: Mechanism
+    numbers: list[Finding]
+
+
+def doubtful_results(
+    system: System, solution: Solution, driven: Driven | None = None, mechanism: Mechanism | None = None
+) -> list[Finding]:
+    """Findings about the results of a run that are far from plausible.
+
+    Parameters
+    ----------
+    system : System
+    solution : Solution
+        Whole or in part.
+    driven : Driven, optional
+        Of a run along a path that torques drive.
+    mechanism : Mechanism, optional
+        As the user described it, where the system is of its finite segments.
+
+    Returns
+    -------
+    list of Finding
+        Each remedy names the quantity of the model that is most likely to blame.
+    """
+    if not solution.t.size:
+        return []
+    mechanism = mechanism or system.mechanism
+    where = _Where("" if driven is None else f"mode {driven.mode}", mechanism, doubtful_numbers(mechanism))
+    found = [*_bent(where, system, solution), *_fast(where, system, solution)]
+    if driven is not None:
+        found += [*_lost(where, driven), *_large_efforts(where, system, driven)]
+    return found
+
+
+def _bent(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+    slopes = {body.name: bending_of(system, body.name, solution).slope for body in system.bodies if body.nf}
+    if not slopes:
+        return
+    worst = max(slopes, key=lambda name: np.max(slopes[name]))
+    k = int(np.argmax(slopes[worst]))
+    if slopes[worst][k] > BENT:
+        blame = _blame(where, worst) or f"look at section and Young's modulus of {worst}, and at what loads it"
+        yield Finding(
+            "deflection-large", where.place,
+            f"{worst} bends by {slopes[worst][k]:.2g} rad at t = {solution.t[k]:.4g} s: more a spring than a link",
+            blame,
+        )  # fmt: skip
+
+
+def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+    speeds = np.stack([np.linalg.norm(solution.v[:, body.position], axis=1) for body in system.bodies], axis=1)
+    k, b = np.unravel_index(np.argmax(np.where(np.isfinite(speeds), speeds, -1.0)), speeds.shape)
+    if speeds[k, b] > FAST:
+        yield Finding(
+            "speed-large", where.place,
+            f"{system.bodies[b].name} moves at {speeds[k, b]:.3g} m/s at t = {solution.t[k]:.4g} s",
+            _blame(where) or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
+        )  # fmt: skip
+
+
+def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
+    extent = float(np.linalg.norm(np.ptp(driven.desired, axis=0)))
+    error = driven.deviation
+    if error > LOST * extent > 0.0:
+        yield Finding(
+            "error-large", where.place,
+            f"the tracking error is {error:.3g} m on a path that is {extent:.3g} m large: it is not followed",
+            _blame(where) or "torques are planned for rigid links and not corrected: are links much too soft for "
+            "the path's acceleration, in their sections and moduli?",
+        )  # fmt: skip
+
+
+def _large_efforts(where: _Where, system: System, driven: Driven) -> Iterator[Finding]:
+    mechanism = where.mechanism
+    size = mechanism_size(mechanism)
+    loads = sum(math.hypot(*one.force) for one in mechanism.loads if isinstance(one, PointForce))
+    turning = sum(abs(one.torque) for one in mechanism.loads if not isinstance(one, PointForce))
+    force = system.total_mass * (driven.acceleration + math.hypot(*mechanism.gravity)) + loads
+    for motor, peak in driven.efforts.items():
+        unit = driven.units[motor]
+        expected = force * size + turning if unit == "N m" else force + turning / size
+        if peak > EFFORT * expected > 0.0:
+            yield Finding(
+                "torque-large", where.place,
+                f"motor {motor} gives up to {peak:.3g} {unit}, where mass, size, acceleration and loads come to "
+                f"{expected:.2g} {unit}",
+                _stiff(mechanism, motor) or _blame(where) or _singular(driven),
+            )  # fmt: skip
+
+
+def _stiff(mechanism: Mechanism, motor: str) -> str:
+    """What acts beside inertia at the motor's joint, or between points."""
+    joint = next(one.joint for one in mechanism.motors if one.name == motor)
+    groups = {"spring": mechanism.springs, "damper": mechanism.dampers, "friction": mechanism.frictions}
+    named = [f"{kind}.{one.name}" for kind, members in groups.items() for one in members if one.joint == joint]
+    named += [f"linear_spring.{one.name}" for one in mechanism.linear_springs]
+    return f"look at {', '.join(named)}, and their units" if named else ""
+
+
+def _singular(driven: Driven) -> str:
+    if driven.condition > _NEAR_SINGULAR:
+        return f"the path passes near a singular position of the motors (condition number {driven.condition:.3g})"
+    return "look at masses (kg) and the path's acceleration (m/s^2)"
+
+
+def _blame(where: _Where, body: str = "") -> str:
+    """The number of the model that is most likely to blame, if one is doubtful."""
+    of_body = [one for one in where.numbers if body and one.place.startswith(f"body.{body}")]
+    for one in [*of_body, *where.numbers]:
+        return f"most likely because of {one.place}: {one.text}"
+    return ""
