@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path as FilePath
 
 from paraflex.checks.pose import Examination, examine, pose_findings
-from paraflex.checks.study import study_findings, task_findings
+from paraflex.checks.study import path_findings, study_findings, task_findings
 from paraflex.files import Model, load
 from paraflex.findings import Finding, Verdict
 from paraflex.mechanism import ActuationMode, Mechanism
@@ -55,17 +55,21 @@ def check(
     seen = seen or examine(mechanism, assembly)
     at_rest = not isinstance(model, Model) or model.start is None
     found: list[Finding] = [*doubtful_numbers(mechanism), *pose_findings(seen, at_rest=at_rest)]
-    if isinstance(model, Model):
+    # Without an assembly there is no pose to run from.
+    if isinstance(model, Model) and seen.starts:
         short = {one.place for one in found if one.code == "mode-short"}
         found += [one for one in study_findings(model, path, assembly, modes) if one.place not in short]
     return Verdict(found)
 
 
-def check_planned(model: Model, task: TrackingTask, modes: Sequence[ActuationMode], assembly: str | None) -> Verdict:
-    """The same of a study that is planned and about to run.
+def check_planned(
+    model: Model, task: TrackingTask, path: str, modes: Sequence[ActuationMode], assembly: str | None
+) -> Verdict:
+    """The same of a study along a path of that name, planned and about to run.
 
     Modes that cannot be driven are left to the run.
     """
     seen = examine(model.mechanism, assembly or model.study.assembly)
     found = [*doubtful_numbers(model.mechanism), *pose_findings(seen), *task_findings(task, modes)]
+    found += path_findings(model, task.path, path, float(task.motion.t[-1]))
     return Verdict(one for one in found if one.code not in ("path-singular", "mode-short"))

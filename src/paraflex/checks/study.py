@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -10,13 +11,17 @@ from paraflex.actuation import actuation_condition
 from paraflex.errors import ActuationError, AssemblyError, InputError, NumericalError, UnreachablePathError
 from paraflex.files import Model
 from paraflex.findings import Finding
-from paraflex.kinematics import Path
+from paraflex.kinematics import Circle, Path
 from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
 from paraflex.simulate import TrackingTask, plan_tracking
 
 # Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
 ILL_CONDITIONED = 1e3
+# Speed [m/s] and acceleration [m/s^2] of an end-effector that no machine reaches: the fastest robots have 150 m/s^2.
+FASTEST, SHARPEST = 50.0, 2000.0
+# Turns that a path along a circle may take.
+_TURNS = 8.0
 # Samples at which a plan is looked at.
 _SAMPLES = 201
 _SAME_TIME = 1e-9
@@ -26,8 +31,10 @@ def study_findings(
     model: Model, path: str | None = None, assembly: str | None = None, modes: Sequence[str] | None = None
 ) -> Iterator[Finding]:
     """What is wrong or doubtful about the study of a model; see `check` for the arguments."""
-    yield from _laws_cut_short(model.mechanism, model.study.duration)
     if not model.paths and path is None:
+        if model.study.duration is None:
+            yield Finding("duration-missing", "study.duration", "no path and no duration", "give one, in s")
+        yield from laws_cut_short(model.mechanism, model.study.duration)
         yield from _constant_torques(model)
         return
     if model.mechanism.end_effector is None:
@@ -46,6 +53,7 @@ def study_findings(
         part = part_of(chosen, duration)
         if part is not None:
             yield part.finding
+    yield from path_findings(model, chosen, name, duration)
     try:
         task = _planned(model, chosen, duration, assembly)
     except UnreachablePathError as error:
@@ -80,6 +88,38 @@ def task_findings(task: TrackingTask, modes: Sequence[ActuationMode]) -> Iterato
                 "move the path, or add motors to the mode",
             )  # fmt: skip
         yield from _friction(task.mechanism, mode, np.max(np.abs(torques), axis=0))
+
+
+def path_findings(model: Model, path: Path, name: str, duration: float) -> Iterator[Finding]:
+    """What can be seen of a path before it is planned."""
+    yield from laws_cut_short(model.mechanism, duration)
+    yield from _too_fast(name, path, duration)
+    yield from _turns(f"path.{name}", path, model.study.orientation)
+
+
+def _too_fast(name: str, path: Path, duration: float) -> Iterator[Finding]:
+    motion = path.evaluate(np.linspace(0.0, min(duration, path.duration), _SAMPLES))
+    speed, acceleration = (
+        float(np.max(np.linalg.norm(part, axis=1))) for part in (motion.velocity, motion.acceleration)
+    )
+    if speed > FASTEST or acceleration > SHARPEST:
+        yield Finding(
+            "path-fast", f"path.{name}", f"it asks for {speed:.3g} m/s and {acceleration:.3g} m/s^2",
+            "max_acceleration is in m/s^2, times are in s, places in m",
+        )  # fmt: skip
+
+
+def _turns(place: str, path: Path, orientation: float) -> Iterator[Finding]:
+    """Angles of a path and of the end-effector that are in degrees."""
+    angles = {"study.orientation": (orientation, 1.0)}
+    if isinstance(path, Circle):
+        angles |= {f"{place}.start_angle": (path.start_angle, 1.0), f"{place}.sweep": (path.sweep, _TURNS)}
+    for where, (angle, most) in angles.items():
+        if abs(angle) > most * 2.0 * math.pi:
+            yield Finding(
+                "angle", where, f"{angle:g} rad are {abs(angle) / (2.0 * math.pi):.3g} turns",
+                f"angles are in radians: {angle:g} degrees are {math.radians(angle):.4g} rad",
+            )  # fmt: skip
 
 
 def _planned(model: Model, path: Path, duration: float, assembly: str | None) -> TrackingTask:
@@ -136,7 +176,8 @@ def _constant_torques(model: Model) -> Iterator[Finding]:
                 )  # fmt: skip
 
 
-def _laws_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator[Finding]:
+def laws_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator[Finding]:
+    """Prescribed motions whose pieces or tables a run does not get to the end of."""
     for one in mechanism.prescribed:
         if isinstance(one.law, PiecewiseLaw):
             end = one.law.ends[-1] if one.law.ends else 0.0

@@ -82,7 +82,7 @@ def run_command(request: RunRequest) -> int:
         task = task.in_segments(proportional_segments(mechanism, request.segments))
         check_stops(task.mechanism, options, request.integration)
     parameters = _parameters(model, path_name, modes, task, how, request)
-    doubts = check_planned(model, task, modes, request.assembly)
+    doubts = check_planned(model, task, path_name, modes, request.assembly)
     method = _method(request, options)
     try:
         result = _simulate(console, task, modes, options, parameters, method, model.study.error, doubts)

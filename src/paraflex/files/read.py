@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 import typing
 from difflib import get_close_matches
@@ -41,12 +42,7 @@ def read_toml(path: Path, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"not valid TOML: {str(error)[0].lower()}{str(error)[1:]}",
-            field="file",
-            remedy="mend that line; a name may stand only once",
-            source=source,
-        ) from error
+        raise _not_toml(str(error), source) from error
     except (ValueError, RecursionError):
         raise InputError(
             "not valid TOML: a number of too many digits, or too many brackets in one another",
@@ -54,6 +50,18 @@ def read_toml(path: Path, source: str) -> dict[str, Any]:
             remedy="name a model file",
             source=source,
         ) from None
+
+
+def _not_toml(reason: str, source: str) -> InputError:
+    """What the parser says, with the name of a table that stands twice."""
+    twice = re.match(r"Cannot declare \((.*?),?\) twice \((.*)\)", reason)
+    if twice is None:
+        problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "mend that line"
+        return InputError(problem, field="file", remedy=f"{remedy}; a name may stand only once", source=source)
+    table = ".".join(part.strip(" '") for part in twice[1].split(","))
+    return InputError(
+        f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out", source=source
+    )
 
 
 def validate(schema: type[T], data: dict[str, Any], source: str) -> T:

@@ -12,8 +12,9 @@ from itertools import combinations
 import numpy as np
 
 from paraflex.findings import Finding
-from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, RigidBody, Section
+from paraflex.mechanism import AssumedModesBeam, AxisJoint, FlexibleBeam, Mechanism, ModalBody, RigidBody, Section
 from paraflex.mechanism.bodies import Body, Material
+from paraflex.mechanism.joints import AngleLaw
 
 Place = tuple[float, float]
 Beam = FlexibleBeam | AssumedModesBeam
@@ -42,7 +43,13 @@ HEAVIEST = 200.0
 GRAVITY, ON_EARTH = 9.81, 0.05
 # Points nearer one another than this part of the mechanism are at one place.
 APART = 1e-9
+# Speed of a body that no mechanism has [m/s].
+FAST = 300.0
+# Length of a beam beyond its last point, over all of it.
+OVERHANG = 0.5
 _TURN = 2.0 * math.pi
+# Instants at which a law is looked at.
+_LOOKS = 201
 
 
 def doubtful_numbers(mechanism: Mechanism) -> list[Finding]:
@@ -58,12 +65,24 @@ def doubtful_numbers(mechanism: Mechanism) -> list[Finding]:
     """
     size = mechanism_size(mechanism)
     found = [*_lengths(mechanism, size), *_gravity(mechanism.gravity), *_angles(mechanism), *_drives(mechanism)]
+    found += _laws(mechanism, size)
     for body in mechanism.bodies:
         if isinstance(body, Beam):
             found += _beam(body)
         elif isinstance(body, RigidBody):
             found += _rigid(body, size)
-    return [*found, *_masses(mechanism, size), *_one_place(mechanism, size)]
+    return _shared([*found, *_masses(mechanism, size), *_one_place(mechanism, size)])
+
+
+def _shared(found: Iterable[Finding]) -> list[Finding]:
+    """One finding in place of several that say the same of several places, as of bodies that share a section."""
+    places: dict[tuple[str, str, str], list[str]] = {}
+    for one in found:
+        places.setdefault((one.code, one.text, one.remedy), []).append(one.place)
+    return [
+        Finding(code, at[0], f"{text} (and so of {', '.join(at[1:])})" if len(at) > 1 else text, remedy)
+        for (code, text, remedy), at in places.items()
+    ]
 
 
 def mechanism_size(mechanism: Mechanism) -> float:
@@ -126,6 +145,8 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
     given = {
         f"joint.{j.name}.{name}": getattr(j, name, 0.0) for j in mechanism.joints for name in ("direction", "angle")
     }
+    turning = [one for one in mechanism.springs if not isinstance(mechanism.joint(one.joint), AxisJoint)]
+    given |= {f"spring.{one.name}.rest": one.rest for one in turning}
     given |= {
         f"assembly.{assembly.name}.{body}": angle
         for assembly in mechanism.assemblies
@@ -138,6 +159,32 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
                 "angle", place, f"{angle:g} rad is more than a turn, and the same as {turn:.4g} rad",
                 f"angles are in radians: {angle:g} degrees are {math.radians(angle):.4g} rad",
             )  # fmt: skip
+
+
+def _laws(mechanism: Mechanism, size: float) -> Iterator[Finding]:
+    """Angles in time: degrees show in where they start, and how far they swing to and fro."""
+    for one in mechanism.prescribed:
+        if isinstance(mechanism.joint(one.joint), AxisJoint):
+            continue
+        end = _end_of(one.law)
+        angle, rate, _ = one.law.evaluate(np.linspace(0.0, end, _LOOKS))
+        place = f"prescribed.{one.name}"
+        swing = float(np.ptp(angle)) if np.any(rate > 0.0) and np.any(rate < 0.0) else 0.0
+        if abs(angle[0]) > _TURN or swing > 2.0 * _TURN:
+            what = f"it swings over {swing:.4g} rad" if swing > 2.0 * _TURN else f"it starts at {angle[0]:.4g} rad"
+            yield Finding("angle", place, f"{what}, more than a turn", "angles are in radians: are they in degrees?")
+        fastest = float(np.max(np.abs(rate)))
+        if fastest * size > FAST:
+            yield Finding(
+                "speed-large", place, f"it turns at {fastest:.4g} rad/s, in a mechanism of {size:.3g} m",
+                "speeds are in rad/s: one turn a minute is 0.105 of them, a degree a second 0.0175",
+            )  # fmt: skip
+
+
+def _end_of(law: AngleLaw) -> float:
+    """A time until which a law is looked at: its last knot or row, or a second."""
+    rows = getattr(law, "times", ())
+    return float(max([*law.knots, *rows], default=0.0)) or 1.0
 
 
 def _drives(mechanism: Mechanism) -> Iterator[Finding]:
@@ -168,6 +215,13 @@ def _beam(body: Beam) -> Iterator[Finding]:
         yield from _section(f"{place}.section", body.length, section)
     for material in dict.fromkeys(materials):
         yield from _material(f"{place}.material", material)
+    places = list(body.points.values())
+    if len(places) > 1 and max(places) - min(places) < OVERHANG * body.length:
+        yield Finding(
+            "beam-overhang", f"{place}.length",
+            f"{body.length:.3g} m, where its points lie between {min(places):.3g} and {max(places):.3g} m",
+            "is the length that of the beam between its joints?",
+        )  # fmt: skip
 
 
 def _section(place: str, length: float, section: Section) -> Iterator[Finding]:

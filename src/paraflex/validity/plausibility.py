@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import System
+from paraflex.dynamics.rank import joint_of_row
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
+from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Mechanism, PointForce
 from paraflex.validity.bending import bending_of
-from paraflex.validity.numbers import doubtful_numbers, mechanism_size
+from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
 
 Array = NDArray[np.float64]
 
@@ -26,8 +28,12 @@ LOST = 0.5
 # A motor's effort over that of the whole mass at the acceleration of the path and under gravity, with all loads: the
 # library's modes take at most 1.04 times as much.
 EFFORT = 30.0
-# Speed of a body [m/s].
-FAST = 300.0
+# Force of a joint or drive over the same, and what it is multiplied by: also of the slowest of mechanisms.
+FORCE = 1000.0
+# Acceleration that masses count with at least: that of gravity [m/s^2].
+_LEAST_ACCELERATION = 9.81
+# Part of the samples that a force is as large in, so that a pole at a singular position is none.
+_LASTING = 0.1
 # Condition number of the actuation matrix that explains large efforts.
 _NEAR_SINGULAR = 50.0
 
@@ -98,7 +104,7 @@ def doubtful_results(
         return []
     mechanism = mechanism or system.mechanism
     where = _Where("" if driven is None else f"mode {driven.mode}", mechanism, doubtful_numbers(mechanism))
-    found = [*_bent(where, system, solution), *_fast(where, system, solution)]
+    found = [*_bent(where, system, solution), *_fast(where, system, solution), *_large_forces(where, system, solution)]
     if driven is not None:
         found += [*_lost(where, driven), *_large_efforts(where, system, driven)]
     return found
@@ -145,9 +151,7 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
 def _large_efforts(where: _Where, system: System, driven: Driven) -> Iterator[Finding]:
     mechanism = where.mechanism
     size = mechanism_size(mechanism)
-    loads = sum(math.hypot(*one.force) for one in mechanism.loads if isinstance(one, PointForce))
-    turning = sum(abs(one.torque) for one in mechanism.loads if not isinstance(one, PointForce))
-    force = system.total_mass * (driven.acceleration + math.hypot(*mechanism.gravity)) + loads
+    force, turning = _expected(system, mechanism, driven.acceleration)
     for motor, peak in driven.efforts.items():
         unit = driven.units[motor]
         expected = force * size + turning if unit == "N m" else force + turning / size
@@ -156,16 +160,46 @@ def _large_efforts(where: _Where, system: System, driven: Driven) -> Iterator[Fi
                 "torque-large", where.place,
                 f"motor {motor} gives up to {peak:.3g} {unit}, where mass, size, acceleration and loads come to "
                 f"{expected:.2g} {unit}",
-                _stiff(mechanism, motor) or _blame(where) or _singular(driven),
+                _resisting(mechanism) or _blame(where) or _singular(driven),
             )  # fmt: skip
 
 
-def _stiff(mechanism: Mechanism, motor: str) -> str:
-    """What acts beside inertia at the motor's joint, or between points."""
-    joint = next(one.joint for one in mechanism.motors if one.name == motor)
+def _expected(system: System, mechanism: Mechanism, acceleration: float) -> tuple[float, float]:
+    """The force that accelerates and holds the whole mass, with all loads [N]; and all torques applied [N m]."""
+    loads = sum(math.hypot(*one.force) for one in mechanism.loads if isinstance(one, PointForce))
+    turning = sum(abs(one.torque) for one in mechanism.loads if not isinstance(one, PointForce))
+    felt = max(acceleration + math.hypot(*mechanism.gravity), _LEAST_ACCELERATION)
+    return system.total_mass * felt + loads, turning
+
+
+def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+    """Forces of joints and of prescribed motions; drives of a path have motors."""
+    if not solution.multipliers.size:
+        return
+    size = mechanism_size(where.mechanism)
+    accelerations = np.stack([np.linalg.norm(solution.a[:, body.position], axis=1) for body in system.bodies])
+    expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))))
+    lasting = np.nanquantile(np.abs(solution.multipliers), 1.0 - _LASTING, axis=0)
+    constraints = system.packed.rows["kind"] == CONSTRAINT
+    lasting = np.where(constraints, np.nan_to_num(lasting), 0.0)
+    arms = np.array([size if row.endswith(" angle") else 1.0 for row in system.rows])
+    forces = lasting / arms
+    k = int(np.argmax(forces))
+    if forces[k] > FORCE * (expected + turning / size) > 0.0:
+        joint = joint_of_row(system.rows[k])
+        yield Finding(
+            "force-large", where.place,
+            f"{joint} takes {forces[k]:.3g} N for a tenth of the time or more, where mass, acceleration and loads come "
+            f"to {expected + turning / size:.2g} N",
+            _blame(where) or _resisting(where.mechanism) or "look at masses (kg), stiffnesses and prescribed motions",
+        )  # fmt: skip
+
+
+def _resisting(mechanism: Mechanism) -> str:
+    """Springs, dampers and friction, of which one may be in another unit."""
     groups = {"spring": mechanism.springs, "damper": mechanism.dampers, "friction": mechanism.frictions}
-    named = [f"{kind}.{one.name}" for kind, members in groups.items() for one in members if one.joint == joint]
-    named += [f"linear_spring.{one.name}" for one in mechanism.linear_springs]
+    groups["linear_spring"] = mechanism.linear_springs
+    named = [f"{kind}.{one.name}" for kind, members in groups.items() for one in members]
     return f"look at {', '.join(named)}, and their units" if named else ""
 
 
