@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from paraflex.cli.commands import models, results, runs, studies
+from paraflex.cli.commands.once import Command
 from paraflex.errors import InputError, ParaflexError
 
 app = typer.Typer(
@@ -40,8 +41,8 @@ for _command in (
     models.new,
     models.schema,
 ):
-    app.command()(_command)
-app.command("optimize", hidden=True)(studies.optimise)
+    app.command(cls=Command)(_command)
+app.command("optimize", cls=Command, hidden=True)(studies.optimise)
 
 BAD_INPUT, TROUBLE, INTERRUPTED = 2, 1, 130
 
