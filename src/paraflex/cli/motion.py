@@ -11,6 +11,7 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
@@ -63,6 +64,7 @@ def run_motion(
         )
     samples = model.study.samples if request.samples is None else request.samples
     folder = results_folder(request.out)
+    say_replaced(folder, "run")
     compile_kernels_for(mechanism, console.print)
     began = time.perf_counter()
     run = _simulate(console, model, mechanism, duration, samples, request, options)
