@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.report.choice import Picked, drawn_rows
-from paraflex.report.curves import compared, followed, plane_path, thinned
+from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, compared, followed, plane_path, thinned
 from paraflex.report.designs import Studied, columns, metric_name, reasons, shown_unit
 from paraflex.report.film import film
 from paraflex.report.page import Page, Panel
@@ -271,9 +271,9 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     bent = [b for b in range(len(bodies)) if np.nanmax(np.abs(deflection[:, :, b]), initial=0.0) > 0.0]
     if bent:
         charts.append(followed(
-            "deflections", "Deflections of the links", "transverse deflection of the tip", "m", deflection[:, :, bent],
+            "deflections", TIP_TITLE, TIP_LABEL, "m", deflection[:, :, bent],
             [bodies[b] for b in bent], runs, selecting="design",
-            note="Of a link's last end, across the link, in its own frame.",
+            note=TIP_NOTE,
         ))  # fmt: skip
     energy = data["strain_energy"].transpose("mode", "time").values
     charts.append(compared("strain", "Strain energy", "strain energy", "J", energy, runs))
