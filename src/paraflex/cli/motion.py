@@ -150,10 +150,18 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     return still if model.start is None else start_state(system, model.start, q=still.q)
 
 
+def _ended(figures: dict) -> str:
+    """How a run ended. When it failed its message says; the last sample is before that."""
+    status, steps, time = figures["status"], f"{figures['steps']} steps", figures["final"]["time"]
+    if status in FINISHED:
+        return f"{status} at t = {time:g} s, {steps}"
+    return f"{status}, {steps}; " + ("no sample was reached" if time is None else f"the last sample is t = {time:g} s")
+
+
 def _report(figures: dict, data: xr.Dataset) -> None:
     out = plain_console()
     final = figures["final"]
-    out.print(f"{figures['mechanism']}: {figures['status']} at t = {final['time']:g} s, {figures['steps']} steps")
+    out.print(f"{figures['mechanism']}: {_ended(figures)}")
     if figures["event"]:
         out.print(figures["message"], soft_wrap=True)
     # Points that segments made by the program hang together at are left out.

@@ -152,7 +152,9 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
 
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    tiles = [("status", str(data["status"].item()), f"t = {_last_time(data):.4g} s")]
+    status = str(data["status"].item())
+    last = "" if status in ("complete", "stopped") else "last sample "
+    tiles = [("status", status, f"{last}t = {_last_time(data):.4g} s")]
     # Of earlier results those of their ends.
     name = "deflection" if "deflection" in data else "tip_transverse"
     deflections = np.abs(data[name].transpose("time", "body").values)
