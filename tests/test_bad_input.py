@@ -129,7 +129,7 @@ FIELDS = [
     ("elements = 2", 'elements = "2"', "body.left.elements: should be a valid integer (got '2')", "elements per span"),
     ('A1 = ["ground.A1", "left.A"]', 'A1 = "left.A"', "joint.A1: should be a valid list (got 'left.A')", "body.point"),
     ('section = "bar"', "section = 1", "body.left.section: should be a valid string (got 1)", "[section.NAME]"),
-    ('type = "rigid"', 'type = "solid"', "body.right.type: unknown type (got 'solid')", "'rigid'"),
+    ('type = "rigid"', 'type = "solid"', "body.right.type: unknown type (got 'solid')", '"rigid"'),
     ('m1 = "A1"', 'm1 = ["A1"]', "motor.m1: should be a valid string (got ['A1'])", "the joint of each motor"),
     ("[parameters]\n", "[[parameters]]\n", "parameters: should be a table", "numbers by name"),
     # Numbers
@@ -204,7 +204,7 @@ FIELDS = [
     # Paths
     ("end = [0.03, 0.32]", "end = [0.0, 0.3]", "path.line.corners: two neighbouring corners coincide", "drop one"),
     ("max_acceleration = 5.0", "max_acceleration = -5.0", "path.line.max_acceleration: must be positive", "m/s^2"),
-    ('type = "line"', 'type = "arc"', "path.line.type: unknown type (got 'arc')", "'circle'"),
+    ('type = "line"', 'type = "arc"', "path.line.type: unknown type (got 'arc')", '"circle"'),
     ("[0.02, 0.31]", "[0.02, inf]", "path.curve.points.1.1: should be a finite number (got inf)", "[x, y]"),
     ("[0.02, 0.31]", "[0.0, 0.3]", "path.curve.points: two neighbouring points coincide", "drop one of them"),
     ('path = "line"', 'path = "lime"', "study.path: unknown path (got 'lime')", 'did you mean "line"?'),

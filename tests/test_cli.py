@@ -214,6 +214,69 @@ def test_modes_lists_table_1():
     assert "tau1, tau5" in paraflex("modes").stdout
 
 
+def without(tables, name, tmp_path):
+    """A library mechanism without some tables, as a file."""
+    kept, keep = [], True
+    for line in library_file(name).read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            keep = not line.startswith(tuple(f"[{table}" for table in tables))
+        kept += [line] if keep else []
+    file = tmp_path / f"{name}.toml"
+    file.write_text("\n".join(kept), encoding="utf-8")
+    return str(file)
+
+
+def test_modes_of_a_model_without_any_are_sets_of_motors_that_suffice(tmp_path):
+    done = paraflex("modes", without(["mode", "study"], "raparm_i", tmp_path), "--path", "square", "--json")
+    rows = json.loads(done.stdout)
+    known = {row["mode"]: row for row in json.loads(paraflex("modes", "--json").stdout)}
+    assert all(row["declared"] for row in known.values())
+    assert not any(row["declared"] for row in rows)
+    # Two motors drive a mechanism of two freedoms; there are six pairs of four. All motors are the last.
+    assert [len(row["motors"]) for row in rows] == [2] * 6 + [4]
+    conditions = [row["condition_max"] for row in rows[:-1]]
+    assert conditions == sorted(conditions)
+    for row in rows:
+        if row["mode"] in known:
+            assert row["condition_max"] == pytest.approx(known[row["mode"]]["condition_max"], rel=1e-12)
+    assert "RAParM-I has no [mode] tables" in done.stderr
+    assert "ask for some by --mode tau2,tau6" in done.stderr
+    table = paraflex("modes", without(["mode", "study"], "raparm_i", tmp_path))
+    assert "tau5, tau6" in table.stdout
+    assert "has no [mode] tables" in table.stderr
+
+
+def test_modes_of_the_study_are_listed(tmp_path):
+    file = without(["mode"], "raparm_i", tmp_path)
+    rows = json.loads(paraflex("modes", file, "--json").stdout)
+    assert rows
+    assert all(row["declared"] for row in rows)
+
+
+def test_modes_without_a_path_or_motors_say_so(tmp_path):
+    done = paraflex("modes", without(["mode", "study", "path"], "raparm_i", tmp_path), "--json")
+    rows = json.loads(done.stdout)
+    assert [len(row["motors"]) for row in rows] == [2] * 6 + [4]
+    assert all("drives_path" not in row for row in rows)
+    assert "RAParM-I has no path: add [path.NAME]" in done.stderr
+    for how in ([], ["--json"]):
+        done = paraflex("modes", "four_bar", *how)
+        assert done.stdout.strip() == ("[]" if how else "")
+        assert "four-bar has no motors, hence no actuation modes: add [motor]" in done.stderr
+
+
+def test_modes_of_too_few_motors_are_json_for_all_readers(tmp_path):
+    source = library_file("raparm_i").read_text(encoding="utf-8")
+    file = tmp_path / "short.toml"
+    file.write_text(source.replace("[mode]", '[mode]\nalone = ["tau1"]'), encoding="utf-8")
+    done = paraflex("modes", str(file), "--json")
+    # Infinity is no JSON.
+    row = next(row for row in json.loads(done.stdout, parse_constant=pytest.fail) if row["mode"] == "alone")
+    assert row["condition_max"] is None
+    assert row["drives_path"] is False
+    assert "infinite" in paraflex("modes", str(file)).stdout
+
+
 def test_version_and_help():
     assert paraflex("--version").stdout.strip().count(".") == 2
     assert "run" in paraflex("--help").stdout

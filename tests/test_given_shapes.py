@@ -666,7 +666,7 @@ def test_info_and_run_take_them(tmp_path, source):
         ("transverse_poly", "tranverse_poly", 'body.rod.tranverse_polynomials: unknown field'),
         ("[0, 0, 1],", "[0, 1],", "body.rod.transverse: its shape functions contain a rigid motion of the bar"),
         ("[0, 0, 1],", '[0, 0, "l"],', 'body.rod.transverse_polynomials.0.2: unknown parameter "l"'),
-        ('"assumed-modes"', '"assumed"', "body.rod.type: unknown type (got 'assumed'); use 'beam', 'rigid', 'assumed"),
+        ('"assumed-modes"', '"assumed"', "body.rod.type: unknown type (got 'assumed'); did you mean \"assumed-modes"),
         ('section = "bar"', 'section = "bra"', "body.rod.section: unknown section (got 'bra')"),
         ('P = "tip" }', 'Q = "tip" }', "body.rod.lumps: a lump on an unknown point (got 'Q')"),
         ('P = "L" }', "P = 0.6 }", "body.rod.points.P: the point lies beyond the beam's end"),

@@ -183,7 +183,10 @@ def test_a_run_that_failed_says_why(task) -> None:
         task.simulate("++", options=IntegrationOptions(max_steps=3))
     shown = read(caught.value.partial)
     assert "failed" in shown.text
-    assert caught.value.partial.solution.message in shown.text
+    solution = caught.value.partial.solution
+    assert solution.message in shown.text
+    # The message says when it failed; the last sample is earlier.
+    assert f"failed, its last sample at t = {solution.t[-1]:.4g} s" in shown.text
 
 
 def test_a_motion_run() -> None:

@@ -1,6 +1,7 @@
 """Runs without a path: in Python, as a dataset, on the command line."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -22,7 +23,8 @@ from paraflex.mechanism import (
     TorsionalDamper,
 )
 from paraflex.motion import simulate_motion
-from paraflex.results import load_results, motion_dataset, motion_summary, save_results
+from paraflex.report import motion_page
+from paraflex.results import load_results, motion_dataset, motion_summary, open_results, save_results
 from test_cli import paraflex
 from test_loads import INERTIA, MASS, REACH, G, pendulum
 
@@ -118,7 +120,25 @@ def test_a_run_that_stops_keeps_what_there_is():
     data = motion_dataset(caught.value.partial)
     assert data["status"].item() == "failed"
     assert 0 < int(data["angle"].notnull().sum()) < data.sizes["time"]
-    assert motion_summary(data)["final"]["angle"]["arm"] is None
+    final = motion_summary(data)["final"]
+    solution = caught.value.partial.solution
+    assert final["time"] == solution.t[-1] <= caught.value.moment.time
+    assert final["angle"]["arm"] == data["angle"].sel(body="arm", time=final["time"]).item()
+
+
+def test_a_run_that_fails_names_one_time_at_which_it_did(tmp_path):
+    done = paraflex("run", "pendulum", "--duration", "1", "--max-steps", "30", "--out", str(tmp_path))
+    assert done.returncode == 1
+    failed = re.findall(r"at t = (\S+) s", done.stderr)
+    assert len(failed) == 1
+    assert re.search(
+        r"^flexible pendulum: failed, 30 steps; the last sample is t = (\S+) s$", done.stdout, re.MULTILINE
+    )
+    last = json.loads((tmp_path / "summary.json").read_text())["final"]["time"]
+    assert last <= float(failed[0]) < 1.0
+    assert f"failed at t = {failed[0]} s" not in done.stdout
+    tile = motion_page(open_results(tmp_path)).figures[0]
+    assert tile == ("status", "failed", f"last sample t = {last:.4g} s")
 
 
 @pytest.mark.parametrize(

@@ -420,7 +420,7 @@ BAD = [
     ("tracking_rms = 1.0", "tracking_rms = -1.0", "objective.minimise.tracking_rms: must be positive (got -1.0)"),
     ("tracking_rms = 1.0", "peak_torque = 1.0", "objective.minimise.peak_torque: of which motor? (got 'peak_torque')"),
     ("tracking_rms = 1.0", '"tracking_rms.tau1" = 1.0', "not a metric per motor"),
-    ("relative = false", 'over = "wurst"', 'give "worst" or "mean" of all paths'),
+    ("relative = false", 'over = "wurst"', 'did you mean "worst"?'),
     ("low = 0.002", "low = 0.006", "outside the bounds, 0.006 to 0.008 (got 0.005)"),
     ("low = 0.002", "low = 0.002\nstart = 0.001", "vary.x.start: outside the bounds, 0.002 to 0.008 (got 0.001)"),
     ("low = 0.002", "low = 0.008", "vary.x.high: low and high are equal"),

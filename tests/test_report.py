@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 from paraflex.errors import InputError, OutputError
+from paraflex.plots.catalogue import CATALOGUE
 from paraflex.report import (
     Chart,
     Curve,
@@ -48,6 +49,22 @@ def page(tracking_html):
 def text_of(html):
     """What is read: tags as spaces."""
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html))
+
+
+def test_charts_are_titled_by_what_they_plot():
+    """A distance from singular positions would fall to zero there; a condition number grows."""
+    page = tracking_page(tracked())
+    charts = {chart.identity: chart for panel in page.panels for chart in panel.charts}
+    condition = charts["condition"]
+    assert condition.title == "Condition number of the actuation matrix"
+    assert condition.y == "condition number"
+    first = tracked()["actuation_condition"].values[0]
+    assert np.nanmax(condition.curves[0].y) == pytest.approx(np.nanmax(first))
+    # Not deflections, which are from the chord: so are the table's and the tile's.
+    assert "deflection" not in charts["deflections"].title + charts["deflections"].y
+    assert "tangent at its first end" in charts["deflections"].note
+    singular = next(one for one in CATALOGUE["tracking"] if one.name == "actuation_condition")
+    assert singular.shows == "condition number of the actuation matrix along the path, all modes"
 
 
 def test_rows_come_back_rounded_by_less_than_a_hundred_thousandth_and_once_each():
@@ -347,6 +364,11 @@ def test_a_run_without_a_path_has_a_report(tmp_path):
         array_of(page["film"]["tip"])[0], data["point_position"].sel(point="beam.tip"), atol=1e-4
     )
     assert motion_page(data).film is not None
+    tile = next(value for title, value, _ in motion_page(data).figures if title == "largest deflection")
+    unit = tile.partition(" ")[2]
+    assert float(tile.split()[0]) == pytest.approx(
+        {"mm": 1e3, "µm": 1e6}[unit] * float(data["deflection"].max()), rel=0.01
+    )
     assert film(data.drop_vars("shape"), ()) is None
 
 

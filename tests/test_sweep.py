@@ -279,7 +279,7 @@ def run_task_rows(file):
         ("samples = 51", 'assembly = "sideways"', "unknown assembly (got 'sideways')"),
         ('mechanism = "raparm_i"', 'mechanism = "raparm"', 'did you mean "raparm_i"?'),
         ("[integration]", '[sampling]\nkind = "sobol"\n[integration]', "sobol samples are taken from a range"),
-        ("[integration]", '[sampling]\nkind = "lisst"\n[integration]', 'give "grid", "list", "random" or "sobol"'),
+        ("[integration]", '[sampling]\nkind = "lisst"\n[integration]', 'did you mean "list"?'),
         ("samples = 51", "sample = 51", 'did you mean "samples"?'),
     ],
 )

@@ -9,11 +9,14 @@ import pandas as pd
 import pytest
 
 from paraflex.errors import InputError
+from paraflex.files import library_file
 from paraflex.plots.designs import DesignTable, in_conflict, undominated
 from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows, fronts
 from paraflex.report.designs import Studied, read_studied, reasons
+from paraflex.report.film import frames_of
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
+from paraflex.studies.sweeps.reopen import open_study, run_again
 from paraflex.studies.sweeps.report import study_page
 from paraflex.studies.sweeps.units import unit_of
 from reports import array_of, chart_of, html_of, rows_of, told
@@ -281,6 +284,63 @@ def test_a_search_has_one_with_its_convergence(tmp_path):
     assert least[-1] == pytest.approx(result.objective, rel=1e-5)
     assert len(page["runs"]) >= 2
     assert page["film"] is not None
+
+
+MARKED = """
+name = "a mark along the link"
+mechanism = "marked.toml"
+paths = ["square"]
+modes = ["++"]
+duration = 0.05
+samples = 11
+metrics = ["tracking_rms"]
+
+[sampling]
+kind = "list"
+
+[integration]
+method = "esdirk5"
+tolerance = 1e-3
+
+[vary.mark]
+fields = ["body.proximal1.points.mark"]
+values = [0.010, 0.100, 0.245]
+
+[vary.elements]
+fields = ["body.distal1.elements"]
+whole = true
+values = [2, 3, 4]
+"""
+
+
+def test_designs_with_other_stations_move_as_each_is_drawn(tmp_path):
+    model = library_file("five_bar").read_text(encoding="utf-8")
+    marked = model.replace('points = { A1 = 0.0, B1 = "l1" }', 'points = { A1 = 0.0, mark = 0.1, B1 = "l1" }')
+    assert marked != model
+    (tmp_path / "marked.toml").write_text(marked, encoding="utf-8")
+    (tmp_path / "study.toml").write_text(MARKED, encoding="utf-8")
+    result = sweep(load_sweep(tmp_path / "study.toml"), tmp_path / "out", workers=1)
+    assert dict(result.counts) == {"complete": 3}
+    study = open_study(tmp_path / "out")
+    runs = [
+        run_again(study.setting, values, "square", "++")[0] for values in ((0.010, 2), (0.100, 3), (0.245, 4))
+    ]  # fmt: skip
+    # What made the report leave designs out: stations are laid between the points of a beam.
+    assert len({run.sizes["station"] for run in runs}) > 1
+    page = study_page(tmp_path / "out")
+    assert not any("not shown in motion" in note for note in page.notes)
+    film = page.film
+    assert film is not None
+    assert sorted(page.runs) == ["#0 ++", "#1 ++", "#2 ++"]
+    kept = frames_of(runs[0].sizes["time"])
+    for label, shape in zip(page.runs, film.shape, strict=True):
+        own = runs[int(label[1])].isel(mode=0)
+        for body, first, end in film.bodies:
+            mine = own["shape"].values[kept][:, own["station_body"].values == body]
+            # The very stations of this design in their order, some of them twice.
+            drawn = shape[:, first:end]
+            same = [np.all(drawn[:, k] == drawn[:, k - 1]) for k in range(1, drawn.shape[1])]
+            np.testing.assert_array_equal(drawn[:, [True, *(not one for one in same)]], mine)
 
 
 def test_a_folder_without_rows_is_refused(finished, tmp_path):

@@ -411,11 +411,10 @@ def _drive_and_hold(
         efforts = np.concatenate([torques.evaluate(driven.t[:count]), efforts[: held.t.size - bool(held.event)]])
         return TrackingRun(task, torques, condition, solution, title, holding=efforts)
 
-    left = replace(options, max_steps=max(1, options.max_steps - driven.steps - driven.rejected))
     try:
         held = integrate(
-            braked.system, signals, braked.state, times[count:], knots=np.array(knots), options=left,
-            on_progress=on_progress,
+            braked.system, signals, braked.state, times[count:], knots=np.array(knots), options=options,
+            begun=driven, on_progress=on_progress,
         )  # fmt: skip
     except IntegrationError as error:
         error.partial = whole(error.partial)

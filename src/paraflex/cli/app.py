@@ -11,6 +11,7 @@ import typer
 
 from paraflex.cli.collected import collecting
 from paraflex.cli.commands import models, results, runs, studies
+from paraflex.cli.commands.once import Command
 from paraflex.errors import InputError, ParaflexError
 
 app = typer.Typer(
@@ -41,8 +42,8 @@ for _command in (
     models.new,
     models.schema,
 ):
-    app.command()(_command)
-app.command("optimize", hidden=True)(studies.optimise)
+    app.command(cls=Command)(_command)
+app.command("optimize", cls=Command, hidden=True)(studies.optimise)
 
 BAD_INPUT, TROUBLE, INTERRUPTED = 2, 1, 130
 

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from paraflex.cli.compare_tables import print_comparison
 from paraflex.cli.motion import start_of
+from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
@@ -53,6 +54,7 @@ def compare_command(request: CompareRequest) -> int:
     # Every check that needs no computing comes before the first minute is spent.
     modes = _modes(model, request)
     folder = results_folder(request.out)
+    say_replaced(folder, "comparison of methods")
     compile_kernels_for(model.mechanism, console.print)
     began = time.perf_counter()
     case = _motion(model, request) if modes is None else _tracking(model, request, modes)

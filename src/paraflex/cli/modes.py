@@ -3,47 +3,138 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
+from itertools import combinations, islice
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from paraflex.actuation import actuation_condition
+from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
+from paraflex.cli.request import find_path
 from paraflex.cli.tables import plain_console
+from paraflex.dynamics import build_system, closure_of, mobility, reach
 from paraflex.errors import ActuationError
-from paraflex.files import load
+from paraflex.files import Model, load
+from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
 from paraflex.simulate import plan_tracking
+
+# Samples of the path at which modes are judged.
+_SAMPLES = 201
+# Sets of motors that are tried, and those listed at most, of a mechanism that names no modes.
+_TRIED, _LISTED = 20_000, 20
 
 
 def modes_command(source: str, path: str | None, as_json: bool) -> None:
-    """List the actuation modes with the condition of their actuation matrix along a path."""
+    """List the actuation modes with the condition of their actuation matrix along a path.
+
+    Of a model that names none: the sets of motors that could be asked for.
+    """
     model = load(source)
-    rows = []
-    effort = None
-    if model.mechanism.end_effector is not None and (path is not None or model.paths):
-        effort = plan_tracking(
-            model.mechanism.rigid(), model.path(path), samples=201, orientation=model.study.orientation
-        ).effort
-    for mode in model.mechanism.modes:
-        row: dict[str, Any] = {"mode": mode.name, "motors": list(mode.motors)}
-        if effort is not None:
-            row["redundancy"] = len(mode.motors) - effort.required.shape[1]
-            row["condition_max"] = float(np.max(actuation_condition(effort, mode)))
-            try:
-                check_mode(effort, mode)
-                row["drives_path"] = True
-            except ActuationError as error:
-                row["drives_path"], row["reason"] = False, str(error)
-        rows.append(row)
+    effort = _effort(model, path)
+    named = _named_modes(model)
+    rows, more = [_row(mode, effort) for mode in named], 0
+    if not named and model.mechanism.motors:
+        rows, more = _possible_rows(model, effort)
+    for row in rows:
+        row["declared"] = bool(named)
+    for line in _explain(model, path, rows, more):
+        plain_console(stderr=True).print(line, soft_wrap=True)
     if as_json:
         print(json.dumps(rows, indent=2))
-        return
-    table = Table(title=f"{model.mechanism.name}: actuation modes", title_justify="left")
+    elif rows:
+        plain_console().print(_table(model, rows))
+
+
+def _effort(model: Model, path: str | None) -> Effort | None:
+    """What the path asks of the motors; None without a path, or a point to follow it."""
+    if model.mechanism.end_effector is None or not (path is not None or model.paths):
+        return None
+    study = model.study
+    followed, _ = find_path(model, path)
+    return plan_tracking(
+        model.mechanism.rigid(), followed, samples=_SAMPLES, assembly=study.assembly, orientation=study.orientation
+    ).effort
+
+
+def _named_modes(model: Model) -> list[ActuationMode]:
+    """Modes of [mode] tables, and others of the study."""
+    studied = [parse_mode(model.mechanism, name) for name in model.study.modes]
+    return list(dict.fromkeys([*model.mechanism.modes, *studied]))
+
+
+def _row(mode: ActuationMode, effort: Effort | None) -> dict[str, Any]:
+    row: dict[str, Any] = {"mode": mode.name, "motors": list(mode.motors)}
+    if effort is None:
+        return row
+    worst = float(np.max(actuation_condition(effort, mode)))
+    row["redundancy"] = len(mode.motors) - effort.required.shape[1]
+    row["condition_max"] = worst if np.isfinite(worst) else None
+    try:
+        check_mode(effort, mode)
+        row["drives_path"] = True
+    except ActuationError as error:
+        row["drives_path"], row["reason"] = False, str(error)
+    return row
+
+
+def _possible_rows(model: Model, effort: Effort | None) -> tuple[list[dict[str, Any]], int]:
+    """Smallest sets of motors that suffice, the best first, and all motors; and how many sets are left out."""
+    motors = [motor.name for motor in model.mechanism.motors]
+    sets = _sets_of_pose(model) if effort is None else combinations(motors, effort.required.shape[1])
+    rows = [_row(mode_of_motors(model.mechanism, chosen), effort) for chosen in islice(sets, _TRIED)]
+    fit = sorted(
+        (row for row in rows if row.get("drives_path", True)), key=lambda row: row.get("condition_max") or np.inf
+    )
+    everything = _row(mode_of_motors(model.mechanism, motors), effort)
+    shown = [row for row in fit[:_LISTED] if row["mode"] != everything["mode"]]
+    return [*shown, everything], max(0, len(fit) - _LISTED)
+
+
+def _sets_of_pose(model: Model) -> Iterable[tuple[str, ...]]:
+    """Smallest sets of motors that reach all freedoms at the pose of the assembly; none where that does not close."""
+    if not model.mechanism.assemblies:
+        return ()
+    system = build_system(model.mechanism.rigid())
+    start = closure_of(system, model.mechanism.assembly(model.study.assembly)).state
+    return () if start is None else reach(system, start, mobility(system, start).freedoms).sets
+
+
+def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: int) -> list[str]:
+    """What the table does not say: what its rows are, where no modes are named, and what is missing for the rest."""
+    mechanism = model.mechanism
+    said = []
+    if not rows:
+        said.append(f"{mechanism.name} has no motors, hence no actuation modes: add [motor] with a joint for each")
+    elif not rows[0]["declared"]:
+        sets = "the smallest sets of motors that suffice, and all motors" if len(rows) > 1 else "all motors"
+        left = f" ({more} more sets suffice)" if more else ""
+        said.append(
+            f"{mechanism.name} has no [mode] tables; listed are {sets}{left}: "
+            f"ask for some by --mode {','.join(rows[0]['motors'])}"
+        )
+    if not model.paths and path is None:
+        said.append(f"{mechanism.name} has no path: add [path.NAME], or name a file by --path, to see what drives it")
+    elif mechanism.end_effector is None:
+        said.append(f"{mechanism.name} has no [end_effector] to follow a path: what drives it cannot be said")
+    return said
+
+
+def _table(model: Model, rows: list[dict[str, Any]]) -> Table:
+    declared = rows[0]["declared"]
+    title = f"{model.mechanism.name}: {'actuation modes' if declared else 'sets of motors'}"
+    table = Table(title=title, title_justify="left")
     for heading in ("mode", "active motors", "redundancy", "worst condition number", "drives the path"):
         table.add_column(heading)
     for row in rows:
         drives = {True: "yes", False: row.get("reason", "no"), None: ""}[row.get("drives_path")]
-        condition = f"{row['condition_max']:.3g}" if "condition_max" in row else ""
-        table.add_row(row["mode"], ", ".join(row["motors"]), str(row.get("redundancy", "")), condition, drives)
-    plain_console().print(table)
+        table.add_row(row["mode"], ", ".join(row["motors"]), str(row.get("redundancy", "")), _condition(row), drives)
+    return table
+
+
+def _condition(row: dict[str, Any]) -> str:
+    if "condition_max" not in row:
+        return ""
+    worst = row["condition_max"]
+    return "infinite" if worst is None else f"{worst:.3g}"

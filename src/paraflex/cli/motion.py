@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from paraflex.checks import check
 from paraflex.cli.collected import collected
+from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
@@ -64,6 +65,7 @@ def run_motion(
         )
     samples = model.study.samples if request.samples is None else request.samples
     folder = results_folder(request.out)
+    say_replaced(folder, "run")
     compile_kernels_for(mechanism, console.print)
     began = time.perf_counter()
     run = _simulate(console, model, mechanism, duration, samples, request, options)
@@ -151,10 +153,18 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     return still if model.start is None else start_state(system, model.start, q=still.q)
 
 
+def _ended(figures: dict) -> str:
+    """How a run ended. When it failed its message says; the last sample is before that."""
+    status, steps, time = figures["status"], f"{figures['steps']} steps", figures["final"]["time"]
+    if status in FINISHED:
+        return f"{status} at t = {time:g} s, {steps}"
+    return f"{status}, {steps}; " + ("no sample was reached" if time is None else f"the last sample is t = {time:g} s")
+
+
 def _report(figures: dict, data: xr.Dataset) -> None:
     out = plain_console()
     final = figures["final"]
-    out.print(f"{figures['mechanism']}: {figures['status']} at t = {final['time']:g} s, {figures['steps']} steps")
+    out.print(f"{figures['mechanism']}: {_ended(figures)}")
     if figures["event"]:
         out.print(figures["message"], soft_wrap=True)
     # Points that segments made by the program hang together at are left out.

@@ -55,7 +55,9 @@ def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
     wanted = names or list(model.study.modes) or [mode.name for mode in model.mechanism.modes]
     if not wanted:
         raise InputError(
-            "no actuation mode to run", field="--mode", remedy="name one, or add [study] modes to the file"
+            "no actuation mode to run",
+            field="--mode",
+            remedy="name one (paraflex modes lists what there is), or add [study] modes to the file",
         )
     try:
         return list(dict.fromkeys(parse_mode(model.mechanism, name) for name in wanted))

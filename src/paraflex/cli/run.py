@@ -15,6 +15,7 @@ from paraflex.checks import check_planned
 from paraflex.cli.collected import collected
 from paraflex.cli.integration import IntegrationRequest, check_stops, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
+from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
@@ -71,6 +72,7 @@ def run_command(request: RunRequest) -> int:
     modes = find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     folder = results_folder(request.out)
+    say_replaced(folder, "run")
     mechanism = asked_mechanism(model, request)
     if request.segments is None:
         check_stops(mechanism, options, request.integration)

@@ -13,6 +13,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import COMPLETE, study_folder
 from paraflex.cli.tables import number, plain_console, warn_of_parts
 from paraflex.errors import InputError, OutputError
@@ -50,6 +51,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     asked = digest([setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics, at])
     with held(folder):
         _claim(folder, asked)
+        say_replaced(folder, "sensitivity")
         found = sensitivities(study, at=at)
         figures = {"content": asked} | found.told()
         _write(folder, figures, found)

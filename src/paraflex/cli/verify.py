@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from paraflex.cli.agreement import print_agreement
+from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
@@ -62,6 +63,7 @@ def verify_command(request: VerifyRequest) -> int:
     for name in models:
         check_model(name, mechanism)
     folder = results_folder(request.out)
+    say_replaced(folder, "verification")
     for geometry in Geometry:
         if geometry is Geometry.LINEAR or "second-order" in models:
             compile_kernels(geometry, console.print)

@@ -17,6 +17,8 @@ from paraflex.files.expressions import evaluate_parameters
 # A mechanism written by hand is some kilobytes; far more is a wrong file, and parsing it would only take long.
 _LARGEST_FILE = 5_000_000
 
+# The field that says of which kind a table is, in every file.
+_TAG = "type"
 _NO_TABLE = ("dict_type", "model_type", "model_attributes_type")
 
 T = typing.TypeVar("T", bound=BaseModel)
@@ -97,18 +99,47 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
         remedy = f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
         return InputError("unknown field", field=field, value=value, remedy=remedy, source=source)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        tags = problem.get("ctx", {}).get("expected_tags", "")
-        got = value.get("type") if isinstance(value, dict) else value
-        return InputError("unknown type", field=f"{field}.type", value=got, remedy=f"use {tags}", source=source)
+        return _tag_problem(_tags(schema, problem["loc"]), field, value, source)
     if kind == "expression":
         said = problem.get("ctx", {})
         remedy = f"give {description}; {said.get('remedy')}"
         return InputError(said.get("problem", ""), field=field, value=value, remedy=remedy, source=source)
     if kind in _NO_TABLE:
         return InputError("should be a table", field=field, value=value, remedy=f"give {description}", source=source)
+    if kind == "literal_error":
+        allowed = problem.get("ctx", {}).get("expected", "")
+        near = get_close_matches(str(value), re.findall("'([^']*)'", allowed), n=1)
+        remedy = f'did you mean "{near[0]}"?' if near else f"give {description}"
+        return InputError(f"should be {allowed}", field=field, value=value, remedy=remedy, source=source)
     message = problem["msg"].removeprefix("Input ").replace(" after validation", "")
     text = message[0].lower() + message[1:]
     return InputError(text, field=field, value=value, remedy=f"give {description}", source=source)
+
+
+def _tag_problem(tags: list[str], table: str, value: Any, source: str) -> InputError:
+    """What is wrong with the field that says of which kind a table is."""
+    choice = " or ".join([", ".join(f'"{tag}"' for tag in tags[:-1]), f'"{tags[-1]}"'])
+    given = value if isinstance(value, dict) else {}
+    if _TAG in given:
+        near = get_close_matches(str(given[_TAG]), tags, n=1)
+        remedy = f'did you mean "{near[0]}"? it may be {choice}' if near else f"it may be {choice}"
+        return InputError("unknown type", field=f"{table}.{_TAG}", value=given[_TAG], remedy=remedy, source=source)
+    near = get_close_matches(_TAG, given, n=1)
+    if near:
+        remedy = f'did you mean "{_TAG}"?'
+        return InputError(
+            "unknown field", field=f"{table}.{near[0]}", value=given[near[0]], remedy=remedy, source=source
+        )
+    return InputError("is missing", field=f"{table}.{_TAG}", remedy=f"it may be {choice}", source=source)
+
+
+def _tags(schema: type[BaseModel], location: tuple) -> list[str]:
+    """What the `type` of a body, path or load may be."""
+    annotation: Any = schema.model_fields[str(location[0])].annotation
+    while typing.get_origin(annotation) in (dict, typing.Annotated):
+        annotation = typing.get_args(annotation)[0 if typing.get_origin(annotation) is typing.Annotated else -1]
+    kinds = [variant.model_fields[_TAG].annotation for variant in typing.get_args(annotation)]
+    return [tag for kind in kinds for tag in typing.get_args(kind)]
 
 
 def _fields(schema: type[BaseModel], problem: Any) -> list:

@@ -45,6 +45,7 @@ def integrate(
     *,
     knots: NDArray[np.float64] | None = None,
     options: IntegrationOptions | None = None,
+    begun: Solution | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Solution:
     """Integrate a system from an initial state.
@@ -61,6 +62,8 @@ def integrate(
     knots : array, optional
         Times at which the signals are not smooth; steps end there.
     options : IntegrationOptions, optional
+    begun : Solution, optional
+        The part of the run that this one goes on from: its steps count towards those of the options, and in errors.
     on_progress : callable, optional
         Told the time reached [s] every few milliseconds. A KeyboardInterrupt, in it or elsewhere, ends the run with
         what is there, marked "interrupted".
@@ -89,12 +92,13 @@ def integrate(
     run = prepare(problem, options)
     status, message, bent, drift, now = "complete", "", "", "", None
     code, limits = PAUSED, (run.dependent_rows, options.tolerance)
+    most = options.max_steps - (0 if begun is None else begun.steps + begun.rejected)
     try:
         run.start()
         while code == PAUSED:
-            if run.attempts >= options.max_steps:
+            if run.attempts >= most:
                 break
-            code, crossing = advance(run, gauges, min(_SLICE, options.max_steps - run.attempts))
+            code, crossing = advance(run, gauges, min(_SLICE, most - run.attempts))
             if crossing is not None:
                 status, message = "stopped", crossing.message
                 break
@@ -118,7 +122,7 @@ def integrate(
         error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)})"
     elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
         error, cause = SingularPositionError, _before_singular(options.method, run.singular_ahead)
-    moment = Moment(now.t, solution.steps)
+    moment = Moment(now.t, solution.steps + (0 if begun is None else begun.steps))
     raise error(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
 
 

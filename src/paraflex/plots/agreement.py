@@ -187,7 +187,7 @@ def model_distances(data: xr.Dataset) -> Figure:
                 distance = np.linalg.norm(place - other, axis=1)
                 shown = np.where(distance > _SHORTEST, distance, np.nan)
                 draw_actual(panel, run, time, 1e3 * shown, label=printed(name), **look)
-        for panel, title in zip(column, ("from the desired path", f"from {printed(reference)}"), strict=True):
+        for panel, title in zip(column, ("from the desired place", f"from {printed(reference)}"), strict=True):
             shade_rest(panel, data)
             panel.set_title(f"{mode_label(mode)}: distance {title}")
             if any(peak(np.asarray(line.get_ydata(), dtype=float)) > 0.0 for line in panel.lines):

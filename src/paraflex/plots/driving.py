@@ -116,7 +116,8 @@ def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
     InputError
         No mode has a condition number: there was no path.
     """
-    known = [row for row in rows if np.isfinite(row.get("condition_max", np.nan))]
+    # None is an infinite one.
+    known = [row for row in rows if np.isfinite(row.get("condition_max") or np.nan)]
     if not known:
         raise InputError("no condition numbers: the mechanism has no path", field="modes", remedy="name one: --path")
     figure, axes = panels(1, 1, width=ONE_COLUMN)

@@ -81,7 +81,7 @@ METRIC_NAMES = {
     "strain_energy_max": "largest strain energy",
     "kinetic_energy_max": "largest kinetic energy",
     "total_mass": "mass",
-    "actuation_condition_max": "condition number",
+    "actuation_condition_max": "largest condition number",
 }
 
 

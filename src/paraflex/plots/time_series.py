@@ -24,7 +24,7 @@ _MOST_NARROW = 4
 
 @journal_style()
 def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = None) -> Figure:
-    """Axial and transverse displacement and slope of links' end points in their body frames (Fig. 13).
+    """Axial and transverse displacement and slope of links' last ends from the tangents at their first ends (Fig. 13).
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def most_deflected(run: xr.Dataset) -> list[str]:
 
 @journal_style()
 def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Transverse displacement of the end points of links in their body frames; of more than seven, of the largest.
+    """Transverse displacement of links' last ends from the tangents at their first; of more than seven, of the largest.
 
     Parameters
     ----------

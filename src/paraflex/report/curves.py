@@ -17,6 +17,9 @@ from paraflex.report.text import symbol
 COLOURS, DASHES = 8, 5
 DOTTED = 2
 MOST_SAMPLES = 2000
+# What the charts of tip displacements show: a deflection is from a link's chord.
+TIP_TITLE, TIP_LABEL = "Displacements of the links' ends across them", "transverse displacement of the tip"
+TIP_NOTE = "Of a link's last end from the tangent at its first end."
 
 
 class Unit(NamedTuple):

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import xarray as xr
 
-from paraflex.report.curves import Unit, followed, look, thinned, unit_for
+from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, Unit, followed, look, thinned, unit_for
 from paraflex.report.film import NO_SHAPES, film
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
@@ -80,8 +80,8 @@ def _panels(data: xr.Dataset) -> list[Panel]:
     bent = [b for b in range(len(bodies)) if largest(data["tip_transverse"].values[:, b]) > 0.0]
     if bent:
         names, values = [bodies[b] for b in bent], data["tip_transverse"].values[None, :, bent]
-        motion.append(followed("deflections", "Deflections", "transverse deflection of the tip", "m", values, names,
-                               _ALONE, note="Of a body's last end, across the body, in its own frame."))  # fmt: skip
+        motion.append(followed("deflections", TIP_TITLE, TIP_LABEL, "m", values, names,
+                               _ALONE, note=TIP_NOTE))  # fmt: skip
     motion.append(_phases(data, bodies))
     points = _points(data)
     if points is not None:
@@ -154,8 +154,12 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
 
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    tiles = [("status", str(data["status"].item()), f"t = {_last_time(data):.4g} s")]
-    deflections = np.abs(data["tip_transverse"].values)
+    status = str(data["status"].item())
+    last = "" if status in ("complete", "stopped") else "last sample "
+    tiles = [("status", status, f"{last}t = {_last_time(data):.4g} s")]
+    # Of earlier results those of their ends.
+    name = "deflection" if "deflection" in data else "tip_transverse"
+    deflections = np.abs(data[name].transpose("time", "body").values)
     if largest(deflections) > 0.0:
         unit = unit_for("m", deflections)
         body = int(np.argmax([largest(one) for one in deflections.T]))

@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from paraflex.report.choice import Picked, drawn_rows
-from paraflex.report.curves import compared, followed, plane_path, thinned
+from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, compared, followed, plane_path, thinned
 from paraflex.report.designs import Studied, columns, metric_name, reasons, shown_unit
 from paraflex.report.film import film
 from paraflex.report.page import Page, Panel
@@ -92,7 +93,9 @@ def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount
     logarithmic = [name for name, one in account.parameters.items() if one.spread == "log"]
     drawn = columns(studied, rows, units, logarithmic)
     few = None if data is None else data.isel(time=thinned(data.sizes["time"]))
-    missing = dict(account.failed) | dict.fromkeys(others, "it has other bodies, joints or elements than the first")
+    missing = dict(account.failed) | dict.fromkeys(
+        others, "it has other bodies, joints, motors or springs than the first"
+    )
     return Page(
         title=account.name,
         kind=account.kind,
@@ -117,7 +120,7 @@ def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Datase
     """Runs of one mechanism with different numbers as one dataset, on the longest of their times; NaN after an end."""
     longest = max((one["time"].values for one in runs), key=lambda time: time[-1])
     parts = []
-    for one in runs:
+    for one in _with_as_many_stations(runs):
         kept = one[[name for name in _KEPT if name in one]].isel(mode=0)
         kept = kept.drop_vars([name for name in kept.coords if name not in _COORDINATES])
         same = np.array_equal(one["time"].values, longest)
@@ -129,10 +132,41 @@ def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Datase
 
 
 def _of_one_kind(runs: Mapping[int, xr.Dataset]) -> tuple[dict[int, xr.Dataset], list[int]]:
-    """Runs with as many drawn points, bodies and joints as the first, and the rows of the others."""
-    sizes = {row: {dim: size for dim, size in one.sizes.items() if dim != "time"} for row, one in runs.items()}
-    first = next(iter(sizes.values()), None)
-    return {row: one for row, one in runs.items() if sizes[row] == first}, [r for r in runs if sizes[r] != first]
+    """Runs with the bodies, joints, motors and springs of the first, and the rows of the others."""
+    kinds = {row: _kind(one) for row, one in runs.items()}
+    first = next(iter(kinds.values()), None)
+    return {row: one for row, one in runs.items() if kinds[row] == first}, [r for r in runs if kinds[r] != first]
+
+
+def _kind(run: xr.Dataset) -> tuple:
+    """What two runs have in common that are drawn with the same links; how many stations each has may differ."""
+    names = [tuple(map(str, run[dim].values)) for dim in ("body", "joint", "motor")]
+    springs = run["spring_position"].shape[1:] if "spring_position" in run else ()
+    return (*names, tuple(dict.fromkeys(map(str, _station_bodies(run)))), springs)
+
+
+def _with_as_many_stations(runs: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Runs whose bodies are drawn by as many stations as in the run that has most: some stand twice, none is moved.
+
+    A parameter that moves a point along a beam changes how many there are between its points.
+    """
+    names = [_station_bodies(run) for run in runs]
+    if all(np.array_equal(each, names[0]) for each in names):
+        return list(runs)
+    most = {name: max(int(np.sum(each == name)) for each in names) for name in dict.fromkeys(names[0])}
+    return [run.isel(station=_spread(each, most)) for run, each in zip(runs, names, strict=True)]
+
+
+def _spread(names: NDArray[np.str_], most: Mapping[str, int]) -> NDArray[np.intp]:
+    """Stations, each at least once, so that every body has as many as wanted."""
+    own = {name: np.flatnonzero(names == name) for name in most}
+    return np.concatenate([
+        places[np.rint(np.linspace(0, places.size - 1, most[name])).astype(np.intp)] for name, places in own.items()
+    ])  # fmt: skip
+
+
+def _station_bodies(run: xr.Dataset) -> NDArray[np.str_]:
+    return run["station_body"].values if "station_body" in run else np.zeros(0, dtype=str)
 
 
 def _subtitle(studied: Studied, account: StudyAccount) -> str:
@@ -237,9 +271,9 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     bent = [b for b in range(len(bodies)) if np.nanmax(np.abs(deflection[:, :, b]), initial=0.0) > 0.0]
     if bent:
         charts.append(followed(
-            "deflections", "Deflections of the links", "transverse deflection of the tip", "m", deflection[:, :, bent],
+            "deflections", TIP_TITLE, TIP_LABEL, "m", deflection[:, :, bent],
             [bodies[b] for b in bent], runs, selecting="design",
-            note="Of a link's last end, across the link, in its own frame.",
+            note=TIP_NOTE,
         ))  # fmt: skip
     energy = data["strain_energy"].transpose("mode", "time").values
     charts.append(compared("strain", "Strain energy", "strain energy", "J", energy, runs))

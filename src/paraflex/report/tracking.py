@@ -9,7 +9,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.plots.runs import default_mode
-from paraflex.report.curves import DOTTED, compared, followed, look, plane_path, thinned, unit_for
+from paraflex.report.curves import (
+    DOTTED,
+    TIP_LABEL,
+    TIP_NOTE,
+    TIP_TITLE,
+    compared,
+    followed,
+    look,
+    plane_path,
+    thinned,
+    unit_for,
+)
 from paraflex.report.film import NO_SHAPES, film
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
@@ -165,10 +176,10 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
         Panel("Motors", [
             followed("torques", effort, effort.split()[1][:-1], torque_unit(data), data["torque"].values, motors, runs,
                      choosing="motor"),
-            compared("condition", "Distance from singular positions", "condition number", "1",
+            compared("condition", "Condition number of the actuation matrix", "condition number", "1",
                      data["actuation_condition"].values, runs, log=True,
-                     note="Condition number of the matrix from motor torques to forces along the path: it grows "
-                          "without bound where the active motors lose control of a direction."),
+                     note="Of the matrix from motor torques to forces along the path: it grows without bound towards "
+                          "positions where the active motors lose control of a direction."),
         ]),
     ]  # fmt: skip
     links = [
@@ -181,13 +192,13 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     if bent:
         names = [bodies[b] for b in bent]
         links.insert(0, followed(
-            "deflections", "Deflections of the links", "transverse deflection of the tip", "m",
+            "deflections", TIP_TITLE, TIP_LABEL, "m",
             data["tip_transverse"].values[:, :, bent], names, runs,
-            note="Of a link's last end, across the link, in its own frame.",
+            note=TIP_NOTE,
         ))  # fmt: skip
         links.insert(1, followed(
-            "axial", "Axial displacements", "axial displacement of the tip", "m",
-            data["tip_axial"].values[:, :, bent], names, runs,
+            "axial", "Displacements of the links' ends along them", "axial displacement of the tip", "m",
+            data["tip_axial"].values[:, :, bent], names, runs, note=TIP_NOTE,
         ))  # fmt: skip
     return [*charts, Panel("Links", links), Panel("Energies", [energies(data, runs), _strain(data, runs)])]
 

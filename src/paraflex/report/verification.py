@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.plots.agreement import printed
 from paraflex.plots.workspace import round_magnification
-from paraflex.report.curves import look, thinned, unit_for
+from paraflex.report.curves import TIP_LABEL, TIP_TITLE, look, thinned, unit_for
 from paraflex.report.film import NO_SHAPES, film
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, verify_command_line
@@ -166,7 +166,7 @@ def _panels(data: xr.Dataset, runs: _Runs, reference: str) -> list[Panel]:
     name = printed(reference)
     return [
         Panel("End-effector", [
-            _one("errors", "Distance from the desired path", "distance", "m", gaps, runs, log=True),
+            _one("errors", "Tracking error: distance from the desired place", "distance", "m", gaps, runs, log=True),
             _one("apart", f"Distance from {name}", "distance", "m", apart, runs, log=True),
             _paths(data, runs),
         ]),
@@ -177,7 +177,7 @@ def _panels(data: xr.Dataset, runs: _Runs, reference: str) -> list[Panel]:
             _links("rates", "Link angular velocities", "angular velocity", "rad/s", data, "chord_velocity", runs),
             _links("rate_differences", f"Link angular velocities, difference from {name}", "difference", "rad/s", data,
                    "chord_velocity", runs, datum),
-            _links("deflections", "Deflections of the links", "transverse deflection of the tip", "m", data,
+            _links("deflections", TIP_TITLE, TIP_LABEL, "m", data,
                    "tip_transverse", runs),
         ]),
         Panel("Motors and energies", [

@@ -92,7 +92,7 @@ _COMMENTS = {
     "torque": "on the joint's second body: positive turns it anticlockwise or moves it along the axis",
     "applied_torque": "as `torque` of a run along a path",
     "angle": "of the body frame's x axis against the ground's, anticlockwise",
-    "tip_transverse": "along y of the body frame, which is its x axis turned anticlockwise",
+    "tip_transverse": "across the tangent at the first end of the link, positive to its left: anticlockwise",
     "tip_slope": "anticlockwise",
 }
 

@@ -69,8 +69,11 @@ def _verdict(run: TrackingRun | MotionRun) -> str:
 
 
 def _ended(solution: Solution) -> str:
-    until = f" at t = {solution.t[-1]:.4g} s" if solution.t.size else ""
-    return f"{solution.status}{until}"
+    if not solution.t.size:
+        return solution.status
+    # A run fails after its last sample: its message says when.
+    until = " at" if solution.status in ("complete", "stopped") else ", its last sample at"
+    return f"{solution.status}{until} t = {solution.t[-1]:.4g} s"
 
 
 def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:

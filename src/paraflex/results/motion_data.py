@@ -134,8 +134,9 @@ def motion_dataset(
 
 
 def motion_summary(data: xr.Dataset) -> dict[str, Any]:
-    """The run's figures as plain numbers; None for what it did not reach."""
-    last = data.isel(time=-1)
+    """The run's figures as plain numbers; `final` is its last sample, None for one that reached none."""
+    reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
+    last = data.isel(time=reached[-1] if reached.size else 0)
     figures: dict[str, Any] = {name: data[name].item() for name in FIGURES}
     figures = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in figures.items()}
     return {
@@ -145,7 +146,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "validity": validity_summary(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
-            "time": float(last["time"]),
+            "time": float(last["time"]) if reached.size else None,
             "angle": _numbers(last["angle"], "body"),
             "point_position": {
                 str(point): [finite_or_none(x) for x in last["point_position"].sel(point=point).values]

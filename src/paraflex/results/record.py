@@ -64,8 +64,8 @@ class Record:
         Of the line from a beam's first end to its last, which no choice of frame touches; of a modal body's first
         point to its last, less its angle undeformed; a rigid body's angle [rad, rad/s].
     tip : (k, bodies, 3) array
-        Axial, transverse displacement and slope of a beam's last end (a modal body's last point) in its body frame
-        [m, m, rad].
+        Axial, transverse displacement and slope of a beam's last end (a modal body's last point) from the tangent at
+        its first end [m, m, rad].
     points : (k, points, 2) array
         Positions [m].
     joint_force : (k, joints, 2) array

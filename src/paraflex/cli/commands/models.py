@@ -6,14 +6,24 @@ from typing import Annotated
 
 import typer
 
-from paraflex.cli.commands.options import AssemblyOption, Json, PathOption, Source
+from paraflex.cli.commands.options import (
+    DEFAULT_MODEL,
+    AssemblyOption,
+    Json,
+    MechanismOption,
+    ModelArgument,
+    PathOption,
+    model_named,
+)
 
 
-def modes(source: Source = "raparm_i", path: PathOption = None, json: Json = False) -> None:
+def modes(
+    source: ModelArgument = None, mechanism: MechanismOption = None, path: PathOption = None, json: Json = False
+) -> None:
     """List the actuation modes and how well each can drive the path."""
     from paraflex.cli.modes import modes_command
 
-    modes_command(source, path, json)
+    modes_command(model_named(source, mechanism) or DEFAULT_MODEL, path, json)
 
 
 def methods(json: Json = False) -> None:
@@ -27,6 +37,7 @@ def info(
     source: Annotated[
         str | None, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file; all of the library.")
     ] = None,
+    mechanism: MechanismOption = None,
     assembly: AssemblyOption = None,
     path: PathOption = None,
     at: Annotated[
@@ -43,7 +54,7 @@ def info(
     """
     from paraflex.cli.inspect import InfoRequest, info_command
 
-    raise typer.Exit(info_command(InfoRequest(source, assembly, path, at, balanced, json)))
+    raise typer.Exit(info_command(InfoRequest(model_named(source, mechanism), assembly, path, at, balanced, json)))
 
 
 def new(

@@ -6,6 +6,11 @@ from typing import Annotated
 
 import typer
 
+from paraflex.errors import InputError
+
+# What a command runs of which no model is named.
+DEFAULT_MODEL = "raparm_i"
+
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 PathOption = Annotated[
     str | None,
@@ -13,8 +18,12 @@ PathOption = Annotated[
         "--path", metavar="NAME|FILE", help="A path of the model (square, line, circle, ...) or a TOML file with one."
     ),
 ]
+ModelArgument = Annotated[
+    str | None,
+    typer.Argument(metavar="NAME|FILE", help=f"A library mechanism or a TOML file. Default: {DEFAULT_MODEL}."),
+]
 MechanismOption = Annotated[
-    str, typer.Option("--mechanism", "-m", metavar="NAME|FILE", help="A library mechanism or a TOML file.")
+    str | None, typer.Option("--mechanism", "-m", metavar="NAME|FILE", help="The same, named by an option.")
 ]
 DurationOption = Annotated[float | None, typer.Option(metavar="S", help="Duration, dwell included.")]
 SamplesOption = Annotated[int | None, typer.Option(metavar="N", help="Samples kept.")]
@@ -41,7 +50,6 @@ ClusterOption = Annotated[
     ),
 ]
 ReportOption = Annotated[bool, typer.Option("--report/--no-report", help="Write report.html, or leave it out.")]
-Source = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file.")]
 ReferenceOption = Annotated[
     str | None,
     typer.Option(metavar="pinned|cantilever|free", help="How frames are fixed to beams. Default: the model's."),
@@ -50,3 +58,19 @@ CurvatureOption = Annotated[
     str | None,
     typer.Option(metavar="separate|shared", help="Curvature of beams at lumped inertias. Default: the model's."),
 ]
+
+
+def model_named(argument: str | None, option: str | None) -> str | None:
+    """The model that a command line names, by its argument or by --mechanism; None where it names none.
+
+    Raises
+    ------
+    InputError
+        Both name one, and not the same.
+    """
+    if argument is not None and option is not None and argument != option:
+        raise InputError(
+            f"two models are named, {argument!r} and --mechanism {option!r}", field="--mechanism",
+            remedy="name one of them",
+        )  # fmt: skip
+    return option if argument is None else argument

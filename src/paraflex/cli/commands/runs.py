@@ -7,21 +7,25 @@ from typing import Annotated
 import typer
 
 from paraflex.cli.commands.options import (
+    DEFAULT_MODEL,
     AssemblyOption,
     CurvatureOption,
     DurationOption,
     Json,
     MechanismOption,
     MethodOption,
+    ModelArgument,
     PathOption,
     ReferenceOption,
     ReportOption,
     SamplesOption,
+    model_named,
 )
 
 
 def run(
-    mechanism: MechanismOption = "raparm_i",
+    source: ModelArgument = None,
+    mechanism: MechanismOption = None,
     path: PathOption = None,
     mode: Annotated[
         list[str] | None,
@@ -103,7 +107,7 @@ def run(
         stop_at=stop_at or [],
     )
     request = RunRequest(
-        mechanism=mechanism,
+        mechanism=model_named(source, mechanism) or DEFAULT_MODEL,
         path=path,
         modes=mode or [],
         duration=duration,
@@ -126,7 +130,8 @@ def run(
 
 
 def verify(
-    mechanism: MechanismOption = "raparm_i",
+    source: ModelArgument = None,
+    mechanism: MechanismOption = None,
     path: PathOption = None,
     mode: Annotated[
         list[str] | None,
@@ -161,7 +166,7 @@ def verify(
     from paraflex.cli.verify import VerifyRequest, verify_command
 
     request = VerifyRequest(
-        mechanism=mechanism,
+        mechanism=model_named(source, mechanism) or DEFAULT_MODEL,
         path=path,
         modes=mode or [],
         tolerance=tol,
@@ -182,7 +187,8 @@ def verify(
 
 
 def compare_methods(
-    mechanism: MechanismOption = "raparm_i",
+    source: ModelArgument = None,
+    mechanism: MechanismOption = None,
     path: PathOption = None,
     mode: Annotated[
         str | None, typer.Option(metavar="MODE", help="Actuation mode. Default: the study's with most motors.")
@@ -209,7 +215,7 @@ def compare_methods(
     from paraflex.cli.compare import CompareRequest, compare_command
 
     request = CompareRequest(
-        mechanism=mechanism,
+        mechanism=model_named(source, mechanism) or DEFAULT_MODEL,
         path=path,
         modes=[] if mode is None else [mode],
         duration=duration,

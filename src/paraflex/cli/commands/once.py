@@ -1,0 +1,57 @@
+"""Commands whose options are given once, unless their help calls them repeatable."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+from typer.core import TyperCommand, TyperOption
+
+from paraflex.errors import InputError
+
+
+class Command(TyperCommand):
+    """A command that refuses a second value of an option that takes one."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse as every command does; before that, look for options given twice.
+
+        Raises
+        ------
+        InputError
+            An option of one value is given twice, or a switch on and off.
+        """
+        if not ctx.resilient_parsing:  # in completion, where the line is not yet whole
+            self._refuse_second_values(ctx, list(args))
+        return super().parse_args(ctx, args)
+
+    def _refuse_second_values(self, ctx: Any, args: list[str]) -> None:
+        twin = copy.copy(self)
+        twin.params = [_repeatable(param) for param in self.params]
+        given, _, _ = twin.make_parser(ctx).parse_args(args=args)
+        for option in self.params:
+            if not isinstance(option, TyperOption) or option.multiple or not option.name:
+                continue
+            values = given.get(option.name) or []
+            # A switch given twice says the same twice.
+            if len(set(values) if option.is_flag else values) > 1:
+                raise _given_twice(option, values)
+
+
+def _repeatable(param: Any) -> Any:
+    if not isinstance(param, TyperOption) or param.multiple:
+        return param
+    twin = copy.copy(param)
+    twin.multiple = True
+    return twin
+
+
+def _given_twice(option: TyperOption, values: list[Any]) -> InputError:
+    longest = max(option.opts, key=len)
+    if option.is_flag:
+        names = [longest if value else option.secondary_opts[0] for value in values]
+        return InputError("given on and off", field=longest, value=" ".join(names), remedy="leave one of them out")
+    return InputError(
+        f"given {len(values)} times", field=longest, value=", ".join(map(str, values)),
+        remedy="it takes one value: leave the others out",
+    )  # fmt: skip

@@ -1,0 +1,89 @@
+"""Options that commands share: one value each, and one way to name a model."""
+
+import pytest
+from typer.main import get_command
+
+from paraflex.cli import app as program
+from paraflex.errors import InputError
+
+COMMANDS = get_command(program.app).commands
+NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}
+STUDIES = ("sensitivity", "sweep", "optimise", "optimize", "identify", "indices")
+NEEDED |= {name: ["study.toml"] for name in STUDIES}
+MODEL_COMMANDS = ("run", "verify", "compare-methods", "modes", "info")
+
+
+def options():
+    """Every option of every command that takes one value."""
+    for name, command in COMMANDS.items():
+        for parameter in command.params:
+            if parameter.opts[0].startswith("-") and not parameter.is_flag and not parameter.multiple:
+                yield pytest.param(name, parameter, id=f"{name} {parameter.opts[0]}")
+
+
+@pytest.mark.parametrize(("name", "parameter"), [*options()])
+def test_a_second_value_of_an_option_is_refused(name, parameter):
+    longest = max(parameter.opts, key=len)
+    # The two spellings, where there are two, are one option; the values are given in both ways.
+    line = [*NEEDED.get(name, []), parameter.opts[0], "7", f"{longest}=8"]
+    with pytest.raises(InputError) as error:
+        COMMANDS[name].make_context(name, line)
+    assert error.value.field == longest
+    assert error.value.value == "7, 8"
+
+
+def test_options_of_several_values_take_them():
+    context = COMMANDS["run"].make_context("run", ["--mode", "++++", "--mode", "+-+-", "--stop-at", "singular=0.1"])
+    assert context.params["mode"] == ["++++", "+-+-"]
+    assert context.params["stop_at"] == ["singular=0.1"]
+
+
+def test_a_switch_on_and_off_is_refused_and_twice_on_is_not():
+    with pytest.raises(InputError, match="--report: given on and off"):
+        COMMANDS["run"].make_context("run", ["--no-report", "--report"])
+    assert COMMANDS["run"].make_context("run", ["--json", "--json"]).params["json"] is True
+
+
+def called(monkeypatch, command, line):
+    """The model that a command would load."""
+    loaded = []
+
+    def load(name):
+        loaded.append(name)
+        raise InputError("enough", field="test")
+
+    for module in ("run", "verify", "compare", "modes", "inspect"):
+        monkeypatch.setattr(f"paraflex.cli.{module}.load", load)
+    with pytest.raises(InputError, match="enough"):
+        COMMANDS[command].main([*line], standalone_mode=False)
+    return loaded
+
+
+@pytest.mark.parametrize("command", MODEL_COMMANDS)
+@pytest.mark.parametrize(
+    "line", [["five_bar"], ["-m", "five_bar"], ["--mechanism", "five_bar"], ["five_bar", "-m", "five_bar"]]
+)
+def test_models_are_named_by_argument_or_option(monkeypatch, command, line):
+    assert called(monkeypatch, command, line) == ["five_bar"]
+
+
+@pytest.mark.parametrize("command", [name for name in MODEL_COMMANDS if name != "info"])
+def test_without_a_name_it_is_the_papers(monkeypatch, command):
+    assert called(monkeypatch, command, []) == ["raparm_i"]
+
+
+@pytest.mark.parametrize("command", MODEL_COMMANDS)
+def test_two_different_models_are_refused_with_exit_code_2(monkeypatch, capsys, command):
+    monkeypatch.setattr("sys.argv", ["paraflex", command, "five_bar", "--mechanism", "raparm_i"])
+    with pytest.raises(SystemExit) as end:
+        program.main()
+    assert end.value.code == 2
+    says = "error: --mechanism: two models are named, 'five_bar' and --mechanism 'raparm_i'; name one of them\n"
+    assert capsys.readouterr().err == says
+
+
+def test_every_command_with_a_mechanism_takes_both():
+    with_option = [name for name, each in COMMANDS.items() if any("--mechanism" in one.opts for one in each.params)]
+    assert sorted(with_option) == sorted(MODEL_COMMANDS)
+    for name in MODEL_COMMANDS:
+        assert any(one.opts == ["source"] for one in COMMANDS[name].params), name
