@@ -15,11 +15,12 @@ from paraflex.display import shown
 from paraflex.dynamics import (
     State,
     System,
+    balanced_state,
     brake,
     build_system,
     constant_signals,
+    joint_motions,
     pack_signals,
-    static_equilibrium,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError, as_enum
@@ -142,21 +143,20 @@ class TrackingTask:
         )
 
     def balanced(self, mode: str | ActuationMode) -> TrackingTask:
-        """The same task, starting from static equilibrium with the active motors of a mode held where the path begins.
+        """The same task, starting balanced: the active motors of a mode stand, or move, as where the path begins.
 
-        Under weight or loads links sag before they move; started undeformed they would ring about that.
+        Under weight or loads links sag before they move; started undeformed they would ring about that. On a path that
+        starts in motion inertia forces of that motion deflect them as well: see `dynamics.balanced_state`.
 
         Raises
         ------
-        InputError
-            The path does not start at rest.
         AssemblyError
             No equilibrium is found.
         """
-        if np.any(self.motion.v[0]):
-            raise InputError("the path does not start at rest", field="path", remedy="start undeformed")
         joints = [motor.joint for motor in self.mechanism.motors if motor.name in self.mode(mode).motors]
-        return replace(self, start=static_equilibrium(self.system, self.start, joints))
+        rigid = self.motion
+        driven = joint_motions(rigid.system, rigid.q[0], rigid.v[0], rigid.a[0], joints)
+        return replace(self, start=balanced_state(self.system, self.start, driven))
 
     def simulate(
         self,

@@ -9,6 +9,7 @@ from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joi
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.numbers import blocks_of, numbers_of, same_layout, with_numbers
 from paraflex.dynamics.packing import records
+from paraflex.dynamics.quasi_static import JointMotion, balanced_state, joint_motions
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.reduction import MissedTurn, missed_turns
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
@@ -32,6 +33,7 @@ __all__ = [
     "Dependence",
     "InputSignals",
     "JointCoordinate",
+    "JointMotion",
     "Marker",
     "MissedTurn",
     "Mobility",
@@ -43,6 +45,7 @@ __all__ = [
     "Vibration",
     "across_chord",
     "axis_angle",
+    "balanced_state",
     "blocks_of",
     "brake",
     "build_system",
@@ -52,6 +55,7 @@ __all__ = [
     "dependence",
     "end_markers",
     "joint_coordinate",
+    "joint_motions",
     "material_angle",
     "missed_turns",
     "mobility",

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.dynamics.system import System
 from paraflex.kernel.bodies import motion_forces
@@ -64,6 +65,20 @@ def stiffness_diagonal(system: System) -> NDArray[np.float64]:
     for body in system.bodies:
         diagonal[body.flexible] = body.modes.omega**2
     return diagonal
+
+
+def elastic_stiffness(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:
+    """Stiffness (n, n) that keeps links and the springs at joints in shape: omega^2 of modes, J^T k J of springs.
+
+    Finite segments are held in line by springs at joints alone.
+    """
+    stiffness = scipy.sparse.diags(stiffness_diagonal(system))
+    springs = system.mechanism.springs
+    if springs:
+        rows = [scipy.sparse.csr_matrix(joint_coordinate(system, spring.joint, q[None]).rows) for spring in springs]
+        J = scipy.sparse.vstack(rows)
+        stiffness = stiffness + J.T @ scipy.sparse.diags([spring.stiffness for spring in springs]) @ J
+    return scipy.sparse.csr_matrix(stiffness)
 
 
 def sparse_jacobian(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:
