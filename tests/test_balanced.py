@@ -15,6 +15,7 @@ from paraflex.dynamics import (
     consistent_state,
     joint_coordinate,
     moment_signals,
+    projection,
     static_equilibrium,
 )
 from paraflex.errors import AssemblyError
@@ -153,6 +154,16 @@ def test_segments_of_a_moving_link_start_in_line():
     assert np.max(strain[1]) < 0.8 * np.max(strain[0])
 
 
+def test_segments_start_in_line_with_sparse_matrices_too(monkeypatch):
+    mechanism = finite_segments(load("four_bar").mechanism, 4).mechanism
+    system = build_system(mechanism)
+    dense = consistent_state(system, mechanism.assembly())
+    monkeypatch.setattr(projection, "DENSE_ROWS", 0)
+    sparse = consistent_state(system, mechanism.assembly())
+    np.testing.assert_allclose(sparse.q, dense.q, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(sparse.v, dense.v, rtol=0, atol=1e-6)
+
+
 def test_large_systems_find_the_same_balance(monkeypatch):
     """Sparse and dense matrices, with a damper and friction at joints that the motion loads."""
     mechanism = dataclasses.replace(
@@ -162,6 +173,7 @@ def test_large_systems_find_the_same_balance(monkeypatch):
     )
     _, _, dense = start_of(mechanism)
     monkeypatch.setattr(equilibria, "_DENSE", 0)
+    monkeypatch.setattr(projection, "DENSE_ROWS", 0)
     _, _, sparse = start_of(mechanism)
     np.testing.assert_allclose(sparse.q, dense.q, rtol=0, atol=1e-11)
     np.testing.assert_allclose(sparse.v, dense.v, rtol=0, atol=1e-6)

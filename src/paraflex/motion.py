@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from paraflex.display import shown
 from paraflex.dynamics import State, System, build_system, consistent_state, constant_signals, pack_signals
-from paraflex.errors import InputError, IntegrationError, suggestion
+from paraflex.errors import InputError, IntegrationError, ResultWarning, suggestion
+from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.mechanism import Mechanism
 from paraflex.validity import Validity, assess, warn
@@ -80,7 +81,8 @@ def simulate_motion(
     on_progress : callable, optional
         Told the time reached [s].
     warning : bool
-        Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
+        Whether a run beyond what its model can describe issues a `ValidityWarning`, and one with findings a
+        `ResultWarning`; its `validity` and `solution.findings` say so either way.
 
     Raises
     ------
@@ -113,9 +115,14 @@ def simulate_motion(
             system, signals, state, times, knots=np.array(knots), options=options, on_progress=on_progress
         )
     except IntegrationError as error:
-        error.partial = MotionRun(system, times, values, error.partial)
+        error.partial = _run(system, times, values, error.partial)
         raise
-    run = MotionRun(system, solution.t if solution.event else times, values, solution)
+    run = _run(system, times, values, solution)
     if warning:
         warn(run.validity)
+        warn_of(solution.findings, ResultWarning)
     return run
+
+
+def _run(system: System, times: NDArray[np.float64], torques: Mapping[str, float], solution: Solution) -> MotionRun:
+    return MotionRun(system, solution.t if solution.event else times, torques, solution)

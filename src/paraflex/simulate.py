@@ -23,8 +23,10 @@ from paraflex.dynamics import (
     pack_signals,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
-from paraflex.errors import InputError, IntegrationError, as_enum
+from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
+from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
+from paraflex.integrators.beam_ends import leave_beam
 from paraflex.kinematics import Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 from paraflex.validity import Following, Validity, assess, warn
@@ -236,6 +238,7 @@ def plan_tracking(
     assembly: str | None = None,
     orientation: float = 0.0,
     after: Ending | str = Ending.FREE,
+    warning: bool = True,
 ) -> TrackingTask:
     """Plan a motion of the end-effector: joint motion of the rigid mechanism and what it asks of the motors.
 
@@ -253,11 +256,14 @@ def plan_tracking(
         Angle of the end-effector where it is a task coordinate and the path does not say it [rad].
     after : Ending or str
         What the active motors do after the path: "free" or "hold".
+    warning : bool
+        Whether a `ModelWarning` names points that the path takes off their beams, where `SlidingJoint.at_end` says
+        "warn".
 
     Raises
     ------
     InputError, AssemblyError, UnreachablePathError
-        See `kinematics.follow_path`.
+        See `kinematics.follow_path`; a path that takes a sliding point off its beam, where `at_end` says "error".
     """
     end = path.duration if duration is None else duration
     if not (np.isfinite(end) and end > 0.0):
@@ -268,6 +274,9 @@ def plan_tracking(
 
     follow = path_follower(mechanism, path, end, assembly=assembly, orientation=orientation)
     motion = follow(times)
+    left = leave_beam(motion.system, motion.t, motion.q, motion.v)
+    if warning:
+        warn_of(left)
     system = build_system(mechanism)
     return TrackingTask(
         mechanism=mechanism,
@@ -307,7 +316,8 @@ def simulate(
     on_progress : callable, optional
         Told the time reached [s].
     warning : bool
-        Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
+        Whether a run beyond what its model can describe issues a `ValidityWarning`, and one with findings a
+        `ResultWarning`; its `validity` and `solution.findings` say so either way.
 
     Returns
     -------
@@ -338,6 +348,7 @@ def simulate(
         raise
     if warning:
         warn(run.validity, f"mode {torques.mode.name}: ")
+        warn_of(run.solution.findings, ResultWarning)
     return run
 
 

@@ -23,7 +23,7 @@ def modes_command(source: str, path: str | None, as_json: bool) -> None:
     effort = None
     if model.mechanism.end_effector is not None and (path is not None or model.paths):
         effort = plan_tracking(
-            model.mechanism.rigid(), model.path(path), samples=201, orientation=model.study.orientation
+            model.mechanism.rigid(), model.path(path), samples=201, orientation=model.study.orientation, warning=False
         ).effort
     for mode in model.mechanism.modes:
         row: dict[str, Any] = {"mode": mode.name, "motors": list(mode.motors)}

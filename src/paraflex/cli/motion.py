@@ -30,6 +30,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary, save_results
+from paraflex.results.findings import findings_lines
 from paraflex.results.validity import validity_lines
 
 # Singular positions told one by one.
@@ -173,8 +174,8 @@ def _report(figures: dict, data: xr.Dataset) -> None:
         f"largest violation of constraints {figures['constraint_position_max']:.1e} m, "
         f"imbalance of energy {figures['energy_balance_max']:.1e} J"
     )
-    for line in validity_lines({"": figures["validity"]}):
-        out.print(line, soft_wrap=True)
+    for line in [*validity_lines({"": figures["validity"]}), *findings_lines({"": figures["findings"]})]:
+        out.print(line, soft_wrap=True, markup=False)
 
 
 def _write(data: xr.Dataset, figures: dict, folder: Path, *, report: bool) -> None:

@@ -98,11 +98,16 @@ def _table(title: str) -> Table:
 
 
 def validity(console: Console, figures: dict[str, Any]) -> None:
-    """Whether the model holds: of the worst mode, and which others are beyond."""
-    from paraflex.results.validity import validity_lines  # with xarray, which descriptions of mechanisms do without
+    """Whether the model holds: of the worst mode, and which others are beyond; and what makes runs doubtful."""
+    # With xarray, which descriptions of mechanisms do without.
+    from paraflex.results.findings import findings_lines
+    from paraflex.results.validity import validity_lines
 
-    for line in validity_lines({name: mode.get("validity") for name, mode in figures["modes"].items()}):
+    modes = figures["modes"].items()
+    for line in validity_lines({name: mode.get("validity") for name, mode in modes}):
         console.print(line, soft_wrap=True)
+    for line in findings_lines({name: mode.get("findings") for name, mode in modes}):
+        console.print(line, soft_wrap=True, markup=False)
 
 
 def failures(console: Console, result: StudyResult) -> None:

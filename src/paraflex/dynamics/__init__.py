@@ -5,7 +5,13 @@ from paraflex.dynamics.chord import across_chord
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, end_markers, node_marker
 from paraflex.dynamics.drive import Reach, reach
 from paraflex.dynamics.equilibrium import static_equilibrium
-from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate, material_angle
+from paraflex.dynamics.joint_coordinates import (
+    JointCoordinate,
+    axis_angle,
+    joint_coordinate,
+    material_angle,
+    place_along_beam,
+)
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.numbers import blocks_of, numbers_of, same_layout, with_numbers
 from paraflex.dynamics.packing import records
@@ -66,6 +72,7 @@ __all__ = [
     "numbers_of",
     "pack_signals",
     "piecewise_quintic",
+    "place_along_beam",
     "project_position",
     "project_velocity",
     "reach",

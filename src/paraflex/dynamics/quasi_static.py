@@ -143,14 +143,16 @@ class _Motion:
         """Velocities and accelerations (n,) at coordinates (n,)."""
         v, a = self.velocities(q), np.zeros(self.system.n)
         for _ in range(_PROJECTIONS):
-            a = a - least_change(self.system, q, self._accelerations(q, v, a), _STIFFNESS)
+            a = a - least_change(self.system, q, self._accelerations(q, v, a), _STIFFNESS, every_spring=True)
         return v, a
 
     def velocities(self, q: Array, near: Array | None = None) -> Array:
         """Those allowed (n,) at coordinates (n,) that are nearest to others, to none by default."""
         v = np.zeros(self.system.n) if near is None else near
         for _ in range(_PROJECTIONS):
-            v = v - least_change(self.system, q, self.system.constraints(self.signals, self.time, q, v)[1], _STIFFNESS)
+            v = v - least_change(
+                self.system, q, self.system.constraints(self.signals, self.time, q, v)[1], _STIFFNESS, every_spring=True
+            )
         return v
 
     def _accelerations(self, q: Array, v: Array, a: Array) -> Array:

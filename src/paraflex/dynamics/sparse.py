@@ -16,6 +16,7 @@ from paraflex.dynamics.system import System
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import OMEGA2, PackedSystem, make_scratch
+from paraflex.mechanism import is_hinge
 
 # What stands in for zero on the diagonal of a dependent row, as a fraction of entries of size one, so that the factor
 # exists; iterative refinement takes its effect out again.
@@ -67,13 +68,13 @@ def stiffness_diagonal(system: System) -> NDArray[np.float64]:
     return diagonal
 
 
-def elastic_stiffness(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:
-    """Stiffness (n, n) that keeps links and the springs at joints in shape: omega^2 of modes, J^T k J of springs.
+def elastic_stiffness(system: System, q: NDArray[np.float64], *, every_spring: bool = False) -> scipy.sparse.csr_matrix:
+    """Stiffness (n, n) that keeps links in shape: omega^2 of modes, J^T k J of the springs between finite segments.
 
-    Finite segments are held in line by springs at joints alone.
+    With every spring those at other joints as well.
     """
-    stiffness = scipy.sparse.diags(stiffness_diagonal(system))
-    springs = system.mechanism.springs
+    mechanism, stiffness = system.mechanism, scipy.sparse.diags(stiffness_diagonal(system))
+    springs = [one for one in mechanism.springs if every_spring or is_hinge(mechanism.joint(one.joint))]
     if springs:
         rows = [scipy.sparse.csr_matrix(joint_coordinate(system, spring.joint, q[None]).rows) for spring in springs]
         J = scipy.sparse.vstack(rows)

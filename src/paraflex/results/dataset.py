@@ -15,6 +15,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.mechanism import Mechanism
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
+from paraflex.results.findings import FINDINGS
 from paraflex.results.metrics import SAME_TIME, ErrorSpan, Part, peak_torque, rms_torque, tracking_variables
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
@@ -70,6 +71,7 @@ UNITS = {
     "brake_energy": ("energy that brakes took as they engaged after the motion", "J"),
     "event": ("event that stopped the run", "1"),
     "event_time": ("when it was stopped", "s"),
+    "findings": ("what makes the run doubtful, as JSON: code, level, place, text and remedy of each finding", "1"),
 } | VALIDITY_UNITS
 
 # What units do not say: on which body, in which frame, positive which way.
@@ -155,6 +157,7 @@ def tracking_dataset(
     for name in FIGURES:
         data[name] = (("mode",), np.array([one.figures[name] for one in records]))
     data[BRAKE_ENERGY] = (("mode",), np.array([one.figures.get(BRAKE_ENERGY, 0.0) for one in records]))
+    data[FINDINGS] = (("mode",), np.array([one.figures.get(FINDINGS, "[]") for one in records]))
     for name, values in validity_variables([one.validity for one in records]).items():
         data[name] = (("mode",), values)
     out = xr.Dataset(

@@ -15,6 +15,7 @@ from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.dataset import UNITS, describe, end_effector_point
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
+from paraflex.results.findings import FINDINGS, findings_summary, findings_text
 from paraflex.results.joint_loads import joint_loads
 from paraflex.results.motion import point_motion, tip_deflection
 from paraflex.results.outlines import chord_deflections
@@ -84,7 +85,7 @@ def motion_dataset(
     data["deflection"] = (("time", "body"), _full(chord_deflections(mechanism, drawn.shape), run))
     for name, (dims, array) in drawing_variables(drawn).items():
         data[name] = (("time", *dims), _full(array, run).astype(np.float32))
-    data |= {name: getattr(solution, name) for name in FIGURES}
+    data |= {name: getattr(solution, name) for name in FIGURES} | {FINDINGS: findings_text(solution.findings)}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
     data["applied_torque"] = (("motor",), np.array(list(run.torques.values())))
     out = xr.Dataset(
@@ -130,6 +131,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "mechanism": data.attrs["mechanism"],
         **figures,
         "validity": validity_summary(data),
+        "findings": findings_summary(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]),

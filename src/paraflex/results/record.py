@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics import Marker, System, end_markers, material_angle
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, drawing, system_drawing
+from paraflex.results.findings import FINDINGS, findings_text
 from paraflex.results.joint_loads import joint_loads
 from paraflex.results.motion import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.results.outlines import outline_motion, outlines, segment_motion
@@ -148,7 +149,8 @@ def record(run: TrackingRun) -> Record:
         strain_energy=solution.strain_energy[:k],
         work=solution.work[:k],
         drawing=_drawing(task, parts, q),
-        figures={name: getattr(solution, name) for name in (*FIGURES, BRAKE_ENERGY)},
+        figures={name: getattr(solution, name) for name in (*FIGURES, BRAKE_ENERGY)}
+        | {FINDINGS: findings_text(solution.findings)},
         validity=run.validity,
     )
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from paraflex.results.findings import findings_summary
 from paraflex.results.metrics import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.validity import validity_summary
 
@@ -40,6 +41,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         and rms_torque per motor, end_effector_final, the solver's figures and validity (None of rigid bodies); `error`,
         which of the errors ranks the modes; `after`, what the motors do after the path; `part`, how much of the path a
         run did that was too short for all of it, else None; `parameters`; `version`. A figure not reached is None.
+        `findings` of a mode are what makes it doubtful.
     """
     modes, part = {}, part_run(data)
     for name in data["mode"].values:
@@ -59,6 +61,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         figures["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
         figures["actuation_condition_max"] = finite_or_none(np.max(run["actuation_condition"].values))
         figures["validity"] = validity_summary(run)
+        figures["findings"] = findings_summary(run)
         modes[str(name)] = figures
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}

@@ -117,6 +117,7 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
         assembly=setting.assembly or model.study.assembly,
         orientation=model.study.orientation,
         after=model.study.after,
+        warning=False,
     )
     return planned, options
 
