@@ -6,6 +6,7 @@ import warnings
 from itertools import pairwise
 
 import numpy as np
+import pandas
 import pytest
 import scipy.optimize
 
@@ -192,7 +193,7 @@ def test_a_bead_leaves_the_first_end_too():
 
 
 def test_a_path_that_leaves_the_beam_is_refused_before_any_run():
-    with pytest.raises(UnreachablePathError, match=r"off its beam lever, which is 0\.25 m") as e:
+    with pytest.raises(UnreachablePathError, match=r"the path takes joint pin as far as 0\.264\d* m") as e:
         plan_tracking(driven(), path(), samples=51)
     assert e.value.moment.time == pytest.approx(path_leaves(), abs=1e-5)
     with pytest.warns(ModelWarning, match=r"its point leaves lever, 0\.25 m long, at t ="):
@@ -288,6 +289,42 @@ def test_the_command_line_says_so(tmp_path):
     assert "pin" not in said["ignore"]
     figures = json.loads((tmp_path / "error" / "summary.json").read_text())
     assert figures["event"] == "joint pin at the end of lever"
+
+
+@pytest.mark.parametrize(("at_end", "status"), [("stop", "failed"), ("error", "failed"), ("warn", "complete")])
+def test_a_sweep_has_no_metrics_of_a_run_that_ended_there(tmp_path, at_end, status):
+    """The design whose beam is too short fails, with the time; the longer one is complete whatever `at_end` is."""
+    start, fields = MODEL.index("[prescribed.drive]"), MODEL.index("[assembly.start]")
+    text = MODEL[:start] + MODEL[fields:].replace("duration = 1.0\n", "")
+    text = text.replace("AT_END", f'at_end = "{at_end}"').replace("length = 0.25", 'length = "L"')
+    text = text.replace("T = 0.25", 'T = "L"').replace("[ground]", "[parameters]\nL = 0.25\n[ground]", 1)
+    x = BASE + CRANK * np.cos(START)
+    text += f"""
+[motor]
+tau = "O"
+[mode]
+"+" = ["tau"]
+[end_effector]
+point = "crank.P"
+coordinates = ["x"]
+[path.line]
+type = "line"
+start = [{x:.17g}, 0.0]
+end = [0.25, 0.0]
+max_acceleration = 10.0
+"""
+    (tmp_path / "lever.toml").write_text(text)
+    (tmp_path / "study.toml").write_text(
+        'name = "lengths"\nmechanism = "lever.toml"\nsamples = 21\n[sampling]\nkind = "grid"\n'
+        '[vary.L]\nfields = ["parameters.L"]\nvalues = [0.25, 0.35]\n'
+    )
+    out = tmp_path / "out"
+    done = paraflex("sweep", str(tmp_path / "study.toml"), "--workers", "1", "--no-report", "--out", str(out))
+    table = pandas.read_parquet(out / "results.parquet").set_index("L")
+    assert list(table["status"]) == [status, "complete"], done.stderr
+    if status == "failed":
+        assert "pin" in table["reason"][0.25]
+        assert table["time_reached"][0.25] == pytest.approx(path_leaves(), abs=1e-4)
 
 
 @pytest.mark.parametrize("name", library_names())

@@ -105,8 +105,8 @@ def _first_outside(gauge: Gauge, t: Array, q: Array, v: Array, k: int) -> float:
 def _planned(end: BeamEnd, places: Array) -> str:
     far = places[np.argmax(np.abs(places - 0.5 * end.length))]
     return (
-        f"the path takes joint {end.joint} off its beam {end.beam}, which is {end.length:.6g} m long, as far as "
-        f'{far:.6g} m from its first end (at_end = "error"): it leaves'
+        f"the path takes joint {end.joint} as far as {far:.6g} m from the first end of its beam {end.beam}, which is "
+        f'{end.length:.6g} m long (at_end = "error"): it comes to the end'
     )
 
 
