@@ -574,6 +574,11 @@ def test_everything_at_once_keeps_its_energy_balance():
     mechanism = make_sliders()
     nylon = Material(youngs_modulus=2e9, density=1100.0)
     mechanism = mechanism.with_bodies(replace(mechanism.body(name), material=nylon) for name in ("crank", "rod"))
+    # Equations that hold together are asked for, not whether the beams are long enough.
+    endless = [
+        replace(joint, at_end="ignore") if isinstance(joint, SlidingJoint) else joint for joint in mechanism.joints
+    ]
+    mechanism = replace(mechanism, joints=tuple(endless))
     system = build_system(mechanism)
     q = np.zeros(system.n)
     signals = twins.still_signals(system)

@@ -8,12 +8,12 @@ import scipy.optimize
 
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.dynamics.state import point_position
-from paraflex.errors import AssemblyError, InputError
+from paraflex.errors import AssemblyError
 from paraflex.fem import ReferenceCondition
 from paraflex.fem.element import TRANSVERSE
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Line, PointPath
+from paraflex.kinematics import Line
 from paraflex.mechanism import (
     AppliedTorque,
     Assembly,
@@ -124,14 +124,6 @@ def test_what_nothing_holds_has_no_equilibrium():
     with pytest.raises(AssemblyError, match="no static equilibrium near the start: hold more joints"):
         equilibrium(pendulum(loads=(AppliedTorque("twist", PointRef("arm", "A"), 0.6),)))
     equilibrium(pendulum(loads=(AppliedTorque("twist", PointRef("arm", "A"), 0.6),)), held=["pin"])
-
-
-def test_a_path_that_starts_moving_cannot_start_balanced(square):
-    path = PointPath(((0.0, 0.264), (0.02, 0.27), (0.03, 0.29)), 0.2)
-    task = plan_tracking(raparm_i(), path, samples=11)
-    moving = dataclasses.replace(task, motion=dataclasses.replace(task.motion, v=task.motion.v + 1.0))
-    with pytest.raises(InputError, match="path: the path does not start at rest"):
-        moving.balanced("++++")
 
 
 @pytest.mark.parametrize("n", [20, 300])

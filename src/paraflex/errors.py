@@ -31,6 +31,7 @@ __all__ = [
     "ResultWarning",
     "SingularActuationError",
     "SingularPositionError",
+    "SliderOffBeamError",
     "StiffnessWarning",
     "UnreachablePathError",
     "ValidityWarning",
@@ -183,6 +184,10 @@ class IntegrationError(NumericalError):
 
 class SingularPositionError(IntegrationError):
     """A run came to a singular position, where constraints depend on one another, and did not pass it."""
+
+
+class SliderOffBeamError(IntegrationError):
+    """A point that slides along a beam came to the beam's end, and the joint's `at_end` asks for an error."""
 
 
 class ConstraintDriftError(IntegrationError):

@@ -44,8 +44,8 @@ class MotionRun:
 
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
-        """What of its results is not plausible."""
-        return tuple(doubtful_results(self.system, self.solution))
+        """What happened in it, and what of its results is not plausible."""
+        return (*self.solution.findings, *doubtful_results(self.system, self.solution))
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -120,10 +120,14 @@ def simulate_motion(
             system, signals, state, times, knots=np.array(knots), options=options, on_progress=on_progress
         )
     except IntegrationError as error:
-        error.partial = MotionRun(system, times, values, error.partial)
+        error.partial = _run(system, times, values, error.partial)
         raise
-    run = MotionRun(system, solution.t if solution.event else times, values, solution)
+    run = _run(system, times, values, solution)
     if warning:
         warn(run.validity)
         warn_of(run.doubts, ResultWarning)
     return run
+
+
+def _run(system: System, times: NDArray[np.float64], torques: Mapping[str, float], solution: Solution) -> MotionRun:
+    return MotionRun(system, solution.t if solution.event else times, torques, solution)

@@ -15,16 +15,18 @@ from paraflex.display import shown
 from paraflex.dynamics import (
     State,
     System,
+    balanced_state,
     brake,
     build_system,
     constant_signals,
+    joint_motions,
     pack_signals,
-    static_equilibrium,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
+from paraflex.integrators.beam_ends import leave_beam
 from paraflex.kinematics import Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn
@@ -143,21 +145,20 @@ class TrackingTask:
         )
 
     def balanced(self, mode: str | ActuationMode) -> TrackingTask:
-        """The same task, starting from static equilibrium with the active motors of a mode held where the path begins.
+        """The same task, starting balanced: the active motors of a mode stand, or move, as where the path begins.
 
-        Under weight or loads links sag before they move; started undeformed they would ring about that.
+        Under weight or loads links sag before they move; started undeformed they would ring about that. On a path that
+        starts in motion inertia forces of that motion deflect them as well: see `dynamics.balanced_state`.
 
         Raises
         ------
-        InputError
-            The path does not start at rest.
         AssemblyError
             No equilibrium is found.
         """
-        if np.any(self.motion.v[0]):
-            raise InputError("the path does not start at rest", field="path", remedy="start undeformed")
         joints = [motor.joint for motor in self.mechanism.motors if motor.name in self.mode(mode).motors]
-        return replace(self, start=static_equilibrium(self.system, self.start, joints))
+        rigid = self.motion
+        driven = joint_motions(rigid.system, rigid.q[0], rigid.v[0], rigid.a[0], joints)
+        return replace(self, start=balanced_state(self.system, self.start, driven))
 
     def simulate(
         self,
@@ -213,9 +214,10 @@ class TrackingRun:
 
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
-        """What of its results is not plausible, for mass, size and speed of the mechanism."""
+        """What happened in it, and what of its results is not plausible for mass, size and speed of the mechanism."""
         whole = self.task.whole or self.task
-        return tuple(doubtful_results(self.task.system, self.solution, self._driven(), whole.mechanism))
+        found = doubtful_results(self.task.system, self.solution, self._driven(), whole.mechanism)
+        return (*self.solution.findings, *found)
 
     def _driven(self) -> Driven | None:
         """Path, efforts and condition number, where torques drive the mechanism along the path."""
@@ -261,6 +263,7 @@ def plan_tracking(
     assembly: str | None = None,
     orientation: float = 0.0,
     after: Ending | str = Ending.FREE,
+    warning: bool = True,
 ) -> TrackingTask:
     """Plan a motion of the end-effector: joint motion of the rigid mechanism and what it asks of the motors.
 
@@ -278,11 +281,14 @@ def plan_tracking(
         Angle of the end-effector where it is a task coordinate and the path does not say it [rad].
     after : Ending or str
         What the active motors do after the path: "free" or "hold".
+    warning : bool
+        Whether a `ModelWarning` names points that the path takes off their beams, where `SlidingJoint.at_end` says
+        "warn".
 
     Raises
     ------
     InputError, AssemblyError, UnreachablePathError
-        See `kinematics.follow_path`.
+        See `kinematics.follow_path`; a path that takes a sliding point off its beam, where `at_end` says "error".
     """
     end = path.duration if duration is None else duration
     if not (np.isfinite(end) and end > 0.0):
@@ -293,6 +299,9 @@ def plan_tracking(
 
     follow = path_follower(mechanism, path, end, assembly=assembly, orientation=orientation)
     motion = follow(times)
+    left = leave_beam(motion.system, motion.t, motion.q, motion.v)
+    if warning:
+        warn_of(left)
     system = build_system(mechanism)
     return TrackingTask(
         mechanism=mechanism,

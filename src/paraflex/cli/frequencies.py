@@ -63,21 +63,36 @@ def frequencies(
     state = start if request.at is None else _pose_at(model, rigid, start, assembly, request.at, request.path)
     state = undeformed(system, rigid, state)
     if request.balanced:
-        try:
-            state = static_equilibrium(system, state, motors)
-        except AssemblyError as error:
-            raise InputError(error.cause, field="--balanced", remedy="leave it out") from error
+        state = _balanced(system, state, motors)
     held = natural_frequencies(system, state, motors, count=LOWEST) if motors else None
     free = natural_frequencies(system, state, torque_at=motors, count=LOWEST)
+    is_equilibrium = free.acceleration < BALANCED
     return {
         "time": state.time,
         "balanced": request.balanced,
         "acceleration": free.acceleration,
-        "is_equilibrium": free.acceleration < BALANCED,
+        "is_equilibrium": is_equilibrium,
+        "equilibrium_nearby": is_equilibrium or _has_equilibrium(system, state, motors),
         "motors_held_hz": None if held is None else hertz(held.frequencies),
         "motors_free_hz": hertz(free.frequencies),
         "growing": max(_growing(free), 0 if held is None else _growing(held)),
     }
+
+
+def _balanced(system: System, state: State, held: list[str]) -> State:
+    try:
+        return static_equilibrium(system, state, held)
+    except AssemblyError as error:
+        raise InputError(error.cause, field="--balanced", remedy="leave it out") from error
+
+
+def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:
+    """Whether `--balanced` would find an equilibrium from a pose."""
+    try:
+        static_equilibrium(system, state, held)
+    except AssemblyError:
+        return False
+    return True
 
 
 def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float, path: str | None) -> State:

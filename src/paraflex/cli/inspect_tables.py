@@ -169,8 +169,13 @@ def _print_frequencies(console: Console, found: dict[str, Any]) -> None:
         )
         console.print(f"  {found['growing']} motion(s) grow instead of vibrating: {where}")
     if not found["is_equilibrium"]:
+        nearby = (
+            "--balanced takes the equilibrium nearby"
+            if found["equilibrium_nearby"]
+            else "with its motors held, too, there is none nearby"
+        )
         console.print(
             f"  not an equilibrium: let go it would start with {found['acceleration']:.3g} m/s^2, root mean square "
-            "over the mass; --balanced takes the equilibrium nearby",
+            f"over the mass; {nearby}",
             soft_wrap=True,
         )

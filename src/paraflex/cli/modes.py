@@ -54,7 +54,12 @@ def _effort(model: Model, path: str | None) -> Effort | None:
     study = model.study
     followed, _ = find_path(model, path)
     return plan_tracking(
-        model.mechanism.rigid(), followed, samples=_SAMPLES, assembly=study.assembly, orientation=study.orientation
+        model.mechanism.rigid(),
+        followed,
+        samples=_SAMPLES,
+        assembly=study.assembly,
+        orientation=study.orientation,
+        warning=False,
     ).effort
 
 

@@ -26,7 +26,7 @@ from paraflex.cli.request import (
 )
 from paraflex.cli.tables import FINISHED, plain_console, validity, warn_of_doubts
 from paraflex.compilation import compile_kernels_for
-from paraflex.dynamics import State, build_system, consistent_state, start_state, static_equilibrium
+from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
 from paraflex.errors import AssemblyError, InputError, IntegrationError
 from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
@@ -135,7 +135,7 @@ def _simulate(
 
 
 def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanced: bool) -> State | None:
-    """The state the file describes, from static equilibrium if asked for; None for an assembly undeformed at rest."""
+    """The state the file describes, balanced if asked for; None for an assembly undeformed, moving with its drives."""
     if balanced and model.start is not None and model.start.places:
         raise InputError(
             "the file gives the coordinates of the start", field="--balanced",
@@ -149,8 +149,11 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
         assert model.start is not None
         return start_state(system, model.start, given)
     undeformed = consistent_state(system, mechanism.assembly(assembly))
-    still = static_equilibrium(system, undeformed, [motor.joint for motor in mechanism.motors])
-    return still if model.start is None else start_state(system, model.start, q=still.q)
+    try:
+        found = balanced_state(system, undeformed, {motor.joint: JointMotion() for motor in mechanism.motors})
+    except AssemblyError as error:
+        raise InputError(error.cause, field="--balanced", remedy="leave it out") from error
+    return found if model.start is None else start_state(system, model.start, q=found.q)
 
 
 def _ended(figures: dict) -> str:

@@ -86,6 +86,7 @@ def plan_study(
             assembly=request.assembly or model.study.assembly,
             orientation=model.study.orientation,
             after=model.study.after if request.after is None else request.after,
+            warning=False,
         )
     except AssemblyError as error:
         raise InputError(

@@ -5,10 +5,17 @@ from paraflex.dynamics.chord import across_chord
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, end_markers, node_marker
 from paraflex.dynamics.drive import Reach, reach
 from paraflex.dynamics.equilibrium import static_equilibrium
-from paraflex.dynamics.joint_coordinates import JointCoordinate, axis_angle, joint_coordinate, material_angle
+from paraflex.dynamics.joint_coordinates import (
+    JointCoordinate,
+    axis_angle,
+    joint_coordinate,
+    material_angle,
+    place_along_beam,
+)
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
 from paraflex.dynamics.numbers import blocks_of, numbers_of, same_layout, with_numbers
 from paraflex.dynamics.packing import records
+from paraflex.dynamics.quasi_static import JointMotion, balanced_state, joint_motions
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
 from paraflex.dynamics.reduction import MissedTurn, missed_turns
 from paraflex.dynamics.signals import InputSignals, constant_signals, moment_signals, pack_signals, piecewise_quintic
@@ -32,6 +39,7 @@ __all__ = [
     "Dependence",
     "InputSignals",
     "JointCoordinate",
+    "JointMotion",
     "Marker",
     "MissedTurn",
     "Mobility",
@@ -43,6 +51,7 @@ __all__ = [
     "Vibration",
     "across_chord",
     "axis_angle",
+    "balanced_state",
     "blocks_of",
     "brake",
     "build_system",
@@ -52,6 +61,7 @@ __all__ = [
     "dependence",
     "end_markers",
     "joint_coordinate",
+    "joint_motions",
     "material_angle",
     "missed_turns",
     "mobility",
@@ -62,6 +72,7 @@ __all__ = [
     "numbers_of",
     "pack_signals",
     "piecewise_quintic",
+    "place_along_beam",
     "project_position",
     "project_velocity",
     "reach",

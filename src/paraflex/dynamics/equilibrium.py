@@ -1,8 +1,8 @@
-"""Static equilibrium: where a mechanism stands still under weight, loads and springs, some joints held."""
+"""Equilibrium under weight, loads and springs: at rest, some joints held, and in the motion that drives prescribe."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy
@@ -30,6 +30,13 @@ _LONGEST_STEP = 0.3
 # Up to so many unknowns a dense Jacobian, whose dependent columns least squares can tell, is fast enough.
 _DENSE = 400
 _NO_EQUILIBRIUM = "no static equilibrium near the start: hold more joints"
+_NO_MOVING_EQUILIBRIUM = (
+    "no equilibrium of links with weight, loads and the inertia of the motion near the start: the drives are too fast "
+    "for links this soft"
+)
+
+# Velocities and accelerations (n,) at coordinates (n,).
+Motion = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 
 def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -> State:
@@ -52,8 +59,43 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
     AssemblyError
         No equilibrium is found near the start.
     """
-    if system.n + system.m > _DENSE:
-        return _sparse_equilibrium(system, start, held)
+    return State(start.time, _find(system, start, held, None), np.zeros(system.n))
+
+
+def moving_equilibrium(system: System, start: State, motion: Motion) -> NDArray[np.float64]:
+    """The pose (n,) nearest a start at which all forces balance those of inertia in a motion.
+
+    The iteration of `static_equilibrium` with M a + h(q, v) among the forces, dampers and friction at joints too;
+    v and a follow every iteration.
+
+    Parameters
+    ----------
+    system : System
+        All its rigid freedoms prescribed.
+    start : State
+        Its q is where the search begins.
+    motion : callable
+        v and a (n,) at a pose (n,), such as the constraints allow.
+
+    Raises
+    ------
+    AssemblyError
+        No equilibrium is found near the start.
+    """
+    return _find(system, start, (), motion)
+
+
+def _find(system: System, start: State, held: Sequence[str], motion: Motion | None) -> NDArray[np.float64]:
+    solve = _sparse_equilibrium if system.n + system.m > _DENSE else _dense_equilibrium
+    try:
+        return solve(system, start, held, motion)
+    except AssemblyError as error:
+        if motion is None:
+            raise
+        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial) from None
+
+
+def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> NDArray[np.float64]:
     n, m, size = system.n, system.m, system.n + system.m + len(held)
     residual = _Residual(system, start, held)
     z = np.concatenate([start.q, np.zeros(m + len(held))])
@@ -62,6 +104,8 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
     for body in system.bodies:
         scale[body.flexible] = 1.0 / np.maximum(body.modes.omega, 1.0)
     for _ in range(_MAX_ITERATIONS):
+        if motion is not None:
+            residual.v, residual.a = motion(z[:n])
         value = scale * residual(z)
         jacobian = np.column_stack(
             [(scale * residual(z + _DIFFERENCE * unit) - value) / _DIFFERENCE for unit in np.diag(scale)]
@@ -71,25 +115,27 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
         reach = max(np.max(np.abs(change[body.offset : body.offset + 3])) for body in system.bodies)
         z += change * min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
         if reach <= _SMALLEST_MOVE and np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_force:
-            return State(start.time, z[:n], np.zeros(n))
+            return z[:n]
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), partial=z[:n])
 
 
-def _sparse_equilibrium(system: System, start: State, held: Sequence[str]) -> State:
+def _sparse_equilibrium(
+    system: System, start: State, held: Sequence[str], motion: Motion | None
+) -> NDArray[np.float64]:
     """The same with sparse matrices; springs at joints are stiffness here, not multipliers."""
     forces, elastic = RestingForces(system, start.time), stiffness_diagonal(system)
     signals, still = moment_signals(system.mechanism, start.time), np.zeros(system.n)
-    compliance = system.packed.rows["compliance"][forces.springs]
     kept = [float(joint_coordinate(system, name, start.q[None]).value[0]) for name in held]
     rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
     q, mu = start.q.copy(), np.zeros(rigid.size + len(held))
     for _ in range(_MAX_ITERATIONS):
+        if motion is not None:
+            forces.v, forces.a = motion(q)
         found = [joint_coordinate(system, name, q[None]) for name in held]
         off = np.array([joint.value[0] for joint in found]) - kept
         holding = scipy.sparse.csr_matrix(np.array([joint.rows[0] for joint in found]).reshape(-1, system.n))
-        lam = np.zeros(system.m)
+        lam = forces.compliant(q)
         lam[rigid] = mu[: rigid.size]
-        lam[forces.springs] = forces(q, lam)[1] / compliance
         f = forces(q, lam)[0] + elastic * q + holding.T @ mu[rigid.size :]
         phi, _ = system.constraints(signals, start.time, q, still)
         K = scipy.sparse.csr_matrix(pose_stiffness(system, start.time, q, lam) + scipy.sparse.diags(elastic))
@@ -105,7 +151,7 @@ def _sparse_equilibrium(system: System, start: State, held: Sequence[str]) -> St
         q, mu = q + part * change, mu + part * more
         largest = max(np.max(np.abs(lam), initial=0.0), np.max(np.abs(mu), initial=0.0))
         if reach <= _SMALLEST_MOVE and np.max(np.abs(f)) <= _BALANCED * largest:
-            return State(start.time, q, still)
+            return q
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), partial=q)
 
 
@@ -122,7 +168,7 @@ def _solve(
 
 
 class _Residual:
-    """Forces, constraints and held joints at (q, multipliers, holding torques), at rest."""
+    """Forces, constraints and held joints at (q, multipliers, holding torques), in motion at `v` and `a` (n,)."""
 
     def __init__(self, system: System, start: State, held: Sequence[str]) -> None:
         mechanism = system.mechanism
@@ -130,8 +176,10 @@ class _Residual:
         self.kept = self.joints(start.q)[0]
         self.signals = moment_signals(mechanism, start.time)
         self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
-        self.still = np.zeros(system.n)
+        self.v, self.a, self.still = np.zeros((3, system.n))
         self.largest_force = 0.0
+        # Rows of friction come with a scale of their own, none by default.
+        self.workspace.compliance[:] = system.packed.rows["compliance"]
 
     def joints(self, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates of the held joints (held,) and their derivatives (held, n)."""
@@ -143,9 +191,9 @@ class _Residual:
         system, ws, still = self.system, self.workspace, self.still
         q, lam, torque = np.split(z, [system.n, system.n + system.m])
         q, lam = np.ascontiguousarray(q), np.ascontiguousarray(lam)
-        equations(system.packed, self.signals, self.time, INDEX_1, q, still, still, lam, self.torques, ws)
+        equations(system.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, ws)
         phi, _ = system.constraints(self.signals, self.time, q, still)
-        # Rows of springs have no second derivatives in them, those of dampers hold no force at rest.
+        # Rows of springs, dampers and friction have no second derivatives in them.
         closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
         value, rows = self.joints(q)
         holding = rows.T @ torque

@@ -45,6 +45,12 @@ def joint_coordinate(
     return JointCoordinate(np.sum(e * d, axis=1), np.sum(rows * v, axis=1), rows)
 
 
+def place_along_beam(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far from its beam's first end (k,) the point of a sliding joint stands in the undeformed beam [m]."""
+    joint = system.mechanism.joint(name)
+    return joint_coordinate(system, name, q).value + system.marker(joint.a).x0[0]
+
+
 def axis_marker(system: System, joint: AxisJoint) -> Marker:
     """What carries a joint's axis: the material at point a, of a sliding joint the body's frame there."""
     marker = system.marker(joint.a)

@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence, involved, joint_of_row
-from paraflex.dynamics.sparse import Saddle, body_masses, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.dynamics.sparse import Saddle, body_masses, elastic_stiffness, sparse_jacobian, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import InconsistentConstraintsError, Moment
 
@@ -25,18 +25,22 @@ def least_change(
     residual: NDArray[np.float64],
     stiffness: float = 0.0,
     damping: float = 0.0,
+    *,
+    every_spring: bool = False,
 ) -> NDArray[np.float64]:
     """The smallest d in the metric M + stiffness K with Phi_q d = residual; least squares for dependent rows.
+
+    K keeps links in shape; with every spring also those at joints.
 
     With damping it goes less far, as Levenberg and Marquardt have it: a fraction of the mean diagonal entry of
     Phi_q (M + stiffness K)^-1 Phi_q^T.
     """
     if system.m > DENSE_ROWS:
-        return _sparse_change(system, q, residual, stiffness, damping)
+        return _sparse_change(system, q, residual, stiffness, damping, every_spring)
     jacobian = system.jacobian(q)
-    metric = np.asarray(scipy.linalg.block_diag(*body_masses(system, q))) + stiffness * np.diag(
-        stiffness_diagonal(system)
-    )
+    metric = np.asarray(scipy.linalg.block_diag(*body_masses(system, q)))
+    if stiffness:
+        metric = metric + stiffness * elastic_stiffness(system, q, every_spring=every_spring).toarray()
     weighted = np.linalg.solve(metric, jacobian.T)
     schur = jacobian @ weighted
     if damping:
@@ -45,10 +49,17 @@ def least_change(
 
 
 def _sparse_change(
-    system: System, q: NDArray[np.float64], residual: NDArray[np.float64], stiffness: float, damping: float
+    system: System,
+    q: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    stiffness: float,
+    damping: float,
+    every_spring: bool,
 ) -> NDArray[np.float64]:
     jacobian = sparse_jacobian(system, q)
-    metric = sparse_mass(system, q) + scipy.sparse.diags(stiffness * stiffness_diagonal(system))
+    metric = sparse_mass(system, q)
+    if stiffness:
+        metric = scipy.sparse.csr_matrix(metric + stiffness * elastic_stiffness(system, q, every_spring=every_spring))
     mean = float(np.mean(jacobian.multiply(jacobian) @ (1.0 / np.asarray(metric.diagonal(), dtype=float))))
     return Saddle(metric, jacobian, np.full(system.m, damping * mean)).solve(r=residual)[0]
 

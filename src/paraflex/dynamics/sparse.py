@@ -10,11 +10,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.dynamics.system import System
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import OMEGA2, PackedSystem, make_scratch
+from paraflex.mechanism import is_hinge
 
 # What stands in for zero on the diagonal of a dependent row, as a fraction of entries of size one, so that the factor
 # exists; iterative refinement takes its effect out again.
@@ -64,6 +66,20 @@ def stiffness_diagonal(system: System) -> NDArray[np.float64]:
     for body in system.bodies:
         diagonal[body.flexible] = body.modes.omega**2
     return diagonal
+
+
+def elastic_stiffness(system: System, q: NDArray[np.float64], *, every_spring: bool = False) -> scipy.sparse.csr_matrix:
+    """Stiffness (n, n) that keeps links in shape: omega^2 of modes, J^T k J of the springs between finite segments.
+
+    With every spring those at other joints as well.
+    """
+    mechanism, stiffness = system.mechanism, scipy.sparse.diags(stiffness_diagonal(system))
+    springs = [one for one in mechanism.springs if every_spring or is_hinge(mechanism.joint(one.joint))]
+    if springs:
+        rows = [scipy.sparse.csr_matrix(joint_coordinate(system, spring.joint, q[None]).rows) for spring in springs]
+        J = scipy.sparse.vstack(rows)
+        stiffness = stiffness + J.T @ scipy.sparse.diags([spring.stiffness for spring in springs]) @ J
+    return scipy.sparse.csr_matrix(stiffness)
 
 
 def sparse_jacobian(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:

@@ -13,7 +13,7 @@ from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian, sparse_mass
 from paraflex.dynamics.state import State, reference_pose
 from paraflex.dynamics.system import System
 from paraflex.errors import InputError
@@ -264,8 +264,7 @@ def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> NDArra
 
 
 def _metric(system: System, q: NDArray[np.float64], stiffness: float) -> scipy.sparse.csr_matrix:
-    weights = scipy.sparse.diags(stiffness * stiffness_diagonal(system))
-    return scipy.sparse.csr_matrix(sparse_mass(system, q) + weights)
+    return scipy.sparse.csr_matrix(sparse_mass(system, q) + stiffness * elastic_stiffness(system, q))
 
 
 def _least(metric: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, wanted: NDArray) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import greedy_colours, tied_bodies, without_stiffness
 from paraflex.dynamics.state import point_position
 from paraflex.dynamics.system import System
-from paraflex.kernel.packed import INDEX_1, SPRING
+from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING
 from paraflex.kernel.stage import equations
 
 Array = NDArray[np.float64]
@@ -24,20 +24,36 @@ _STEP, _SHORTEST = 1e-3, 1e-6
 class RestingForces:
     """Forces at rest (n,), as they stand on the left of the equations, and rows of springs (m,).
 
-    All forces but the stiffness of beams, which is known exactly and would drown them.
+    All forces but the stiffness of beams, which is known exactly and would drown them. With velocities `v` and
+    accelerations `a` (n,) in place of zeros they are those of a motion.
     """
 
     def __init__(self, system: System, time: float) -> None:
         self.packed, self.time = without_stiffness(system.packed), time
         self.signals, self.workspace = moment_signals(system.mechanism, time), system.workspace()
-        self.still, self.torques = np.zeros(system.n), np.zeros(len(system.mechanism.motors))
+        self.v, self.a = np.zeros((2, system.n))
+        self.torques = np.zeros(len(system.mechanism.motors))
         self.springs = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
 
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
         """At coordinates (n,) with multipliers (m,)."""
-        ws, still = self.workspace, self.still
-        equations(self.packed, self.signals, self.time, INDEX_1, q, still, still, lam, self.torques, ws)
-        return ws.f.copy(), ws.rows[self.springs]
+        self._evaluate(q, lam)
+        return self.workspace.f.copy(), self.workspace.rows[self.springs]
+
+    def compliant(self, q: Array) -> Array:
+        """Multipliers (m,) of springs, dampers and friction at coordinates (n,); zero in rows of constraints."""
+        rows = self.packed.rows
+        # Rows of springs and dampers are compliance times what is missing; those of friction with the scale set here.
+        scale = np.where(rows["kind"] == FRICTION, 1.0, rows["compliance"])
+        self.workspace.compliance[:] = scale
+        self._evaluate(q, np.zeros(rows.size))
+        compliant = rows["kind"] != CONSTRAINT
+        return np.divide(self.workspace.rows, scale, out=np.zeros(rows.size), where=compliant)
+
+    def _evaluate(self, q: Array, lam: Array) -> None:
+        equations(
+            self.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, self.workspace
+        )  # fmt: skip
 
 
 def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.sparse.csr_matrix:

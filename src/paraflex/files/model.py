@@ -388,7 +388,7 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
         return RevoluteJoint(name, a, b)
     # A field of another kind of joint would be read and not obeyed.
     kind = _JOINTS[entry.type]
-    given = {key: getattr(entry, key) for key in ("direction", "angle") if key in entry.model_fields_set}
+    given = {key: getattr(entry, key) for key in ("direction", "angle", "at_end") if key in entry.model_fields_set}
     for key, value in given.items():
         if key not in {field.name for field in fields(kind)}:
             raise InputError(

@@ -158,6 +158,10 @@ class JointTable(_Table):
     points: TwoPoints = Field(description='["body.point", "body.point"]')
     direction: Number = Field(default=0.0, description="the angle of its axis against the first body in rad")
     angle: Number = Field(default=0.0, description="the angle of the second body against the first in rad")
+    at_end: Literal["error", "stop", "warn", "ignore"] = Field(
+        default="error",
+        description='where a sliding point comes to the end of its beam: "error", "stop", "warn" or "ignore"',
+    )
 
 
 # A revolute joint may be written as its two points alone. Tags are such that errors do not show them.

@@ -53,9 +53,14 @@ class Crossing:
         return self.before.t + self.fraction * (self.after.t - self.before.t)
 
     @property
+    def reached(self) -> str:
+        """What was reached."""
+        return self.gauge.reached(_poses(self.before, self.after, self.fraction)[0])
+
+    @property
     def message(self) -> str:
         """What was reached and when."""
-        return f"{self.gauge.reached(_poses(self.before, self.after, self.fraction)[0])} at t = {self.t:.6g} s"
+        return f"{self.reached} at t = {self.t:.6g} s"
 
 
 def advance(run: Run, gauges: Sequence[Gauge], attempts: int) -> tuple[int, Crossing | None]:

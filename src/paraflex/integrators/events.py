@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from paraflex.errors import InputError, suggestion
-from paraflex.mechanism import Mechanism, RigidBody, WeldJoint
+from paraflex.mechanism import AtEnd, FlexibleBeam, Mechanism, RigidBody, SlidingJoint, WeldJoint
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,41 @@ class SingularDistance:
         return f"singular position{held}"
 
 
+@dataclass(frozen=True)
+class BeamEnd:
+    """The ends of the beam that a joint slides along: every run looks for them, unless the joint says otherwise.
+
+    Attributes
+    ----------
+    joint : str
+    beam : str
+    length : float
+        Of the beam [m].
+    at_end : AtEnd
+        What the run does there.
+    """
+
+    joint: str
+    beam: str
+    length: float
+    at_end: AtEnd
+
+    def __str__(self) -> str:
+        return f"joint {self.joint} at the end of {self.beam}"
+
+
 Event = JointLimit | DeflectionLimit | SingularDistance
+
+
+def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:
+    """Ends of the beams that joints slide along, of those that do not ignore them."""
+    found = []
+    for joint in mechanism.joints:
+        if isinstance(joint, SlidingJoint) and joint.at_end is not AtEnd.IGNORE:
+            beam = mechanism.body(joint.a.body)
+            assert isinstance(beam, FlexibleBeam)
+            found.append(BeamEnd(joint.name, beam.name, beam.length, joint.at_end))
+    return tuple(found)
 
 
 def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:

@@ -10,16 +10,25 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import BodyCoordinates, SingularityMeasure, System, across_chord, joint_coordinate
+from paraflex.dynamics import (
+    BodyCoordinates,
+    SingularityMeasure,
+    System,
+    across_chord,
+    joint_coordinate,
+    place_along_beam,
+)
 from paraflex.errors import InputError
 from paraflex.fem import slope_square_integrals
-from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, check_events
-from paraflex.mechanism import AxisJoint
+from paraflex.integrators.events import BeamEnd, DeflectionLimit, Event, JointLimit, beam_ends, check_events
+from paraflex.mechanism import AtEnd, AxisJoint
 
 Array = NDArray[np.float64]
 
 # Places looked at within an element, its last end among them.
 _PLACES = 4
+# A point may stand at the very end of its beam: rounding and the closing of loops leave it this part of the length off.
+_AT_END = 1e-9
 # Two places are always on their chord.
 _LINE = 3
 
@@ -30,18 +39,23 @@ class Gauge:
 
     Attributes
     ----------
-    event : Event
+    event : Event or BeamEnd
     value : callable
         Of poses (k, n), a value (k,).
     low, high : float
     unit : str
     """
 
-    event: Event
+    event: Event | BeamEnd
     value: Callable[[Array], Array]
     low: float
     high: float
     unit: str
+
+    @property
+    def ends_run(self) -> bool:
+        """Whether the run ends there."""
+        return not (isinstance(self.event, BeamEnd) and self.event.at_end is AtEnd.WARN)
 
     def inside(self, q: Array) -> Array:
         """How far poses (k, n) are inside the bounds (k,): positive inside, zero at the event."""
@@ -55,6 +69,12 @@ class Gauge:
             lower = value - self.low < self.high - value
             side, bound = ("lower", self.low) if lower else ("upper", self.high)
             return f"{event} reached its {side} limit {bound:g} {self.unit}"
+        if isinstance(event, BeamEnd):
+            place = min(max(value, 0.0), event.length)
+            return (
+                f"joint {event.joint} came to the end of its beam {event.beam}, {place:.6g} m from its first end "
+                f'(at_end = "{event.at_end.value}"),'
+            )
         if isinstance(event, DeflectionLimit):
             return f"the {event} reached its limit {self.high:g} {self.unit}"
         return f"a {event} came as near as {self.low:g}"
@@ -80,6 +100,19 @@ def make_gauges(system: System, q: Array, events: Sequence[Event]) -> tuple[Gaug
                 remedy=f"start {wanted}, or move the limit",
             )  # fmt: skip
     return gauges
+
+
+def beam_end_gauges(system: System) -> tuple[Gauge, ...]:
+    """Gauges of the places where points slide along beams, from 0 to the length of the beam."""
+    gauges = []
+    for end in beam_ends(system.mechanism):
+        margin = _AT_END * end.length
+        gauges.append(Gauge(end, _place(system, end.joint), -margin, end.length + margin, "m"))
+    return tuple(gauges)
+
+
+def _place(system: System, joint: str) -> Callable[[Array], Array]:
+    return lambda q: place_along_beam(system, joint, q)
 
 
 def _gauge(system: System, q: Array, event: Event) -> Gauge:

@@ -10,9 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, redundant_rows
-from paraflex.errors import ConstraintDriftError, IntegrationError, Moment, SingularPositionError
+from paraflex.errors import (
+    ConstraintDriftError,
+    IntegrationError,
+    Moment,
+    SingularPositionError,
+    SliderOffBeamError,
+)
 from paraflex.integrators import native, outside
+from paraflex.integrators.beam_ends import BeamEnds
 from paraflex.integrators.crossing import Crossing, advance, samples_until
+from paraflex.integrators.events import BeamEnd
 from paraflex.integrators.gauges import make_gauges
 from paraflex.integrators.methods import Family
 from paraflex.integrators.options import IntegrationOptions
@@ -21,6 +29,7 @@ from paraflex.integrators.solution import Solution
 from paraflex.integrators.watch import bent_too_far, come_apart, least_norm
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import ERROR_TEST, FINISHED, NO_CONVERGENCE, NOT_FINITE, PAUSED
+from paraflex.mechanism import AtEnd
 
 # Attempted steps between two looks: some milliseconds for a dozen bodies.
 _SLICE = 200
@@ -77,18 +86,22 @@ def integrate(
     ------
     IntegrationError
         The run cannot go on; it carries the partial solution.
+    SliderOffBeamError
+        A point that slides along a beam came to its end: see `SlidingJoint.at_end`. The partial solution ends there.
     ConstraintDriftError
         Constraints are left further than errors of integration explain; it carries the partial solution as well.
     SingularPositionError
         It cannot pass a singular position: the mechanism is driven beyond its reach there, or its method is one of
         the Newmark family.
     InputError
-        Times that do not ascend from the start; events that the mechanism cannot have, or a start beyond one.
+        Times that do not ascend from the start; events that the mechanism cannot have, or a start beyond one, or off
+        the end of a beam.
     """
     began = time.perf_counter()
     options = options or IntegrationOptions()
     problem = make_problem(system, signals, initial, times, knots)
-    gauges, crossing = make_gauges(system, initial.q, options.events), None
+    ends, crossing = BeamEnds(system, initial), None
+    gauges = (*make_gauges(system, initial.q, options.events), *ends.gauges)
     run = prepare(problem, options)
     status, message, bent, drift, now = "complete", "", "", "", None
     code, limits = PAUSED, (run.dependent_rows, options.tolerance)
@@ -99,6 +112,8 @@ def integrate(
             if run.attempts >= most:
                 break
             code, crossing = advance(run, gauges, min(_SLICE, most - run.attempts))
+            if crossing is not None:
+                gauges, crossing = ends.pass_over(crossing, gauges)
             if crossing is not None:
                 status, message = "stopped", crossing.message
                 break
@@ -111,6 +126,8 @@ def integrate(
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {run.now().t:.6g} s"
     solution = _solution(run, options, time.perf_counter() - began, status, message, crossing)
+    solution = replace(solution, findings=ends.findings(solution.q))
+    _refuse_beam_end(solution, crossing)
     if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution
     cause = bent or drift or _cause(code, options)
@@ -124,6 +141,17 @@ def integrate(
         error, cause = SingularPositionError, _before_singular(options.method, run.singular_ahead)
     moment = Moment(now.t, solution.steps + (0 if begun is None else begun.steps))
     raise error(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
+
+
+def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
+    """Raise where a run ends at the end of a beam and its joint asks for an error."""
+    if crossing is None or not (
+        isinstance(crossing.gauge.event, BeamEnd) and crossing.gauge.event.at_end is AtEnd.ERROR
+    ):
+        return
+    moment = Moment(crossing.t, solution.steps)
+    cause = crossing.reached
+    raise SliderOffBeamError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
 
 
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.findings import Finding
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -43,9 +45,12 @@ class Solution:
     evaluations : int
         Of the equations of motion.
     event : str
-        Which event stopped the run, whose time and state are then the last sample; empty for none.
+        Which event stopped the run, whose time and state are then the last sample; empty for none. Also of a run that
+        failed where a point came to the end of its beam.
     brake_energy : float
         Kinetic energy that brakes took as they engaged [J]: `work` is less by it from then on.
+    findings : tuple of Finding
+        What makes it doubtful: points that slid off their beams.
     """
 
     t: NDArray[np.float64]
@@ -71,6 +76,7 @@ class Solution:
     evaluations: int = 0
     event: str = ""
     brake_energy: float = 0.0
+    findings: tuple[Finding, ...] = ()
 
     @property
     def event_time(self) -> float:
@@ -92,7 +98,7 @@ class Solution:
             What the brakes took [J].
         """
         gained = self.kinetic_energy[-1] + self.strain_energy[-1] - self.kinetic_energy[0] - self.strain_energy[0]
-        before = self.work[-1]
+        before, known = self.work[-1], {one.place for one in self.findings}
         joined = {
             name: np.concatenate([getattr(self, name)[:samples], getattr(other, name)])
             for name in ("t", "q", "v", "a", "kinetic_energy", "strain_energy")
@@ -110,4 +116,5 @@ class Solution:
             energy_balance_max=max(self.energy_balance_max, abs(gained - before) + other.energy_balance_max),
             singular_positions=self.singular_positions + other.singular_positions,
             brake_energy=energy,
+            findings=self.findings + tuple(one for one in other.findings if one.place not in known),
         )

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import numbers_of, with_numbers
-from paraflex.errors import InputError, IntegrationError, Moment
+from paraflex.errors import InputError, IntegrationError, Moment, SliderOffBeamError
+from paraflex.integrators.beam_ends import BeamEnds
 from paraflex.integrators.methods import METHODS, Family, Treatment
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.integrators.options import IntegrationOptions
@@ -136,6 +137,8 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
     ------
     InputError
         See `check_differentiable`.
+    SliderOffBeamError
+        A point that slides along a beam is off it at a sample: a run that ends early has no derivatives.
     IntegrationError
         The run could not be finished, or equations of a stage could not be solved to rounding: it names the time.
     """
@@ -144,6 +147,7 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
     varied = _Varied(problem, run, directions)
     for chunk in _chunks(run):
         varied.go_through(chunk)
+    _check_on_beams(problem, varied.motion)
     derivatives = [_motion(y) for y in varied.variations]
     empty = tuple(np.zeros((0, *part.shape)) for part in varied.motion)
     return RunDerivatives(
@@ -155,6 +159,15 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
         steps=int(run.state.counts[STEPS]),
         unsettled=varied.unsettled,
     )
+
+
+def _check_on_beams(problem: Problem, motion: Motion) -> None:
+    """Raise where a sliding point is off its beam at a sample, and the run would not have gone on."""
+    for gauge in BeamEnds(problem.system, problem.initial).gauges:
+        outside = np.nonzero(gauge.inside(motion.q) <= 0.0)[0]
+        if outside.size and gauge.ends_run:
+            first = int(outside[0])
+            raise SliderOffBeamError(gauge.reached(motion.q[first]), Moment(float(problem.times[first]), first))
 
 
 def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Array:

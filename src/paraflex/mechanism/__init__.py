@@ -17,6 +17,7 @@ from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, Raylei
 from paraflex.mechanism.joints import (
     GROUND,
     AngleLaw,
+    AtEnd,
     AxisJoint,
     Joint,
     Motor,
@@ -61,6 +62,7 @@ from paraflex.mechanism.segments import (
     Segmented,
     check_segmentable,
     finite_segments,
+    is_hinge,
     proportional_segments,
 )
 from paraflex.mechanism.start import BodyValues, Deflection, Start, check_start
@@ -74,6 +76,7 @@ __all__ = [
     "AppliedTorque",
     "Assembly",
     "AssumedModesBeam",
+    "AtEnd",
     "AxisJoint",
     "Body",
     "BodyValues",
@@ -127,6 +130,7 @@ __all__ = [
     "finite_segments",
     "four_bars_in_a_row",
     "given_shapes",
+    "is_hinge",
     "loops",
     "mode_of_motors",
     "mode_of_signs",

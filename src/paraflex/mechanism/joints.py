@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, as_enum
 
 GROUND = "ground"
 
@@ -110,18 +111,48 @@ class WeldJoint:
     angle: float = 0.0
 
 
+class AtEnd(Enum):
+    """What a run does where a point that slides along a beam comes to the beam's end.
+
+    Error:
+        It fails, with what was computed until then.
+    STOP
+        It ends there, as at a limit of the joint, and has not failed.
+    WARN
+        It goes on, beyond what the beam is: deflections are extrapolated. The result says so.
+    IGNORE
+        It goes on and says nothing.
+    """
+
+    ERROR = "error"
+    STOP = "stop"
+    WARN = "warn"
+    IGNORE = "ignore"
+
+
 @dataclass(frozen=True)
 class SlidingJoint:
     """Point b slides along the centre line of a beam, bent as it is, and body b turns freely.
 
     Point a says which beam. The joint's coordinate is how far point b is beyond point a along the x axis of the beam's
     frame [m]. Deflections are taken where the point stands in the undeformed beam, as a linear theory does.
+
+    Attributes
+    ----------
+    name : str
+    a, b : PointRef
+    at_end : AtEnd or str
+        What a run does where point b comes to an end of the beam; a value is taken for the member.
     """
 
     name: str
     a: PointRef
     b: PointRef
+    at_end: AtEnd = AtEnd.ERROR
     direction: ClassVar[float] = 0.0  # along the beam
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at_end", as_enum(AtEnd, self.at_end, f"joint.{self.name}.at_end"))
 
 
 # Joints that hold two points together, and those with an axis that their travel is measured along.

@@ -11,7 +11,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import SpanProperties
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.damping import stiffness_proportional
-from paraflex.mechanism.joints import PointRef, RevoluteJoint
+from paraflex.mechanism.joints import Joint, PointRef, RevoluteJoint, SlidingJoint
 from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import Assembly, Mechanism
 from paraflex.mechanism.poses import approximate_poses
@@ -68,8 +68,8 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
     Raises
     ------
     InputError
-        Fewer than one segment, a beam without a number, a name that is no flexible beam's, or a flexible body of given
-        shapes.
+        Fewer than one segment, a beam without a number, a name that is no flexible beam's, a flexible body of given
+        shapes, or a beam that a joint slides along.
     """
     check_segmentable(mechanism)
     beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.flexible]
@@ -123,14 +123,25 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
     return Segmented(segmented, carriers)
 
 
+def is_hinge(joint: Joint) -> bool:
+    """Whether a joint is one between two finite segments of a beam."""
+    return (joint.a.point, joint.b.point) == (LAST_END, FIRST_END)
+
+
 def check_segmentable(mechanism: Mechanism) -> None:
-    """Nothing, if every flexible body can be cut into segments.
+    """Check that every flexible body can be cut into segments.
 
     Raises
     ------
     InputError
-        A flexible body of given shapes cannot.
+        A flexible body of given shapes cannot, nor a beam that a joint slides along: no segment reaches far enough.
     """
+    for joint in mechanism.joints:
+        if isinstance(joint, SlidingJoint) and getattr(mechanism.body(joint.a.body), "flexible", False):
+            raise InputError(
+                "a beam that a joint slides along cannot be cut into segments", field=f"joint.{joint.name}",
+                value=str(joint.a), remedy="make the beam rigid, or leave out finite segments",
+            )  # fmt: skip
     for name in given_shapes(mechanism.bodies):
         raise InputError(
             "a body of given shapes cannot be cut into segments",

@@ -77,7 +77,10 @@ def run(
         bool, typer.Option("--ked", help="Kineto-elastodynamics: active motors held on the rigid motion.")
     ] = False,
     balanced: Annotated[
-        bool, typer.Option("--balanced", help="Start from static equilibrium, active motors held; else undeformed.")
+        bool,
+        typer.Option(
+            "--balanced", help="Start balanced, active motors held, or moving as drives prescribe; else undeformed."
+        ),
     ] = False,
     after: Annotated[
         str | None,

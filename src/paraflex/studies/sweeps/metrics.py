@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import joint_coordinate
+from paraflex.errors import IntegrationError, Moment
 from paraflex.results.metrics import drift_speed, during_motion, largest, rms, vibration
 from paraflex.results.motion import point_motion
 from paraflex.results.outlines import deflections
@@ -68,7 +69,17 @@ class Metric:
 
 
 def measure(run: TrackingRun, names: tuple[str, ...]) -> dict[str, float | int]:
-    """Columns of a run that ran to its end, in the order of the names; those per motor are called NAME.MOTOR."""
+    """Columns of a run that ran to its end, in the order of the names; those per motor are called NAME.MOTOR.
+
+    Raises
+    ------
+    IntegrationError
+        The run stopped before, at the end of a beam say: its numbers are not those of a whole run.
+    """
+    solution = run.solution
+    if solution.event:
+        cause = f"stopped before its end, at {solution.event}: no metrics"
+        raise IntegrationError(cause, Moment(solution.event_time, solution.steps), run)
     traces = make_traces(run)
     motors = [motor.name for motor in run.task.mechanism.motors]
     out: dict[str, float | int] = {}

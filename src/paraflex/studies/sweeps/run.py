@@ -86,13 +86,13 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     for row in rows:
         try:
             run = _simulate(planned, row["mode"], options, watch)
+            row |= measure(run, setting.metrics) | {"status": COMPLETE, "time_reached": float(run.solution.t[-1])}
         except Abandoned:
             raise
         # Whatever a strange design does, it is that design's row and not the end of the sweep.
         except Exception as error:
             row |= trouble(error)
             continue
-        row |= measure(run, setting.metrics) | {"status": COMPLETE, "time_reached": float(run.solution.t[-1])}
         if setting.trajectories:
             kept[row["id"]] = _trajectory(run, options, row)
     return Outcome(task, rows, kept)
@@ -117,6 +117,7 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
         assembly=setting.assembly or model.study.assembly,
         orientation=model.study.orientation,
         after=model.study.after,
+        warning=False,
     )
     return planned, options
 

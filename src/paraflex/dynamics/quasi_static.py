@@ -1,0 +1,191 @@
+"""A balanced start: static equilibrium where drives are at rest, else the deflection that their motion needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics.brake import HeldAngle
+from paraflex.dynamics.equilibrium import moving_equilibrium, static_equilibrium
+from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.projection import least_change
+from paraflex.dynamics.rank import dependence
+from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.state import State
+from paraflex.dynamics.system import System, build_system
+from paraflex.kernel.packed import CONSTRAINT, INDEX_1
+from paraflex.kernel.stage import equations
+from paraflex.mechanism import AngleLaw, PrescribedAngle
+
+Array = NDArray[np.float64]
+
+# Weight of stiffness against mass [s^2]: that of `dynamics.state`, links move and do not begin to bend.
+_STIFFNESS = 1e3
+# How far the mechanism moves for a central difference [m, rad].
+_MOVE = 1e-3
+# Projections onto the constraints: what rounding left of the first the second takes away.
+_PROJECTIONS = 2
+
+
+class JointMotion(NamedTuple):
+    """Rate and acceleration that a joint is driven with [rad/s, rad/s^2; m/s, m/s^2]; none of a joint that is held."""
+
+    rate: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True)
+class DrivenAngle:
+    """An angle [rad], or a travel [m], with its rate and acceleration at a time [s]."""
+
+    time: float
+    value: float
+    motion: JointMotion
+    knots: tuple[float, ...] = ()
+
+    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
+        """Value, rate and acceleration at times t."""
+        s, (rate, acceleration) = t - self.time, self.motion
+        return (
+            self.value + rate * s + 0.5 * acceleration * s**2,
+            rate + acceleration * s,
+            np.full(t.shape, acceleration),
+        )  # fmt: skip
+
+
+def joint_motions(system: System, q: Array, v: Array, a: Array, joints: Iterable[str]) -> dict[str, JointMotion]:
+    """Rates and accelerations of joints in a motion q, v, a (n,), J v and J a + J' v.
+
+    Of angles J is constant; of travels J' v comes from differences along the motion.
+    """
+    motions = {}
+    step = 1e-4 / max(1.0, float(np.max(np.abs(v), initial=0.0)))
+    places = np.array([q - step * v, q, q + step * v])
+    for name in joints:
+        found = joint_coordinate(system, name, places, np.array([v, v, v]))
+        turning = (found.rate[2] - found.rate[0]) / (2.0 * step)
+        motions[name] = JointMotion(float(found.rate[1]), float(found.rows[1] @ a + turning))
+    return motions
+
+
+def balanced_state(system: System, start: State, driven: Mapping[str, JointMotion]) -> State:
+    """The start from which links need not vibrate.
+
+    Where every drive is at rest that is `static_equilibrium`: they are held at the angles they have. Where one of them
+    moves, links are deflected as that motion needs them, q with
+
+        M a + h(q, v) + K q + Phi_q^T lambda = Q(q, v),   Phi(q, t) = 0,   Phi' = 0,   Phi'' = 0,
+
+    v and a the motion of the drives with links that keep their shape (the least v and a in the metric M + s K that
+    constraints allow). Weight, loads and inertia forces are balanced, dampers and friction at joints included. The
+    velocities of the start are those at which this pose moves on with the drives, by central differences, projected on
+    the constraints: those of drives are their laws' to rounding. What is left out are the inertia forces of the
+    changing shape, a fraction (Omega / omega)^2 of the deflection for drives of angular frequency Omega and links
+    of omega.
+
+    Springs at joints count as elastic. Where drives leave other freedoms their motion is not given: the pose is then
+    that of static equilibrium, with the velocities of least kinetic energy.
+
+    Parameters
+    ----------
+    system : System
+    start : State
+        Where the search begins; its v does not matter.
+    driven : mapping of str to JointMotion
+        Joints, besides those with a prescribed law, that keep the coordinate they have at the start, slopes of beams
+        included, and how they move there.
+
+    Raises
+    ------
+    AssemblyError
+        No equilibrium is found near the start.
+    """
+    prescribed = {law.joint: law for law in system.mechanism.prescribed}
+    driven = {joint: motion for joint, motion in driven.items() if joint not in prescribed}
+    now = np.array([start.time])
+    rates = [law.law.evaluate(now)[1][0] for law in prescribed.values()] + [motion.rate for motion in driven.values()]
+    if not np.any(rates):
+        return static_equilibrium(system, start, list(driven))
+    drives = _driven(system, start, driven)
+    if not _prescribes_all(drives, start):
+        still = static_equilibrium(system, start, list(driven))
+        return replace(still, v=_Motion(drives, start.time).velocities(still.q))
+    return _moving(drives, start)
+
+
+def _moving(drives: System, start: State) -> State:
+    """The moving equilibrium, with the velocities at which it moves on."""
+
+    def at(time: float, q: Array) -> Array:
+        return moving_equilibrium(drives, State(time, q, np.zeros_like(q)), _Motion(drives, time))
+
+    motion, q = _Motion(drives, start.time), at(start.time, start.q)
+    v = motion.velocities(q)
+    step = _MOVE / float(np.max(np.abs(v)))
+    before, after = (at(start.time + h, q + h * v) for h in (-step, step))
+    return State(start.time, q, motion.velocities(q, (after - before) / (2.0 * step)))
+
+
+class _Motion:
+    """Velocities and accelerations that drives give a system, its links keeping the shape they have."""
+
+    def __init__(self, system: System, time: float) -> None:
+        self.system, self.time = system, time
+        self.signals, self.workspace = moment_signals(system.mechanism, time), system.workspace()
+        self.torques, self.none = np.zeros(len(system.mechanism.motors)), np.zeros(system.m)
+        self.fixed = system.packed.rows["kind"] == CONSTRAINT
+
+    def __call__(self, q: Array) -> tuple[Array, Array]:
+        """Velocities and accelerations (n,) at coordinates (n,)."""
+        v, a = self.velocities(q), np.zeros(self.system.n)
+        for _ in range(_PROJECTIONS):
+            a = a - least_change(self.system, q, self._accelerations(q, v, a), _STIFFNESS, every_spring=True)
+        return v, a
+
+    def velocities(self, q: Array, near: Array | None = None) -> Array:
+        """Those allowed (n,) at coordinates (n,) that are nearest to others, to none by default."""
+        v = np.zeros(self.system.n) if near is None else near
+        for _ in range(_PROJECTIONS):
+            v = v - least_change(
+                self.system, q, self.system.constraints(self.signals, self.time, q, v)[1], _STIFFNESS, every_spring=True
+            )
+        return v
+
+    def _accelerations(self, q: Array, v: Array, a: Array) -> Array:
+        """Phi'' (m,), zero in rows of springs and dampers."""
+        ws = self.workspace
+        equations(self.system.packed, self.signals, self.time, INDEX_1, q, v, a, self.none, self.torques, ws)
+        return np.where(self.fixed, ws.rows, 0.0)
+
+
+def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> System:
+    """The same system with laws at the joints driven too, each as it is at the start and smooth either side of that."""
+    own = tuple(
+        replace(prescribed, law=_smooth(prescribed.law, start.time)) for prescribed in system.mechanism.prescribed
+    )
+    values = {name: float(joint_coordinate(system, name, start.q[None]).value[0]) for name in driven}
+    more = tuple(
+        PrescribedAngle(f"drive of {name}", name, DrivenAngle(start.time, values[name], motion))
+        for name, motion in driven.items()
+    )
+    return build_system(replace(system.mechanism, prescribed=(*own, *more)), system)
+
+
+def _smooth(law: AngleLaw, time: float) -> DrivenAngle:
+    value, rate, acceleration = (float(x[0]) for x in law.evaluate(np.array([time])))
+    return DrivenAngle(time, value, JointMotion(rate, acceleration))
+
+
+def _prescribes_all(drives: System, start: State) -> bool:
+    """Whether drives and springs at joints leave rigid bodies no freedom."""
+    mechanism = drives.mechanism
+    taken = {prescribed.joint for prescribed in mechanism.prescribed}
+    springs = {spring.joint for spring in mechanism.springs} - taken
+    locks = tuple(PrescribedAngle(f"spring of {name}", name, HeldAngle(0.0)) for name in springs)
+    rigid = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *locks)).rigid())
+    frames = np.concatenate([start.q[body.offset : body.offset + 3] for body in drives.bodies])
+    return dependence(rigid, frames).rank == rigid.n

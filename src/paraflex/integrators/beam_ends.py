@@ -1,0 +1,136 @@
+"""Points that slide along beams, at the ends of these: refused at the start, watched in a run, reported after it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from paraflex.dynamics import State, System
+from paraflex.errors import InputError, Moment, UnreachablePathError
+from paraflex.findings import Finding
+from paraflex.integrators.crossing import Crossing, first_crossing
+from paraflex.integrators.events import BeamEnd
+from paraflex.integrators.gauges import Gauge, beam_end_gauges
+from paraflex.mechanism import AtEnd
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Leaving:
+    """A point that goes on where its beam ends, since when [s]."""
+
+    gauge: Gauge
+    time: float
+
+
+class BeamEnds:
+    """What a run looks for at the ends of beams, and which points have left theirs.
+
+    Parameters
+    ----------
+    system : System
+    start : State
+
+    Raises
+    ------
+    InputError
+        A point is off its beam at the start, and its joint does not say that the run is to go on.
+    """
+
+    def __init__(self, system: System, start: State) -> None:
+        self._left: list[_Leaving] = []
+        within = []
+        for gauge in beam_end_gauges(system):
+            if gauge.inside(start.q[None])[0] > 0.0:
+                within.append(gauge)
+            elif gauge.ends_run:
+                raise _off_at_start(gauge, start)
+            else:
+                self._left.append(_Leaving(gauge, start.time))
+        self.gauges = tuple(within)
+
+    def pass_over(self, crossing: Crossing, gauges: Sequence[Gauge]) -> tuple[tuple[Gauge, ...], Crossing | None]:
+        """Gauges that a run goes on with after a crossing, and the crossing that ends it, in the same step, or None."""
+        left, found = tuple(gauges), crossing
+        while found is not None and not found.gauge.ends_run:
+            self._left.append(_Leaving(found.gauge, found.t))
+            left = tuple(gauge for gauge in left if gauge is not found.gauge)
+            found = first_crossing(left, found.before, found.after)
+        return left, found
+
+    def findings(self, q: Array) -> tuple[Finding, ...]:
+        """One for each point that left its beam; samples q (k, n) say how far it came."""
+        return tuple(_finding(one, one.gauge.value(q)) for one in self._left)
+
+
+def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
+    """Findings of points that a motion at samples t, q, v takes off their beams, by cubics between samples.
+
+    Raises
+    ------
+    UnreachablePathError
+        A point leaves a beam whose joint asks for an error.
+    """
+    found = []
+    for gauge in beam_end_gauges(system):
+        outside = np.nonzero(gauge.inside(q) <= 0.0)[0]
+        if not outside.size:
+            continue
+        end, k = gauge.event, int(outside[0])
+        assert isinstance(end, BeamEnd)
+        time = float(t[0]) if k == 0 else _first_outside(gauge, t, q, v, k)
+        if end.at_end is AtEnd.ERROR:
+            raise UnreachablePathError(_planned(end, gauge.value(q)), Moment(time, k))
+        if end.at_end is AtEnd.WARN:
+            found.append(_finding(_Leaving(gauge, time), gauge.value(q)))
+    return tuple(found)
+
+
+def _first_outside(gauge: Gauge, t: Array, q: Array, v: Array, k: int) -> float:
+    """When a motion comes to a bound between its samples k - 1 and k."""
+    path = CubicHermiteSpline(t[k - 1 : k + 1], q[k - 1 : k + 1], v[k - 1 : k + 1])
+
+    def inside(time: float) -> float:
+        return float(gauge.inside(path(time)[None])[0])
+
+    return float(scipy.optimize.brentq(inside, t[k - 1], t[k]))
+
+
+def _planned(end: BeamEnd, places: Array) -> str:
+    far = places[np.argmax(np.abs(places - 0.5 * end.length))]
+    return (
+        f"the path takes joint {end.joint} as far as {far:.6g} m from the first end of its beam {end.beam}, which is "
+        f'{end.length:.6g} m long (at_end = "error"): it comes to the end'
+    )
+
+
+def _off_at_start(gauge: Gauge, start: State) -> InputError:
+    end = gauge.event
+    assert isinstance(end, BeamEnd)
+    place = float(gauge.value(start.q[None])[0])
+    return InputError(
+        f"its point is off the beam at the start, t = {start.time:.6g} s: {place:.6g} m from the first end of "
+        f"{end.beam}, which is {end.length:.6g} m long",
+        field=f"joint.{end.joint}",
+        remedy='start within the beam, lengthen it, or let the run go on with at_end = "warn"',
+    )
+
+
+def _finding(one: _Leaving, places: Array) -> Finding:
+    end = one.gauge.event
+    assert isinstance(end, BeamEnd)
+    beyond = np.maximum(-places, places - end.length)
+    far = f", as far as {places[np.argmax(beyond)]:.6g} m from its first end" if np.max(beyond, initial=0.0) > 0 else ""
+    return Finding(
+        "slider-off-beam",
+        f"joint.{end.joint}",
+        f"its point leaves {end.beam}, {end.length:.6g} m long, at t = {one.time:.6g} s{far}: deflections there are "
+        "extrapolated",
+        'lengthen the beam, or end runs there with at_end = "stop" or "error"',
+    )
