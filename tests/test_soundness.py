@@ -220,7 +220,7 @@ def test_info_says_what_is_sound_and_what_is_not(tmp_path):
     assert facts["assembly_closes"] is not True
     assert facts["starts"][0]["gap"] == pytest.approx(0.2, rel=1e-3)
     assert facts["starts"][0]["where"] == ["C"]
-    assert facts["complaints"][0].startswith('assembly "outward": the loops do not close: a gap of 0.2 remains in C')
+    assert facts["complaints"][0].startswith('assembly "outward": the loops do not close: a gap of 0.2 m remains in C')
     assert "not sound: assembly" in paraflex("info", str(broken)).stdout
 
 
