@@ -385,7 +385,9 @@ def _drive_and_hold(
         efforts = np.concatenate([torques.evaluate(driven.t[:count]), efforts[: held.t.size - bool(held.event)]])
         return TrackingRun(task, torques, condition, solution, title, holding=efforts)
 
-    left = replace(options, max_steps=max(1, options.max_steps - driven.steps - driven.rejected))
+    left = options
+    if options.max_steps is not None:
+        left = replace(options, max_steps=max(1, options.max_steps - driven.steps - driven.rejected))
     try:
         held = integrate(
             braked.system, signals, braked.state, times[count:], knots=np.array(knots), options=left,

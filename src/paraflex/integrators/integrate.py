@@ -16,6 +16,7 @@ from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.gauges import make_gauges
 from paraflex.integrators.methods import Family
 from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
 from paraflex.integrators.watch import bent_too_far, come_apart, least_norm
@@ -24,8 +25,11 @@ from paraflex.kernel.run_state import ERROR_TEST, FINISHED, NO_CONVERGENCE, NOT_
 
 # Attempted steps between two looks: some milliseconds for a dozen bodies.
 _SLICE = 200
+# Attempts that tell a run's pace: of our own methods, and of those of others, whose steps take ten times as long.
+_WINDOW, _WINDOW_OUTSIDE = 50_000, 5_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
+_NATIVE = (Family.ESDIRK, Family.NEWMARK)
 _NOT_IN_PARTS = (
     "Newton's iteration does not converge in a fixed step, nor in parts of it; "
     "take a shorter step, or leave it out and choose a tolerance"
@@ -87,20 +91,27 @@ def integrate(
     problem = make_problem(system, signals, initial, times, knots)
     gauges, crossing = make_gauges(system, initial.q, options.events), None
     run = prepare(problem, options)
-    status, message, bent, drift, now = "complete", "", "", "", None
+    status, message, bent, drift, slow = "complete", "", "", "", ""
+    native_method = options.description.family in _NATIVE
+    pace = Pace(
+        initial.time, float(problem.times[-1]), options.max_steps, _WINDOW if native_method else _WINDOW_OUTSIDE
+    )
     code, limits = PAUSED, (run.dependent_rows, options.tolerance)
     try:
         run.start()
         while code == PAUSED:
-            if run.attempts >= options.max_steps:
+            if run.attempts >= pace.most:
                 break
-            code, crossing = advance(run, gauges, min(_SLICE, options.max_steps - run.attempts))
+            code, crossing = advance(run, gauges, min(_SLICE, pace.most - run.attempts))
             if crossing is not None:
                 status, message = "stopped", crossing.message
                 break
             now = run.now()
             bent, drift = bent_too_far(system, now.q), come_apart(system, signals, now.t, now.q, *limits)
             if bent or drift:
+                break
+            if code == PAUSED and pace.look(run.attempts, now.t):
+                slow = too_slow(system, now, initial.q, pace)
                 break
             if on_progress is not None:
                 on_progress(now.t)
@@ -109,7 +120,7 @@ def integrate(
     solution = _solution(run, options, time.perf_counter() - began, status, message, crossing)
     if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution
-    cause = bent or drift or _cause(code, options)
+    cause = bent or drift or slow or _cause(code, options, pace)
     now = run.now()
     # Near a singular position it may be Newton or the error test that gives up first.
     lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and not (bent or drift) else []
@@ -125,14 +136,14 @@ def integrate(
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     """A run of a problem by the method of the options, not yet started."""
     family = options.description.family
-    if family in (Family.ESDIRK, Family.NEWMARK):
+    if family in _NATIVE:
         return native.prepare(problem, options)
     return outside.prepare(problem, options)
 
 
-def _cause(code: int, options: IntegrationOptions) -> str:
+def _cause(code: int, options: IntegrationOptions, pace: Pace) -> str:
     if code == PAUSED:
-        return f"no end after {options.max_steps} steps"
+        return f"no end after {pace.most} steps"
     return _NOT_IN_PARTS if code == NO_CONVERGENCE and options.step is not None else _CAUSES[code]
 
 

@@ -30,7 +30,7 @@ from paraflex.mechanism.mechanism import TASK_COORDINATES
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
 _LONGEST_STEP = 1e-3
 # Where such a step is too long it is cut into pieces, and these again; a step shorter than this is short enough [s].
-_PIECES, _SHORTEST_STEP = 16, 1e-6
+_PIECES, _SHORTEST_STEP = 16, 1e-8
 # Steps from the assembly's pose to the start of the path; more where these fail.
 _APPROACHES = (25, 250, 2500)
 # Instants at which the distance of an unreachable path from what can be reached is looked at, evenly spaced besides the
@@ -38,6 +38,8 @@ _APPROACHES = (25, 250, 2500)
 _LOOKS, _MORE_LOOKS = 41, 9
 # A path that leaves what can be reached within this part of what is left of it does so where closure stopped.
 _SOON = 0.05
+# A path that passes within a thousandth of a link of such a position cannot be told from one through it.
+_ALMOST = "or so near to one that the assembly beyond it cannot be told"
 _OTHER = "it can be reached, but only past a Type I singularity or in another assembly"
 
 
@@ -324,7 +326,7 @@ class PathClosure:
         at = float(grid[index])
         # Where the path leaves the workspace the Jacobian is singular as well, but beyond nothing closes.
         found = self.shortfall(path, at, float(grid[-1]), pose if last < 0 else found[0][last])
-        cause, detail = "the path passes a Type I singularity", ""
+        cause, detail = "the path passes a Type I singularity", _ALMOST
         if np.any(found.out[found.t <= at + _SOON * (found.t[-1] - at)]):
             cause, detail = "the path goes out of reach", ""
         elif np.any(found.elsewhere):
