@@ -15,7 +15,7 @@ from paraflex.kernel.packed import Signals
 _LARGEST_SLOPE = 2.0
 # Joints that are further apart than this part of the mechanism's size, or motions further off [rad], have come apart.
 # Where constraints depend on one another they contradict one another long before.
-_APART, _CONTRADICTION = 5e-3, 5e-4
+_APART, _CONTRADICTION = 7e-3, 7e-4
 # Multipliers that exert the same forces but for this fraction are the same.
 _SAME_FORCES = 1e-9
 
