@@ -16,7 +16,7 @@ def test_links_thrown_about_at_a_base_pivot_are_given_up_within_seconds():
     # steps until the end of a motion that means nothing.
     mechanism = load("raparm_i").mechanism
     task = plan_tracking(mechanism, Line((-0.18, 0.02), (-0.02, 0.02), 40.0), duration=0.2, samples=101)
-    with pytest.raises(IntegrationError, match=r"steps have shrunk to .* this pace the run would need") as caught:
+    with pytest.raises(IntegrationError, match=r"steps are down to .* this pace the run would need") as caught:
         task.simulate("++++", method="tr-bdf2", options=IntegrationOptions(method="tr-bdf2", tolerance=1e-4))
     text, solution = str(caught.value), caught.value.partial.solution
     assert "rad/s and accelerates by" in text

@@ -78,7 +78,7 @@ def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace) -> str
     """Why a run is given up early: how small its steps are, what moves fastest, and what to do."""
     needed = f"about {pace.expected:.2g}" if math.isfinite(pace.expected) else "infinitely many"
     return (
-        f"steps have shrunk to {pace.step:.2g} s, and at this pace the run would need {needed} of them: "
+        f"steps are down to {pace.step:.2g} s, and at this pace the run would need {needed} of them: "
         f"{_fastest(system, now)}{_singular(system, now, start)}; choose a motion that turns links less fast, a "
         "coarser tolerance, or allow more steps (max_steps): given up"
     )

@@ -360,7 +360,8 @@ class PathClosure:
     ) -> UnreachablePathError:
         """The error of a path that cannot be followed: when, where, and how far its furthest point is out of reach."""
         lengths, k = self.coordinates != 2, found.furthest
-        if found.out[k] and (k or not found.out[0] or not detail):
+        # A path that comes back to its start is as far there: said once.
+        if found.out[k] and found.beyond(k) != found.beyond(0):
             place = ", ".join(f"{x:.4g}" for x in found.desired[k, lengths])
             place = f"({place}) m" if place else f"at t = {found.t[k]:.6g} s"
             furthest = f"its furthest point, {place}, lies {found.beyond(k)} beyond reach"
