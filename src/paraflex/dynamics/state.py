@@ -134,7 +134,7 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
 
 def closed(system: System, q: NDArray[np.float64], phi: NDArray[np.float64]) -> bool:
     """Whether what constraints (m,) leave open at q is rounding: of the size of the mechanism, or of places far off."""
-    far = float(np.max(np.abs(q) / system.units, initial=1.0))
+    far = max(float(np.max(np.abs(q[body.position]), initial=system.size)) for body in system.bodies) / system.size
     return system.gap(phi) < CLOSED * far
 
 
