@@ -346,7 +346,7 @@ def test_an_assembly_that_cannot_close_says_which_joint_is_open():
     # A rocker that cannot reach: 0.1 + 0.3 + 0.25 m of links over 0.8 m.
     wide = replace(four_bar(("x",)), ground={"O": (0.0, 0.0), "D": (0.8, 0.0)})
     # Stretched out, put together from the ground on, all of what is missing is open at the joint that closes the loop.
-    with pytest.raises(AssemblyError, match=r"do not close: a gap of 0\.15 remains in D at"):
+    with pytest.raises(AssemblyError, match=r"do not close: a gap of 0\.15 m remains in D at"):
         follow_path(wide, Line((0.0, 0.0), (0.1, 0.0), 1.0), [0.0])
 
 

@@ -187,7 +187,7 @@ def test_a_dependence_names_the_rows_it_is_among(monkeypatch, limit):
 @pytest.mark.parametrize(
     ("other", "error", "says"),
     [
-        ({"c0": 0.2}, AssemblyError, r"a gap of 0\.1 remains in law. and law. at"),
+        ({"c0": 0.2}, AssemblyError, r"a gap of 0\.1 rad remains in law. and law. at"),
         ({"c1": 0.2}, InconsistentConstraintsError, r"velocities of constraints contradict one another, by 0\.2: law"),
         ({"c2": 0.2}, InconsistentConstraintsError, r"accelerations .* contradict one another, by 0\.4: law"),
     ],

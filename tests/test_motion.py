@@ -276,5 +276,5 @@ def test_loops_that_do_not_close_are_said_so_with_the_gap(tmp_path):
     file.write_text(text.replace("O = [0.0, 0.0]\n[body", "O = [0.0, 0.0]\nP = [0.2, 0.0]\n[body"))
     done = paraflex("run", "-m", str(file), "--duration", "1", "--out", str(tmp_path / "out"))
     assert done.returncode == 2
-    assert f"{file}: assembly: the loops do not close: a gap of 0.2 remains in far" in done.stderr
+    assert f"{file}: assembly: the loops do not close: a gap of 0.2 m remains in far" in done.stderr
     assert not (tmp_path / "out").exists()

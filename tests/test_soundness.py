@@ -226,7 +226,7 @@ def test_info_says_what_is_sound_and_what_is_not(tmp_path):
     assert facts["verdict"]["level"] == "wrong"
     finding = facts["verdict"]["findings"][0]
     assert (finding["code"], finding["place"]) == ("assembly-open", "assembly.outward")
-    assert finding["text"].startswith("the loops do not close: a gap of 0.2 remains in C")
+    assert finding["text"].startswith("the loops do not close: a gap of 0.2 m remains in C")
     assert "wrong: assembly.outward: the loops do not close" in paraflex("info", str(broken)).stdout
 
 

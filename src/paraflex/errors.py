@@ -163,7 +163,31 @@ class AssemblyError(NumericalError):
 
 
 class UnreachablePathError(AssemblyError):
-    """The end-effector cannot follow the path: out of reach, or past a Type I singularity."""
+    """The end-effector cannot follow the path: out of reach, or past a Type I singularity.
+
+    Attributes
+    ----------
+    shortfall : float
+        Distance of the furthest point of the path from those that can be reached [m]; zero where all can.
+    shortfall_angle : float
+        The same of the end-effector's angle, where it is prescribed [rad].
+    """
+
+    def __init__(
+        self,
+        cause: str,
+        moment: Moment | None = None,
+        partial: Any = None,
+        *,
+        detail: str = "",
+        shortfall: float = 0.0,
+        shortfall_angle: float = 0.0,
+    ) -> None:
+        super().__init__(cause, moment, partial)
+        self.detail, self.shortfall, self.shortfall_angle = detail, shortfall, shortfall_angle
+
+    def __str__(self) -> str:
+        return f"{super().__str__()}: {self.detail}" if self.detail else super().__str__()
 
 
 class InconsistentConstraintsError(NumericalError):

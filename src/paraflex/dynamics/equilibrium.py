@@ -19,13 +19,13 @@ from paraflex.kernel.packed import CONSTRAINT, INDEX_1
 from paraflex.kernel.stage import equations
 
 _MAX_ITERATIONS = 50
-# Newton's iteration has converged when it moves links by less than this [m, rad] ...
+# Newton's iteration has converged when it moves links by less than this [sizes of the mechanism, rad] ...
 _SMALLEST_MOVE = 1e-10
 # ... and what is left of the forces is less than this fraction of the largest.
 _BALANCED = 1e-6
 # Differences that the Jacobian is taken by; forces are linear in multipliers and nearly so in small displacements.
 _DIFFERENCE = 1e-6
-# A pose that moves by more than this in one iteration has left the neighbourhood of the start [m, rad].
+# No link is moved by more than this in one iteration [sizes of the mechanism, rad].
 _LONGEST_STEP = 0.3
 # Up to so many unknowns a dense Jacobian, whose dependent columns least squares can tell, is fast enough.
 _DENSE = 400
@@ -96,25 +96,27 @@ def _find(system: System, start: State, held: Sequence[str], motion: Motion | No
 
 
 def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> NDArray[np.float64]:
-    n, m, size = system.n, system.m, system.n + system.m + len(held)
+    n, m = system.n, system.m
     residual = _Residual(system, start, held)
     z = np.concatenate([start.q, np.zeros(m + len(held))])
-    # Stiffness spans ten powers of ten: modes are scaled to a stiffness of one.
-    scale = np.ones(size)
+    # Without dimension: forces by an effort of the mechanism's mass and size, modes such that their stiffness is one.
+    effort, units = system.total_mass * system.size**2, np.append(1.0 / system.row_units, np.ones(len(held)))
+    scale, by_force = np.append(system.units, effort * units), np.append(system.units / effort, units)
     for body in system.bodies:
-        scale[body.flexible] = 1.0 / np.maximum(body.modes.omega, 1.0)
+        scale[body.flexible] = np.sqrt(effort) / np.maximum(body.modes.omega, 1.0)
+        by_force[body.flexible] = scale[body.flexible] / effort
     for _ in range(_MAX_ITERATIONS):
         if motion is not None:
             residual.v, residual.a = motion(z[:n])
-        value = scale * residual(z)
+        value = by_force * residual(z)
         jacobian = np.column_stack(
-            [(scale * residual(z + _DIFFERENCE * unit) - value) / _DIFFERENCE for unit in np.diag(scale)]
+            [(by_force * residual(z + _DIFFERENCE * unit) - value) / _DIFFERENCE for unit in np.diag(scale)]
         )
         # Dependent rows and motors that hold one another leave multipliers open: those of least norm.
         change = scale * np.linalg.lstsq(jacobian, -value, rcond=1e-12)[0]
-        reach = max(np.max(np.abs(change[body.offset : body.offset + 3])) for body in system.bodies)
+        reach = _largest_move(system, change[:n])
         z += change * min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
-        if reach <= _SMALLEST_MOVE and np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_force:
+        if reach <= _SMALLEST_MOVE and effort * np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_torque:
             return z[:n]
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), partial=z[:n])
 
@@ -146,11 +148,11 @@ def _sparse_equilibrium(
             break
         if not np.all(np.isfinite(change)):
             break
-        reach = max(np.max(np.abs(change[body.offset : body.offset + 3])) for body in system.bodies)
+        reach = _largest_move(system, change)
         part = min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
         q, mu = q + part * change, mu + part * more
-        largest = max(np.max(np.abs(lam), initial=0.0), np.max(np.abs(mu), initial=0.0))
-        if reach <= _SMALLEST_MOVE and np.max(np.abs(f)) <= _BALANCED * largest:
+        largest = max(np.max(np.abs(system.row_units * lam), initial=0.0), np.max(np.abs(mu), initial=0.0))
+        if reach <= _SMALLEST_MOVE and np.max(np.abs(system.units * f)) <= _BALANCED * largest:
             return q
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), partial=q)
 
@@ -167,6 +169,11 @@ def _solve(
     return z[: f.size], z[f.size :] * size
 
 
+def _largest_move(system: System, change: NDArray[np.float64]) -> float:
+    """How far a change of coordinates moves links [sizes of the mechanism, rad]."""
+    return max(float(np.max(np.abs(change / system.units)[body.offset : body.offset + 3])) for body in system.bodies)
+
+
 class _Residual:
     """Forces, constraints and held joints at (q, multipliers, holding torques), in motion at `v` and `a` (n,)."""
 
@@ -177,7 +184,7 @@ class _Residual:
         self.signals = moment_signals(mechanism, start.time)
         self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
         self.v, self.a, self.still = np.zeros((3, system.n))
-        self.largest_force = 0.0
+        self.largest_torque = 0.0
         # Rows of friction come with a scale of their own, none by default.
         self.workspace.compliance[:] = system.packed.rows["compliance"]
 
@@ -197,5 +204,6 @@ class _Residual:
         closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
         value, rows = self.joints(q)
         holding = rows.T @ torque
-        self.largest_force = max(np.max(np.abs(lam), initial=0.0), np.max(np.abs(holding), initial=0.0))
+        torques = (np.abs(system.row_units * lam), np.abs(system.units * holding))
+        self.largest_torque = max(np.max(part, initial=0.0) for part in torques)
         return np.concatenate([ws.f + holding, closed, value - self.kept])

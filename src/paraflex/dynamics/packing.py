@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics.constraints import Constraint, axis_of
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
+from paraflex.dynamics.scale import mechanism_size
 from paraflex.kernel.packed import (
+    ANGLE,
     AXIS,
     AXIS_RECORD,
     BODY,
@@ -40,7 +42,8 @@ def pack_system(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], constraints: list[Constraint]
 ) -> tuple[PackedSystem, tuple[str, ...]]:
     """Records and arrays for the kernels, and the name of every constraint row."""
-    packer = _Packer(mechanism, bodies, index)
+    size = mechanism_size(bodies)
+    packer = _Packer(mechanism, bodies, index, size)
     for constraint in constraints:
         packer.add_constraint(constraint)
     for k, motor in enumerate(mechanism.motors):
@@ -86,6 +89,7 @@ def pack_system(
         spans=np.concatenate([_spans(body).ravel() for body in bodies]),
         inertias=np.concatenate([_inertias(body).ravel() for body in bodies]),
         total_mass=np.sum([body.integrals.m for body in bodies]).item(),
+        size=size,
         gravity=np.array(mechanism.gravity) * 1.0,
     )
     return packed, tuple(packer.labels)
@@ -94,8 +98,10 @@ def pack_system(
 class _Packer:
     """Gathers the records of a system, joint by joint."""
 
-    def __init__(self, mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int]) -> None:
-        self.mechanism, self.bodies, self.index = mechanism, bodies, index
+    def __init__(
+        self, mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], size: float
+    ) -> None:
+        self.mechanism, self.bodies, self.index, self.size = mechanism, bodies, index, size
         self.markers: list[Marker] = []
         self.ports: list[list[dict]] = [[] for _ in bodies]
         self.efforts: list[list[dict]] = [[] for _ in bodies]
@@ -123,6 +129,7 @@ class _Packer:
             "signal": constraint.signal,
             "compliance": constraint.compliance,
             "limit": constraint.limit,
+            "unit": 1.0 if constraint.kind == ANGLE else self.size,
             "ground": -constraint.rest,
         }
         self.rows += [dict(record) for _ in constraint.labels]

@@ -15,7 +15,7 @@ from paraflex.errors import InconsistentConstraintsError, Moment
 
 # Joints named in an error.
 NAMED = 6
-# What constraints may leave of each other's rates (m, rad; s), as a fraction of what they ask for.
+# What constraints may leave of each other's rates (sizes of the mechanism, rad; s), as a fraction of what they ask for.
 _CONFLICT = 1e-6
 
 
@@ -42,10 +42,12 @@ def least_change(
     if stiffness:
         metric = metric + stiffness * elastic_stiffness(system, q, every_spring=every_spring).toarray()
     weighted = np.linalg.solve(metric, jacobian.T)
-    schur = jacobian @ weighted
+    # Without dimension: rows of angles and of lengths would differ by the square of the mechanism's size.
+    units = system.row_units
+    schur = (jacobian @ weighted) / np.outer(units, units)
     if damping:
         schur += damping * np.mean(np.diag(schur)) * np.eye(system.m)
-    return weighted @ np.linalg.lstsq(schur, residual, rcond=1e-12)[0]
+    return weighted @ (np.linalg.lstsq(schur, residual / units, rcond=1e-12)[0] / units)
 
 
 def _sparse_change(
@@ -60,8 +62,9 @@ def _sparse_change(
     metric = sparse_mass(system, q)
     if stiffness:
         metric = scipy.sparse.csr_matrix(metric + stiffness * elastic_stiffness(system, q, every_spring=every_spring))
+    jacobian = scipy.sparse.csr_matrix(scipy.sparse.diags(1.0 / system.row_units) @ jacobian)
     mean = float(np.mean(jacobian.multiply(jacobian) @ (1.0 / np.asarray(metric.diagonal(), dtype=float))))
-    return Saddle(metric, jacobian, np.full(system.m, damping * mean)).solve(r=residual)[0]
+    return Saddle(metric, jacobian, np.full(system.m, damping * mean)).solve(r=residual / system.row_units)[0]
 
 
 def joint_gaps(system: System, phi: NDArray[np.float64]) -> dict[str, float]:
@@ -71,6 +74,11 @@ def joint_gaps(system: System, phi: NDArray[np.float64]) -> dict[str, float]:
         gaps[joint_of_row(row)] = math.hypot(gaps.get(joint_of_row(row), 0.0), value)
     largest = max(gaps.values(), default=0.0)
     return {name: gap for name, gap in sorted(gaps.items(), key=lambda item: -item[1]) if gap >= 0.1 * largest}
+
+
+def gap_unit(system: System, phi: NDArray[np.float64]) -> str:
+    """The unit of the largest number among constraint rows (m,)."""
+    return "rad" if system.rows[int(np.argmax(np.abs(phi)))].endswith(" angle") else "m"
 
 
 def refuse_conflict(
@@ -83,7 +91,7 @@ def refuse_conflict(
     InconsistentConstraintsError
         It names joints and prescribed motions that depend on one another.
     """
-    if not np.max(np.abs(left), initial=0.0) > _CONFLICT * max(1.0, np.max(np.abs(wanted), initial=0.0)):
+    if not system.gap(left) > _CONFLICT * max(1.0, system.gap(wanted)):
         return
     raise InconsistentConstraintsError(contradiction(system, wanted, dependence(system, q), what), Moment(t, 0))
 

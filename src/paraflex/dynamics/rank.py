@@ -81,18 +81,23 @@ def dependence(
     if rigid.size == 0:
         return Dependence(rigid, rigid, np.zeros((0, 0)))
     if rigid.size <= DENSE_ROWS:
-        return _dense(system.jacobian(q)[rigid], rigid, threshold, count)
+        return _dense(system, q, rigid, threshold, count)
     return _sparse(system, q, rigid, threshold, count)
 
 
-def _dense(jacobian: NDArray[np.float64], rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
-    """By a QR factorisation of Phi_q^T with pivots."""
+def _dense(
+    system: System, q: NDArray[np.float64], rigid: NDArray[np.int64], threshold: float, count: int | None
+) -> Dependence:
+    """By a QR factorisation of Phi_q^T with pivots, without dimension."""
+    units = system.row_units[rigid]
+    jacobian = system.jacobian(q)[rigid] * system.units / units[:, None]
     factors = scipy.linalg.qr(jacobian.T, mode="r", pivoting=True)
     upper, order = np.asarray(factors[0]), np.asarray(factors[-1])
     size = np.abs(np.diag(upper))
     rank = int(np.sum(size > threshold * size.max(initial=0.0))) if count is None else rigid.size - count
     coefficients = scipy.linalg.solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
-    return Dependence(rigid[order[:rank]], rigid[order[rank:]], coefficients)
+    kept, dropped = order[:rank], order[rank:]
+    return Dependence(rigid[kept], rigid[dropped], coefficients / units[kept][:, None] * units[dropped])
 
 
 def _sparse(

@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 # How far a body turns, or moves as a part of the mechanism's size, to look whether a pose is a special one.
 _NUDGE = 1e-2
 _DIRECTIONS = 3
-# A pose so found is closed to this [m, rad], is off by a part of the way tried, and has a rank that shows beside both.
+# A pose so found is closed to this [sizes of the mechanism, rad], is off by a part of the way tried, and has a rank
+# that shows beside both.
 _CLOSED, _BACK, _DEPENDENT = 1e-10, 3.0, 1e-6
 
 
@@ -186,7 +187,7 @@ def _poses_nearby(system: System, state: State) -> Iterator[Array]:
     solver = Saddle(M, sparse_jacobian(system, state.q))
     angles = np.array([body.angle for body in system.bodies])
     places = np.setdiff1d(np.arange(system.n), angles)
-    size = _size(system)
+    size = system.size
     for _ in range(_DIRECTIONS):
         wish = random.standard_normal(system.n)
         wish[places] *= size
@@ -194,14 +195,8 @@ def _poses_nearby(system: System, state: State) -> Iterator[Array]:
         move *= _NUDGE / max(np.max(np.abs(move[angles])), np.max(np.abs(move[places])) / size)
         for sign in (1.0, -1.0):
             q = close_downhill(system, signals, state.time, state.q + sign * move)
-            gap = np.max(np.abs(system.constraints(signals, state.time, q, np.zeros(system.n))[0]), initial=0.0)
+            gap = system.gap(system.constraints(signals, state.time, q, np.zeros(system.n))[0])
             gone = q - state.q
             # A pose that cannot be left: closing the loops leads back to it.
             if gap < _CLOSED and move @ (M @ move) < _BACK**2 * (gone @ (M @ gone)):
                 yield q
-
-
-def _size(system: System) -> float:
-    """The largest radius of gyration about a body's origin [m]: there is one whatever points a body has."""
-    bodies = system.packed.bodies
-    return float(np.sqrt(np.max(bodies["I0"] / bodies["m"])))

@@ -14,16 +14,15 @@ from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian, sparse_mass
-from paraflex.dynamics.state import State, reference_pose
+from paraflex.dynamics.state import State, closed, reference_pose
 from paraflex.dynamics.system import System
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start, check_start
 
 _MAX_ITERATIONS = 50
-# What closes no further is closed [m, rad].
-_CLOSED = 1e-12
-# What joints may be open by at a start that is given [m, rad], and velocities by, as a fraction of them.
+# What joints may be open by at a start that is given [sizes of the mechanism, rad], and velocities by, as a fraction
+# of them.
 _GAP = 1e-6
 _SLIP = 1e-6
 # Given deflections of one beam may contradict each other by this fraction of them.
@@ -157,20 +156,21 @@ def _closed(
 ) -> NDArray[np.float64]:
     """Joints closed by the least change of the coordinates that are not held."""
     free, still, q = ~held, np.zeros(system.n), q.copy()
+    scale = scipy.sparse.diags(1.0 / system.row_units)
     phi, _ = system.constraints(signals, time, q, still)
     for _ in range(_MAX_ITERATIONS):
-        if not np.any(free) or np.max(np.abs(phi), initial=0.0) < _CLOSED:
+        if not np.any(free) or closed(system, q, phi):
             break
         metric = _metric(system, q, _POSITION_STIFFNESS)[free][:, free]
-        q[free] -= _least(metric, sparse_jacobian(system, q)[:, free], phi)
+        q[free] -= _least(metric, scale @ sparse_jacobian(system, q)[:, free], scale @ phi)
         phi, _ = system.constraints(signals, time, q, still)
-    gap = np.max(np.abs(phi), initial=0.0)
-    if gap > _GAP:
+    worst = int(np.argmax(np.abs(phi) / system.row_units)) if phi.size else 0
+    if system.gap(phi) > _GAP:
         raise InputError(
-            f"the joints do not close at this start: a gap of {gap:.3g} remains in "
-            f"{system.rows[int(np.argmax(np.abs(phi)))]}",
+            f"the joints do not close at this start: a gap of {abs(phi[worst]):.3g} remains in {system.rows[worst]}",
             field="start.coordinates" if np.all(held) or not np.any(held) else "start",
-            remedy=f"give coordinates at which they close to {_GAP:g} m or rad, or leave more open",
+            remedy=f"give coordinates at which they close to {_GAP * system.size:.2g} m or {_GAP:g} rad, "
+            "or leave more open",
         )
     return q
 
@@ -182,6 +182,9 @@ def _velocities(
     given = _given_velocities(system, start, q)
     C = scipy.sparse.csr_matrix(scipy.sparse.vstack([sparse_jacobian(system, q), *(entry.row for entry in given)]))
     wanted = np.concatenate([-rate, [entry.value for entry in given]])
+    # Rows without dimension: those of lengths by the size of the mechanism.
+    units = np.concatenate([system.row_units, [entry.unit for entry in given]])
+    C, wanted = scipy.sparse.csr_matrix(scipy.sparse.diags(1.0 / units) @ C), wanted / units
     if set(start.rates) == set(system.index):
         v = np.zeros(system.n)
         for name, values in start.rates.items():
@@ -193,35 +196,37 @@ def _velocities(
         # Stiffness and mass lie many powers of ten apart: what rounding left is taken away.
         v += _least(metric, C, wanted - C @ v)
     slip = np.abs(C @ v - wanted)
-    # Metres and radians a second beside those of the terms a row adds up.
+    # What is left beside the terms that a row adds up.
     size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted))
     bad = slip > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SLIP)
     if np.any(bad):
-        _refuse_velocities(system, given, slip, bad)
+        _refuse_velocities(system, given, slip * units, bad)
     return v
 
 
 class _Given(NamedTuple):
-    """One number of a start's velocities: its row (1, n) of the coordinates' velocities, its value, where it stands."""
+    """One number of a start's velocities: its row (1, n), its value, what that is compared with, where it stands."""
 
     row: scipy.sparse.csr_matrix
     value: float
+    unit: float
     field: str
 
 
 def _given_velocities(system: System, start: Start, q: NDArray[np.float64]) -> list[_Given]:
     unit = scipy.sparse.csr_matrix(scipy.sparse.identity(system.n))
     given = [
-        _Given(unit[system.body(name).angle], rate, f"start.velocity.angular.{name}")
+        _Given(unit[system.body(name).angle], rate, 1.0, f"start.velocity.angular.{name}")
         for name, rate in start.angular.items()
     ]
     for ref, velocity in start.point.items():
         rows = scipy.sparse.csr_matrix(point_rows(system, q, ref))
-        given += [_Given(rows[k], velocity[k], f"start.velocity.point.{ref}") for k in range(2)]
+        given += [_Given(rows[k], velocity[k], system.size, f"start.velocity.point.{ref}") for k in range(2)]
     for name, values in start.rates.items():
         body, field = system.body(name), f"start.rates.{name}"
         given += [
-            _Given(unit[body.offset + k], float(rate), field) for k, rate in enumerate(_all_values(body, values, field))
+            _Given(unit[body.offset + k], float(rate), float(system.units[body.offset + k]), field)
+            for k, rate in enumerate(_all_values(body, values, field))
         ]
     return given
 

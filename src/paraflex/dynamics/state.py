@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from paraflex.dynamics.projection import NAMED, joint_gaps, least_change, refuse_conflict
+from paraflex.dynamics.projection import NAMED, gap_unit, joint_gaps, least_change, refuse_conflict
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
@@ -25,7 +25,7 @@ _MAX_ITERATIONS = 50
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
 # How far links are turned aside before that [rad].
 _ASIDE = 1e-2
-# Closure error that counts as closed [m, rad]: a few rounding errors of a metre-sized mechanism.
+# Closure error that counts as closed [rad], and as a part of the mechanism's size: thousands of rounding errors.
 CLOSED = 1e-12
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
 _POSITION_STIFFNESS = 1.0
@@ -120,17 +120,22 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     zero = np.zeros(system.n)
     for _ in range(_MAX_ITERATIONS):
         phi, _ = system.constraints(signals, t, q, zero)
-        if np.max(np.abs(phi), initial=0.0) < CLOSED:
+        if closed(system, q, phi):
             if _keeps_shape(system, start, q):
                 return q
             break
         q -= least_change(system, q, phi, stiffness=_POSITION_STIFFNESS)
     closest = _closest(system, signals, t, start)
-    gaps = joint_gaps(system, system.constraints(signals, t, closest, zero)[0])
-    where = " and ".join(list(gaps)[:NAMED])
-    raise AssemblyError(
-        f"the loops do not close: a gap of {max(gaps.values()):.3g} remains in {where}", Moment(t, 0), partial=closest
-    )
+    phi = system.constraints(signals, t, closest, zero)[0]
+    gaps = joint_gaps(system, phi)
+    gap, where = f"{max(gaps.values()):.3g} {gap_unit(system, phi)}", " and ".join(list(gaps)[:NAMED])
+    raise AssemblyError(f"the loops do not close: a gap of {gap} remains in {where}", Moment(t, 0), partial=closest)
+
+
+def closed(system: System, q: NDArray[np.float64], phi: NDArray[np.float64]) -> bool:
+    """Whether what constraints (m,) leave open at q is rounding: of the size of the mechanism, or of places far off."""
+    far = max(float(np.max(np.abs(q[body.position]), initial=system.size)) for body in system.bodies) / system.size
+    return system.gap(phi) < CLOSED * far
 
 
 def _keeps_shape(system: System, start: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
@@ -172,11 +177,11 @@ def close_downhill(system: System, signals: Signals, t: float, q: NDArray[np.flo
     phi = system.constraints(signals, t, q, still)[0]
     damping = _FIRST_DAMPING
     for _ in range(_MAX_DESCENT):
-        if np.max(np.abs(phi), initial=0.0) < CLOSED or damping > _LARGEST_DAMPING:
+        if closed(system, q, phi) or damping > _LARGEST_DAMPING:
             break
         trial = q - least_change(system, q, phi, _POSITION_STIFFNESS, damping)
         gap = system.constraints(signals, t, trial, still)[0]
-        gain = 1.0 - np.linalg.norm(gap) / np.linalg.norm(phi)
+        gain = 1.0 - np.linalg.norm(gap / system.row_units) / np.linalg.norm(phi / system.row_units)
         if gain > 0.0:
             q, phi = trial, gap
         if 0.0 <= gain < _NO_GAIN:

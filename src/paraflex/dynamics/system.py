@@ -61,6 +61,28 @@ class System:
         """Of all bodies [kg]."""
         return float(self.packed.total_mass)
 
+    @property
+    def size(self) -> float:
+        """The length that tolerances are relative to: see `dynamics.scale` [m]."""
+        return float(self.packed.size)
+
+    @cached_property
+    def units(self) -> NDArray[np.float64]:
+        """What one of each coordinate (n,) is compared with: the size of the mechanism for places, 1 for all others."""
+        units = np.ones(self.n)
+        for body in self.bodies:
+            units[body.position] = self.size
+        return units
+
+    @cached_property
+    def row_units(self) -> NDArray[np.float64]:
+        """The same of each constraint row (m,): the size for lengths, 1 for angles."""
+        return np.real(self.packed.rows["unit"]).astype(float)
+
+    def gap(self, phi: NDArray[np.float64]) -> float:
+        """The largest violation among constraint rows (m,), lengths in sizes of the mechanism, angles in rad."""
+        return float(np.max(np.abs(phi) / self.row_units, initial=0.0))
+
     @cached_property
     def index(self) -> dict[str, int]:
         """Index of each body by name."""

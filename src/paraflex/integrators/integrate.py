@@ -24,6 +24,7 @@ from paraflex.integrators.events import BeamEnd
 from paraflex.integrators.gauges import make_gauges
 from paraflex.integrators.methods import Family
 from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
 from paraflex.integrators.watch import bent_too_far, come_apart, least_norm
@@ -33,8 +34,11 @@ from paraflex.mechanism import AtEnd
 
 # Attempted steps between two looks: some milliseconds for a dozen bodies.
 _SLICE = 200
+# Attempts that tell a run's pace: of our own methods, and of those of others, whose steps take ten times as long.
+_WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
+_NATIVE = (Family.ESDIRK, Family.NEWMARK)
 _NOT_IN_PARTS = (
     "Newton's iteration does not converge in a fixed step, nor in parts of it; "
     "take a shorter step, or leave it out and choose a tolerance"
@@ -103,9 +107,13 @@ def integrate(
     ends, crossing = BeamEnds(system, initial), None
     gauges = (*make_gauges(system, initial.q, options.events), *ends.gauges)
     run = prepare(problem, options)
-    status, message, bent, drift, now = "complete", "", "", "", None
+    status, message, bent, drift, slow = "complete", "", "", "", ""
+    native_method = options.description.family in _NATIVE
+    pace = Pace(
+        initial.time, float(problem.times[-1]), options.max_steps, _WINDOW if native_method else _WINDOW_OUTSIDE
+    )
     code, limits = PAUSED, (run.dependent_rows, options.tolerance)
-    most = options.max_steps - (0 if begun is None else begun.steps + begun.rejected)
+    most = pace.most - (0 if begun is None else begun.steps + begun.rejected)
     try:
         run.start()
         while code == PAUSED:
@@ -121,6 +129,9 @@ def integrate(
             bent, drift = bent_too_far(system, now.q), come_apart(system, signals, now.t, now.q, *limits)
             if bent or drift:
                 break
+            if code == PAUSED and pace.look(run.attempts, now.t):
+                slow = too_slow(system, now, initial.q, pace)
+                break
             if on_progress is not None:
                 on_progress(now.t)
     except KeyboardInterrupt:
@@ -130,7 +141,7 @@ def integrate(
     _refuse_beam_end(solution, crossing)
     if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution
-    cause = bent or drift or _cause(code, options)
+    cause = bent or drift or slow or _cause(code, options, pace)
     now = run.now()
     # Near a singular position it may be Newton or the error test that gives up first.
     lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and not (bent or drift) else []
@@ -157,14 +168,14 @@ def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     """A run of a problem by the method of the options, not yet started."""
     family = options.description.family
-    if family in (Family.ESDIRK, Family.NEWMARK):
+    if family in _NATIVE:
         return native.prepare(problem, options)
     return outside.prepare(problem, options)
 
 
-def _cause(code: int, options: IntegrationOptions) -> str:
+def _cause(code: int, options: IntegrationOptions, pace: Pace) -> str:
     if code == PAUSED:
-        return f"no end after {options.max_steps} steps"
+        return f"no end after {pace.most} steps"
     return _NOT_IN_PARTS if code == NO_CONVERGENCE and options.step is not None else _CAUSES[code]
 
 

@@ -57,8 +57,8 @@ ROUNDING_PART = 1e-13
 # A run takes a handful of steps near each singular position, where shorter ones are not more exact: together they may
 # have an error of about this fraction of the tolerance.
 NEAR_ERROR = 0.01
-# It is not below what rounding makes of multipliers that have a pole [m].
-LEAST_NEAR_ERROR = 2e-11
+# It is not below what rounding makes of multipliers that have a pole, as a part of the mechanism's size.
+LEAST_NEAR_ERROR = 8e-11
 # A singular position is near that could be reached in this fraction of the time since the start.
 _AHEAD = 0.2
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
@@ -195,7 +195,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         treatment=treatment,
         fixed_step=options.step or 0.0,
         max_step=options.max_step,
-        near_error=max(NEAR_ERROR * options.tolerance, LEAST_NEAR_ERROR),
+        near_error=max(NEAR_ERROR * options.tolerance, LEAST_NEAR_ERROR * system.size),
         dependent_part=ROUNDING_PART,
         dependent_rows=_mark_redundant(system, initial.q, workspace),
     )

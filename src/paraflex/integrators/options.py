@@ -46,8 +46,10 @@ class IntegrationOptions:
         Whether coefficients follow the step size instead: violations then decay within some steps, whatever their size.
     max_step : float
         Largest step [s].
-    max_steps : int
-        Attempted steps before the run is given up.
+    max_steps : int, optional
+        Attempted steps before the run is given up; earlier where at its pace it would need five times as many. By
+        default ten million, and a run is given up as well that has become a hundred times slower than it was and would
+        need more than a million.
     newton_fraction : float, optional
         The part of the error allowed in a step that Newton's iteration may leave; the method's own by default.
     events : tuple of JointLimit, DeflectionLimit or SingularDistance
@@ -59,7 +61,7 @@ class IntegrationOptions:
     alpha: float = 20.0
     beta: float = 20.0
     max_step: float = math.inf
-    max_steps: int = 10_000_000
+    max_steps: int | None = None
     newton_fraction: float | None = None
     method: str = DEFAULT_METHOD
     parameters: Mapping[str, float] = field(default_factory=dict)

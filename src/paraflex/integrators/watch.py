@@ -13,9 +13,9 @@ from paraflex.kernel.packed import Signals
 
 # Slopes of a beam this large are beyond any theory of small slopes [rad]: what computes them diverges.
 _LARGEST_SLOPE = 2.0
-# Joints that are further apart than this, as a fraction of the largest link, or motions further off [rad], have come
-# apart. Where constraints depend on one another they contradict one another long before.
-_APART, _CONTRADICTION = 1e-2, 1e-3
+# Joints that are further apart than this part of the mechanism's size, or motions further off [rad], have come apart.
+# Where constraints depend on one another they contradict one another long before.
+_APART, _CONTRADICTION = 7e-3, 7e-4
 # Multipliers that exert the same forces but for this fraction are the same.
 _SAME_FORCES = 1e-9
 
@@ -48,11 +48,7 @@ def come_apart(
         Of the run [m]; what it allows is no fault.
     """
     phi, _ = system.constraints(signals, t, q, np.zeros(system.n))
-    bodies = system.packed.bodies
-    # A radius of gyration is there whatever points a body has; angles are measured in rad.
-    size = min(1.0, float(np.sqrt(np.max(bodies["I0"] / bodies["m"]))))
-    bound = max((_CONTRADICTION if dependent else _APART) * size, tolerance)
-    if not np.max(np.abs(phi), initial=0.0) > bound:
+    if not system.gap(phi) > max(_CONTRADICTION if dependent else _APART, tolerance / system.size):
         return ""
     if dependent:
         return contradiction(system, phi, dependence(system, q, count=dependent), "positions")

@@ -26,11 +26,12 @@ from paraflex.kernel.records import by_reference
 MAX_ITERATIONS = 20
 # So many of them with the factors of the instant before.
 CHORDS = 8
-# Newton has converged when no coordinate moves by more than this [m, rad].
+# Newton has converged when no body turns by more than this [rad], nor shifts by this part of the mechanism's size.
 SMALLEST_MOVE = 1e-13
-# A body that turns or shifts this much against its prediction may have jumped to another assembly [rad, m].
-LARGEST_JUMP = 0.3
-# A pivot below this fraction of the Jacobian's largest entry is a singular position.
+# A body that turns this much against its prediction [rad], or shifts by this many sizes of the mechanism, may have
+# jumped to another assembly.
+LARGEST_TURN, LARGEST_SHIFT = 0.3, 1.2
+# A pivot below this fraction of the largest entry of the Jacobian without dimension is a singular position.
 SINGULAR_PIVOT = 1e-11
 CLOSED, NO_CONVERGENCE, TOO_COARSE, SINGULAR = range(4)
 
@@ -41,7 +42,7 @@ class ClosureScratch(NamedTuple):
 
     single: NDArray[np.float64]  # (n, 1) residual of positions, then what they move by; the same of accelerations
     right: NDArray[np.float64]  # (n, 1 + tasks) of velocities and the basis
-    jacobian: NDArray[np.float64]  # (n, n) at this instant
+    jacobian: NDArray[np.float64]  # (n, n) at this instant, without dimension
     before: NDArray[np.float64]  # and at the instant before
     factors: NDArray[np.float64]  # of `before`
     order: NDArray[np.int64]
@@ -103,6 +104,60 @@ def closure_jacobian(p, marker, coordinates, q, jacobian):
 
 
 @routine
+def row_unit(p, coordinates, r):
+    """What row r is compared with: the size of the mechanism for a length, 1 for an angle."""
+    if r < p.rows.size:
+        return p.rows[r].unit
+    return 1.0 if coordinates[r - p.rows.size] == 2 else p.size
+
+
+@routine
+def scaled_jacobian(p, marker, coordinates, q, jacobian):
+    """[Phi_q; task_q] at q without dimension: rows in their units, places of bodies in sizes of the mechanism."""
+    closure_jacobian(p, marker, coordinates, q, jacobian)
+    for r in range(jacobian.shape[0]):
+        unit = row_unit(p, coordinates, r)
+        for j in range(jacobian.shape[1]):
+            jacobian[r, j] /= unit
+        for i in range(p.bodies.size):
+            for j in range(p.bodies[i].offset, p.bodies[i].offset + 2):
+                jacobian[r, j] *= p.size
+
+
+@routine
+def solve_scaled(p, coordinates, factors, order, right):
+    """Solve for coordinates [m, rad] with the factors of a Jacobian without dimension, in place."""
+    for r in range(right.shape[0]):
+        unit = row_unit(p, coordinates, r)
+        for k in range(right.shape[1]):
+            right[r, k] /= unit
+    solve_factored(factors, order, right)
+    for i in range(p.bodies.size):
+        for j in range(p.bodies[i].offset, p.bodies[i].offset + 2):
+            for k in range(right.shape[1]):
+                right[j, k] *= p.size
+
+
+@routine
+def largest_shift(p, x):
+    """The largest change of place among changes of coordinates, in sizes of the mechanism."""
+    shift = 0.0
+    for i in range(p.bodies.size):
+        first = p.bodies[i].offset
+        shift = max(shift, abs(x[first]) / p.size, abs(x[first + 1]) / p.size)
+    return shift
+
+
+@routine
+def largest_turn(p, x):
+    """The largest turn of a body among changes of coordinates [rad]."""
+    turn = 0.0
+    for i in range(p.bodies.size):
+        turn = max(turn, abs(x[p.bodies[i].offset + 2]))
+    return turn
+
+
+@routine
 def relative_change(ws):
     """Norm of before^-1 (jacobian - before): below one, no matrix between the two is singular.
 
@@ -146,15 +201,16 @@ def close_loops(p, signals, marker, coordinates, t, goal, known, q, ws):
             ws.single[ws.phi.size + i, 0] = ws.here[0, i] - goal[i]
         gap = largest(ws.single[:, 0])
         if known and iteration < CHORDS:
-            solve_factored(ws.factors, ws.order, ws.single)
+            solve_scaled(p, coordinates, ws.factors, ws.order, ws.single)
         else:
-            closure_jacobian(p, marker, coordinates, q, ws.fresh)
+            scaled_jacobian(p, marker, coordinates, q, ws.fresh)
             if factor_dense(ws.fresh, ws.fresh_order) < SINGULAR_PIVOT:
                 return SINGULAR, gap
-            solve_factored(ws.fresh, ws.fresh_order, ws.single)
+            solve_scaled(p, coordinates, ws.fresh, ws.fresh_order, ws.single)
         for j in range(q.size):
             q[j] -= ws.single[j, 0]
-        if largest(ws.single[:, 0]) < SMALLEST_MOVE * (1.0 + largest(q)):
+        move = max(largest_shift(p, ws.single[:, 0]), largest_turn(p, ws.single[:, 0]))
+        if move < SMALLEST_MOVE * (1.0 + max(largest_shift(p, q), largest_turn(p, q))):
             return CLOSED, gap
     return NO_CONVERGENCE, gap
 
@@ -171,7 +227,7 @@ def move_loops(p, signals, marker, coordinates, t, target, q, v, a, basis, ws):
     for i in range(tasks):
         ws.right[m + i, 0] = target[1, i]
         ws.right[m + i, 1 + i] = 1.0
-    solve_factored(ws.factors, ws.order, ws.right)
+    solve_scaled(p, coordinates, ws.factors, ws.order, ws.right)
     for j in range(q.size):
         v[j] = ws.right[j, 0]
         for i in range(tasks):
@@ -186,7 +242,7 @@ def move_loops(p, signals, marker, coordinates, t, target, q, v, a, basis, ws):
         ws.single[r, 0] = -ws.phi[r]
     for i in range(tasks):
         ws.single[m + i, 0] = target[2, i] - ws.here[2, i]
-    solve_factored(ws.factors, ws.order, ws.single)
+    solve_scaled(p, coordinates, ws.factors, ws.order, ws.single)
     for j in range(q.size):
         a[j] = ws.single[j, 0]
 
@@ -222,9 +278,10 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
         if status != CLOSED:
             return status, k, gap
         for j in range(q.shape[1]):
-            if k > 0 and abs(q[k, j] - ws.unused[j]) > LARGEST_JUMP:
-                return TOO_COARSE, k, gap
-        closure_jacobian(p, marker, coordinates, q[k], ws.jacobian)
+            ws.unused[j] -= q[k, j]
+        if k > 0 and (largest_turn(p, ws.unused) > LARGEST_TURN or largest_shift(p, ws.unused) > LARGEST_SHIFT):
+            return TOO_COARSE, k, gap
+        scaled_jacobian(p, marker, coordinates, q[k], ws.jacobian)
         if k > 0 and relative_change(ws) >= 1.0:
             return TOO_COARSE, k, gap
         for j in range(q.shape[1]):

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from math import sqrt
 
-from paraflex.kernel.arrays import add, copy, fill, largest
+from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.linear import solve_system
 from paraflex.kernel.metric import mass_norm
-from paraflex.kernel.projection import CLOSED, least_change
+from paraflex.kernel.projection import CLOSED, largest_violation, least_change
 from paraflex.kernel.run_state import (
     DRIFTED,
     HELD_END,
@@ -154,13 +154,13 @@ def return_to_constraints(p, signals, t, held, m, ws):
     m.counts[HELD_END] = 1 if ws.least[0] < held * held else 0
     for _ in range(PASSES):
         constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
-        if largest(ws.rows) > CLOSED:
+        if largest_violation(p, ws.rows) > CLOSED:
             hold_rows(p, ws, held, 0.0, ws.rows, ws.mu)
             least_change(p, ws.rows, ws)
             add(ws.x, q)
     for _ in range(PASSES):
         constraint_values(p, signals, t, q, v, ws.scratch, ws.mu, ws.rows)
-        if largest(ws.rows) > CLOSED:
+        if largest_violation(p, ws.rows) > CLOSED:
             hold_rows(p, ws, held, 0.0, ws.rows, ws.mu)
             least_change(p, ws.rows, ws)
             add(ws.x, v)
@@ -170,7 +170,7 @@ def return_to_constraints(p, signals, t, held, m, ws):
 @routine
 def damped_distance(p, rows, held, ws):
     """How far constraints of these values are from being met [m], rows not trusted counting as far as they are."""
-    if largest(rows) <= CLOSED:
+    if largest_violation(p, rows) <= CLOSED:
         return 0.0
     damp_rows(p, ws, held, rows, ws.mu)
     least_change(p, rows, ws)

@@ -159,6 +159,7 @@ ROW = np.dtype(
         # inverse of its steepest slope; else zero.
         ("compliance", np.float64),
         ("limit", np.float64),  # of friction: lambda = limit tanh(rate / (compliance limit))
+        ("unit", np.float64),  # what Phi is compared with: the size of the mechanism for a length, 1 for an angle
         ("first", np.int64),  # first column of the row in the envelope of the Schur complement
         ("start", np.int64),  # and where that column is stored
     ],
@@ -201,6 +202,7 @@ class PackedSystem(NamedTuple):
     spans: NDArray[np.float64]
     inertias: NDArray[np.float64]
     total_mass: float
+    size: float  # of the mechanism, see `dynamics.scale`: a power of two [m]
     gravity: NDArray[np.float64]  # (2,) in the ground frame
 
 

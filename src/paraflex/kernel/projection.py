@@ -6,13 +6,14 @@ Bayo 1997): with the mass alone a correction would ring in the stiffest modes.
 
 from __future__ import annotations
 
-from paraflex.kernel.arrays import add, fill, largest
+from paraflex.kernel.arrays import add, fill
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.linear import solve_system
 
-# Violations this small count as none [m, rad]; the factor is of the step's start, so each pass leaves a small part.
-CLOSED, PASSES = 1e-14, 4
+# Violations this small count as none, in units of their rows; the factor is of the step's start, so each pass leaves a
+# small part.
+CLOSED, PASSES = 4e-14, 4
 
 
 @routine
@@ -20,16 +21,25 @@ def project(p, signals, t, q, v, ws):
     """Change q until Phi = 0, then v until Phi' = 0."""
     for _ in range(PASSES):
         constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
-        if largest(ws.rows) <= CLOSED:
+        if largest_violation(p, ws.rows) <= CLOSED:
             break
         least_change(p, ws.rows, ws)
         add(ws.x, q)
     for _ in range(PASSES):
         constraint_values(p, signals, t, q, v, ws.scratch, ws.mu, ws.rows)
-        if largest(ws.rows) <= CLOSED:
+        if largest_violation(p, ws.rows) <= CLOSED:
             break
         least_change(p, ws.rows, ws)
         add(ws.x, v)
+
+
+@routine
+def largest_violation(p, rows):
+    """The largest violation of a constraint, or of its rate, as a part of the unit of its row."""
+    violation = 0.0
+    for r in range(rows.size):
+        violation = max(violation, abs(rows[r]) / p.rows[r].unit)
+    return violation
 
 
 @routine

@@ -49,8 +49,8 @@ SECOND_RATE = 20.0
 # taken to be better than this: motion that sets in makes it worse at once.
 AGEING, BEST_RATE = 1.05, 0.02
 # Changes that fall no more are rounding where they are smaller than this part of the accelerations, or where they
-# move nothing further than this [m]: there are no more digits to be had.
-ROUNDING, FINEST = 1e-8, 1e-15
+# move nothing further than this part of the mechanism's size: there are no more digits to be had.
+ROUNDING, FINEST = 1e-8, 4e-15
 
 
 @seldom
@@ -149,7 +149,7 @@ def solve_stage(
             rate = change / previous
             # From a good guess the second change may be larger than the first; from then on each has to be smaller.
             if change > tolerance and rate > (SECOND_RATE if iteration == 2 else WORST_RATE):
-                if b * size > FINEST and size > ROUNDING * mass_norm(p, ws, a):
+                if b * size > FINEST * p.size and size > ROUNDING * mass_norm(p, ws, a):
                     return DIVERGED, iteration, rate
                 rate = 0.0
         else:

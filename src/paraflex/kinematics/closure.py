@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,20 +18,29 @@ from paraflex.dynamics import (
     records,
     reference_pose,
 )
-from paraflex.errors import InputError, Moment, UnreachablePathError
+from paraflex.errors import AssemblyError, InputError, Moment, UnreachablePathError
 from paraflex.kernel.arrays import apart
-from paraflex.kernel.closure import CLOSED, NO_CONVERGENCE, SINGULAR, close_path, make_closure_scratch, task_values
+from paraflex.kernel.closure import CLOSED, SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
+from paraflex.kinematics.reach import Reach, Shortfall
 from paraflex.mechanism import Assembly, Mechanism, PointRef
 from paraflex.mechanism.mechanism import TASK_COORDINATES
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
 _LONGEST_STEP = 1e-3
 # Where such a step is too long it is cut into pieces, and these again; a step shorter than this is short enough [s].
-_PIECES, _SHORTEST_STEP = 16, 1e-6
+_PIECES, _SHORTEST_STEP = 16, 1e-8
 # Steps from the assembly's pose to the start of the path; more where these fail.
 _APPROACHES = (25, 250, 2500)
+# Instants at which the distance of an unreachable path from what can be reached is looked at, evenly spaced besides the
+# knots of the path, and so many more about the furthest.
+_LOOKS, _MORE_LOOKS = 41, 9
+# A path that leaves what can be reached within this part of what is left of it does so where closure stopped.
+_SOON = 0.05
+# A path that passes within a thousandth of a link of such a position cannot be told from one through it.
+_ALMOST = "or so near to one that the assembly beyond it cannot be told"
+_OTHER = "it can be reached, but only past a Type I singularity or in another assembly"
 
 
 @dataclass(frozen=True)
@@ -130,6 +140,20 @@ def path_follower(
     callable
         The motion at times (k,), ascending [s].
     """
+    closure, assembled = _assembled(mechanism, path, end, assembly, orientation)
+
+    def follow(times: Sequence[float] | NDArray[np.float64]) -> RigidMotion:
+        times = np.ascontiguousarray(times, dtype=float)
+        grid, keep = _no_long_steps(times)
+        return closure.walk(path, closure.approach(path, assembled, times[0], times[-1]), grid, keep)
+
+    return follow
+
+
+def _assembled(
+    mechanism: Mechanism, path: Path, end: float, assembly: str | Assembly | None, orientation: float
+) -> tuple[PathClosure, NDArray[np.float64]]:
+    """What closes loops along a path, and the pose of the assembly; errors as of `follow_path`."""
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
     closure = PathClosure(mechanism.rigid(), orientation, end)
@@ -140,14 +164,40 @@ def path_follower(
             "the path gives angles, the task has none", field="end_effector.coordinates",
             value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
         )  # fmt: skip
-    assembled = closure.assemble(chosen)
+    return closure, closure.assemble(chosen)
 
-    def follow(times: Sequence[float] | NDArray[np.float64]) -> RigidMotion:
-        times = np.ascontiguousarray(times, dtype=float)
-        grid, keep = _no_long_steps(times)
-        return closure.walk(path, closure.approach(path, assembled, times[0]), grid, keep)
 
-    return follow
+def reach_shortfall(
+    mechanism: Mechanism,
+    path: Path,
+    times: Sequence[float] | NDArray[np.float64] | None = None,
+    *,
+    assembly: str | Assembly | None = None,
+    orientation: float = 0.0,
+) -> Shortfall:
+    """How far a path lies from what the mechanism can reach: zero at every instant of a path within reach.
+
+    The distance from a place wanted to the nearest pose that joints and prescribed motions allow, found from the pose
+    of the assembly onwards along the path, and from others where these come nearer. A path within reach may still not
+    be followed: past a Type I singularity poses go on in another assembly, which `follow_path` refuses.
+
+    Parameters
+    ----------
+    mechanism, path, assembly, orientation
+        See `follow_path`.
+    times : (k,) array, optional
+        Ascending [s]; by default 41 over the path, its knots, and some more about the furthest.
+
+    Raises
+    ------
+    InputError, AssemblyError
+        See `follow_path`.
+    """
+    closure, pose = _assembled(mechanism, path, path.duration, assembly, orientation)
+    if times is None:
+        return closure.shortfall(path, 0.0, path.duration, pose)
+    times = np.asarray(times, dtype=float)
+    return closure.reach.shortfall(times, closure.target(path, times)[:, 0], pose, closure.other_poses())
 
 
 def _no_long_steps(times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -180,6 +230,7 @@ class PathClosure:
         )[0]
         self.coordinates = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
         self.packed, self.marker = with_marker(system, effector.point)
+        self.reach = Reach(system, effector.point, self.coordinates, self.signals)
 
     def check_degrees_of_freedom(self) -> None:
         """Nothing, if there are as many task coordinates as degrees of freedom."""
@@ -232,32 +283,32 @@ class PathClosure:
         )
         return status, int(index), residual, (q, v, a, basis)
 
-    def approach(self, path: Path, pose: NDArray[np.float64], start: float) -> NDArray[np.float64]:
+    def approach(self, path: Path, pose: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
         """Move the end-effector from where the assembly has it to the start of the path, staying in that assembly."""
         goal = self.target(path, np.array([start]))[0, 0]
         here = self.task(pose)
-        residual = 0.0
+        reached = pose
         for steps in _APPROACHES:
             fractions = np.linspace(0.0, 1.0, steps + 1)
             target = np.zeros((steps + 1, 3, goal.size))
             target[:, 0] = here + fractions[:, None] * (goal - here)
-            status, _, residual, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
+            status, index, _, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
             if status == CLOSED:
                 return q[-1]
-        raise UnreachablePathError(
-            f"the path's start is out of reach from the assembly's pose (a gap of {residual:.3g} remains)",
-            Moment(start, 0, tuple(goal)),
-        )
+            reached = q[index - 1] if index else reached
+        found = self.shortfall(path, start, end, reached)
+        cause, detail = "the path's start is out of reach", f"{found.beyond(0)} beyond reach"
+        if not found.out[0]:
+            cause, detail = "the path's start is not reached from the assembly's pose", _OTHER
+        raise self._unreachable(cause, detail, found, start, 0, None)
 
     def walk(self, path: Path, pose: NDArray[np.float64], grid: NDArray[np.float64], keep: NDArray[np.bool_]):
         """The motion at the instants of the grid to keep, with more instants between where steps prove too long."""
-        stretches, gap = [], 0.0
+        stretches = []
         while True:
             target = self.target(path, grid)
-            status, index, residual, found = self.run(grid, target, pose)
+            status, index, _, found = self.run(grid, target, pose)
             last = index - 1
-            # Where the path leaves the workspace the Jacobian is singular as well, but beyond nothing closes.
-            gap = residual if status == NO_CONVERGENCE else gap
             if status in (CLOSED, SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
                 break
             # From the last instant reached, in shorter steps.
@@ -272,11 +323,54 @@ class PathClosure:
         )
         if status == CLOSED:
             return motion
-        what = (
-            f"the path is out of reach (a gap of {gap:.3g} remains)" if gap else "the path passes a Type I singularity"
-        )
-        moment = Moment(float(grid[index]), motion.t.size, tuple(target[index, 0]))
-        raise UnreachablePathError(what, moment, partial=motion)
+        at = float(grid[index])
+        # Where the path leaves the workspace the Jacobian is singular as well, but beyond nothing closes.
+        found = self.shortfall(path, at, float(grid[-1]), pose if last < 0 else found[0][last])
+        cause, detail = "the path passes a Type I singularity", _ALMOST
+        if np.any(found.out[found.t <= at + _SOON * (found.t[-1] - at)]):
+            cause, detail = "the path goes out of reach", ""
+        elif np.any(found.elsewhere):
+            detail = _OTHER
+        raise self._unreachable(cause, detail, found, at, motion.t.size, motion)
+
+    def shortfall(self, path: Path, start: float, end: float, pose: NDArray[np.float64]) -> Shortfall:
+        """How far a path lies from what can be reached, from a pose near its start onwards."""
+        end = max(start, min(end, path.duration))
+        knots = [knot for knot in path.knots if start < knot < end]
+        times = np.unique([*np.linspace(start, end, _LOOKS), *knots])
+        others = self.other_poses()
+        found = self.reach.shortfall(times, self.target(path, times)[:, 0], pose, others)
+        k = found.furthest
+        if not found.out[k] or times.size < 2:
+            return found
+        span = times[max(k - 1, 0)], times[min(k + 1, times.size - 1)]
+        closer = np.setdiff1d(np.linspace(*span, _MORE_LOOKS + 2)[1:-1], times)
+        return found.joined(self.reach.shortfall(closer, self.target(path, closer)[:, 0], pose, others))
+
+    def other_poses(self) -> list[NDArray[np.float64]]:
+        """Poses of the assemblies that close."""
+        poses = []
+        for assembly in self.mechanism.assemblies:
+            with suppress(AssemblyError):
+                poses.append(self.assemble(assembly))
+        return poses
+
+    def _unreachable(
+        self, cause: str, detail: str, found: Shortfall, at: float, step: int, partial: RigidMotion | None
+    ) -> UnreachablePathError:
+        """The error of a path that cannot be followed: when, where, and how far its furthest point is out of reach."""
+        lengths, k = self.coordinates != 2, found.furthest
+        # A path that comes back to its start is as far there: said once.
+        if found.out[k] and found.beyond(k) != found.beyond(0):
+            place = ", ".join(f"{x:.4g}" for x in found.desired[k, lengths])
+            place = f"({place}) m" if place else f"at t = {found.t[k]:.6g} s"
+            furthest = f"its furthest point, {place}, lies {found.beyond(k)} beyond reach"
+            detail = f"{detail}; {furthest}" if detail else furthest
+        place = tuple(found.desired[0, lengths].tolist()) or None
+        return UnreachablePathError(
+            cause, Moment(at, step, place), partial, detail=detail,
+            shortfall=float(np.max(found.distance)), shortfall_angle=float(np.max(found.turn)),
+        )  # fmt: skip
 
 
 def _turning(path: Path, t: NDArray[np.float64]) -> NDArray[np.float64] | None:

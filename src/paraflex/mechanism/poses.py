@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from paraflex.mechanism.mechanism import Assembly, Mechanism
 
 Place = tuple[float, float]
-# Points of a body nearer one another than this do not tell its angle [m].
+# Points of a body nearer one another than this part of its size do not tell its angle.
 _APART = 1e-9
 
 
@@ -93,7 +93,8 @@ def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | 
     gx, gy = (sum(place[k] for place in found.values()) / n for k in range(2))
     if angle is None:
         arms = [(local[name][0] - cx, local[name][1] - cy, x - gx, y - gy) for name, (x, y) in found.items()]
-        if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) < _APART:
+        size = max(hypot(x - cx, y - cy) for x, y in local.values())
+        if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) <= _APART * size:
             return None
         # Best fit in the sense of least squares.
         angle = atan2(

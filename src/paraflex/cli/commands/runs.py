@@ -40,7 +40,9 @@ def run(
     assembly: AssemblyOption = None,
     alpha: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient alpha.")] = None,
     beta: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient beta.")] = None,
-    max_steps: Annotated[int | None, typer.Option(metavar="N", help="Steps before a run is given up.")] = None,
+    max_steps: Annotated[
+        int | None, typer.Option(metavar="N", help="Steps before a run is given up. Default: ten million.")
+    ] = None,
     method: MethodOption = None,
     method_parameter: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="A parameter of the method; repeatable.")

@@ -1,0 +1,103 @@
+"""How fast a run gets on: where its steps shrink so far that it would hardly end, it is given up early."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from paraflex.dynamics import System
+from paraflex.dynamics.singularity import SingularityMeasure
+from paraflex.integrators.run import Instant
+
+# Steps of a run where nobody says how many.
+MOST_STEPS = 10_000_000
+# A run that would need this many times the steps it may take is given up early: it may be faster later on.
+_MARGIN = 5.0
+# Where nobody says how many, so is one that would need this many and has become so many times slower than it was. The
+# library's mechanisms take 45 thousand steps at most as their files have it, 260 thousand at 1e-7 m by TR-BDF2, and
+# none becomes more than 25 times slower.
+_MANY, _SLOWER = 1_000_000, 100.0
+# What the first steps tell of a run's pace is left out: they start small.
+_FIRST = 200
+# A singular position nearer than this is named.
+_NEAR = 1e-2
+
+
+class Pace:
+    """Attempted steps against time reached, in a window of the last attempts.
+
+    Parameters
+    ----------
+    start, end : float
+        Of the run [s].
+    most : int or None
+        Steps that the user allows.
+    window : int
+        Attempts that the pace is taken of: seconds of computing for a dozen bodies.
+    """
+
+    def __init__(self, start: float, end: float, most: int | None, window: int) -> None:
+        self._start, self._end, self._most, self._window = start, end, most, window
+        self._looks: deque[tuple[int, float]] = deque([(0, start)])
+        self._usual = math.inf
+
+    @property
+    def most(self) -> int:
+        """Steps after which the run is given up."""
+        return MOST_STEPS if self._most is None else self._most
+
+    @property
+    def step(self) -> float:
+        """The mean of the steps attempted in the window [s]."""
+        (first, then), (last, now) = self._looks[0], self._looks[-1]
+        return (now - then) / max(1, last - first)
+
+    @property
+    def expected(self) -> float:
+        """Steps of the whole run at the pace of the window; infinite where time stands still."""
+        attempts, now = self._looks[-1]
+        return attempts + (self._end - now) / self.step if self.step > 0.0 else math.inf
+
+    def look(self, attempts: int, now: float) -> bool:
+        """Keep how far the run is; whether it should be given up."""
+        self._looks.append((attempts, now))
+        while attempts - self._looks[1][0] >= self._window:
+            self._looks.popleft()
+        if attempts >= _FIRST and now > self._start:
+            self._usual = min(self._usual, attempts / (now - self._start))
+        if attempts - self._looks[0][0] < self._window:
+            return False
+        if self.expected > _MARGIN * self.most:
+            return True
+        return self._most is None and self.expected > _MANY and self.step * self._usual * _SLOWER < 1.0
+
+
+def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace) -> str:
+    """Why a run is given up early: how small its steps are, what moves fastest, and what to do."""
+    needed = f"about {pace.expected:.2g}" if math.isfinite(pace.expected) else "infinitely many"
+    return (
+        f"steps are down to {pace.step:.2g} s, and at this pace the run would need {needed} of them: "
+        f"{_fastest(system, now)}{_singular(system, now, start)}; choose a motion that turns links less fast, a "
+        "coarser tolerance, or allow more steps (max_steps): given up"
+    )
+
+
+def _fastest(system: System, now: Instant) -> str:
+    """The body that accelerates most, as it turns or as it moves by its size, and how fast it is."""
+    parts = [(i, j) for i in range(len(system.bodies)) for j in range(3)]
+    columns = [system.bodies[i].offset + j for i, j in parts]
+    worst = int(np.argmax(np.abs(now.a[columns]) / system.units[columns]))
+    body, turns = system.bodies[parts[worst][0]], parts[worst][1] == 2
+    place = [body.angle] if turns else list(range(body.position.start, body.position.stop))
+    speed, acceleration = (float(np.linalg.norm(x[place])) for x in (now.v, now.a))
+    unit = "rad" if turns else "m"
+    what = "turns" if turns else "moves"
+    return f"{body.name} {what} at {speed:.3g} {unit}/s and accelerates by {acceleration:.2g} {unit}/s^2"
+
+
+def _singular(system: System, now: Instant, start: np.ndarray) -> str:
+    """How near a singular position of the constraints is, where it is near."""
+    measure = float(SingularityMeasure(system, start)(now.q[None])[0])
+    return f", {measure:.1g} from a singular position of the constraints" if measure < _NEAR else ""

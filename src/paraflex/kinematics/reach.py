@@ -1,0 +1,256 @@
+"""How far places of the end-effector lie from those that the mechanism can reach: the nearest pose to each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System
+from paraflex.dynamics.joint_coordinates import marker_place, material_angle
+from paraflex.kernel.packed import Signals
+from paraflex.mechanism import PointRef
+
+Array = NDArray[np.float64]
+
+# A place nearer than this part of the mechanism's size to a pose is reached.
+REACHED = 1e-8
+# Newton's iteration on the distance: how many, the longest step [sizes of the mechanism, rad], the shortest, and the
+# difference that second derivatives are taken by.
+_MAX_ITERATIONS, _LONGEST, _SHORTEST, _DIFFERENCE = 60, 0.5, 1e-12, 1e-6
+# A slope of the distance, or a curvature, below this is none.
+_FLAT = 1e-10
+# Loops are closed to this by so many corrections, none of them longer than half a size or radian.
+_CLOSED, _CORRECTIONS = 1e-11, 30
+# Poses from bodies turned at random that are tried besides.
+_SCATTERED = 4
+# Singular values below this part of the largest are of redundant constraints.
+_DEPENDENT = 1e-9
+
+
+class Nearest(NamedTuple):
+    """The pose nearest to a place wanted.
+
+    Attributes
+    ----------
+    q : (n,) array
+    distance : float
+        From the place wanted [m].
+    turn : float
+        From the angle wanted, where the task has one [rad].
+    part : float
+        Of both, without dimension: zero where the place is reached.
+    """
+
+    q: Array
+    distance: float
+    turn: float
+    part: float
+
+
+@dataclass(frozen=True)
+class Shortfall:
+    """How far a path lies from what the mechanism can reach.
+
+    Attributes
+    ----------
+    t : (k,) array
+        [s]
+    desired : (k, tasks) array
+        Task coordinates wanted [m, rad].
+    distance : (k,) array
+        From the nearest pose [m]; zero where the place is reached.
+    turn : (k,) array
+        The same of the angle, where the task has one [rad].
+    own : (k,) array
+        Both, without dimension, to the nearest pose found without going to another assembly: where this is not zero
+        and the others are, the place is reached, but only past a Type I singularity or in another assembly.
+    """
+
+    t: Array
+    desired: Array
+    distance: Array
+    turn: Array
+    own: Array
+
+    @property
+    def out(self) -> NDArray[np.bool_]:
+        """Where no pose reaches (k,)."""
+        return (self.distance > 0.0) | (self.turn > 0.0)
+
+    @property
+    def elsewhere(self) -> NDArray[np.bool_]:
+        """Where poses reach, but none near those before (k,)."""
+        return ~self.out & (self.own > 0.0)
+
+    @property
+    def furthest(self) -> int:
+        """The instant of the largest distance, or where there is none of the largest turn."""
+        return int(np.argmax(self.distance if np.any(self.distance) else self.turn))
+
+    def beyond(self, k: int) -> str:
+        """How far the k-th place lies from the nearest pose, with units; empty where it is reached."""
+        parts = [
+            f"{self.distance[k]:.3g} m" if self.distance[k] else "",
+            f"{self.turn[k]:.3g} rad" if self.turn[k] else "",
+        ]
+        return " and ".join(filter(None, parts))
+
+    def joined(self, more: Shortfall) -> Shortfall:
+        """With other instants, in order of time."""
+        order = np.argsort(np.concatenate([self.t, more.t]), kind="stable")
+        names = ("t", "desired", "distance", "turn", "own")
+        return Shortfall(*(np.concatenate([getattr(self, name), getattr(more, name)])[order] for name in names))
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The poses of a rigid mechanism and how near they bring its end-effector to places.
+
+    Attributes
+    ----------
+    system : System
+    point : PointRef
+        The end-effector.
+    coordinates : (tasks,) array of int
+        0 x, 1 y, 2 angle.
+    signals : Signals
+        Of prescribed motions.
+    """
+
+    system: System
+    point: PointRef
+    coordinates: NDArray[np.int64]
+    signals: Signals
+
+    def nearest(self, t: float, goal: Array, q: Array) -> Nearest:
+        """The pose nearest to a goal (tasks,) among those near a closed pose q.
+
+        Newton's method on half the square of the distance within the poses that the constraints allow, along the null
+        space of Phi_q; second derivatives are those of the Lagrangian, by differences.
+        """
+        square, longest = self._square(q, goal), _LONGEST
+        for _ in range(_MAX_ITERATIONS):
+            if square <= (1e-3 * REACHED) ** 2:
+                break
+            step = self._step(goal, q, longest)
+            length = float(np.max(np.abs(step)))
+            if length <= _SHORTEST:
+                break
+            trial = self.closed(t, q + self.system.units * step)
+            found = np.inf if trial is None else self._square(trial, goal)
+            if trial is None or found >= square:
+                longest = 0.25 * length
+                if longest < _SHORTEST:
+                    break
+                continue
+            q, square, longest = trial, found, min(_LONGEST, 2.0 * longest)
+        off = np.abs(self._task(q)[0] - goal)
+        angle = self.coordinates == 2
+        part = float(np.linalg.norm(off / self._units))
+        if part <= REACHED:
+            return Nearest(q, 0.0, 0.0, 0.0)
+        return Nearest(q, float(np.linalg.norm(off[~angle])), float(np.linalg.norm(off[angle])), part)
+
+    def closed(self, t: float, q: Array) -> Array | None:
+        """The pose with loops closed from there by least changes; None where they do not close."""
+        system, still = self.system, np.zeros(self.system.n)
+        for _ in range(_CORRECTIONS):
+            phi = system.constraints(self.signals, t, q, still)[0] / system.row_units
+            if np.max(np.abs(phi), initial=0.0) <= _CLOSED * float(np.max(np.abs(q) / system.units, initial=1.0)):
+                return q
+            change = np.linalg.lstsq(self._jacobian(q), -phi, rcond=_DEPENDENT)[0]
+            q = q + system.units * change * min(1.0, _LONGEST / max(np.max(np.abs(change)), _LONGEST))
+        return None
+
+    def tracked(self, times: Sequence[float] | Array, goals: Array, q: Array) -> list[Nearest]:
+        """The nearest poses to goals (k, tasks) at times (k,), each from the one before."""
+        found = []
+        for t, goal in zip(times, goals, strict=True):
+            start = self.closed(float(t), q)
+            found.append(self.nearest(float(t), goal, q if start is None else start))
+            q = found[-1].q
+        return found
+
+    def shortfall(self, times: Array, goals: Array, q: Array, others: Sequence[Array] = ()) -> Shortfall:
+        """How far goals (k, tasks) at times (k,) lie from the nearest pose, from a pose q onwards along them.
+
+        Where other poses, or such from bodies turned at random, come nearer to the furthest goal these count too.
+        """
+        found = self.tracked(times, goals, q)
+        own = np.array([one.part for one in found])
+        worst = int(np.argmax(own))
+        t, goal = float(times[worst]), goals[worst]
+        if own[worst] > 0.0:
+            for pose in (*others, *self.scattered(t, q, _SCATTERED)):
+                start = self.closed(t, pose)
+                if start is not None and self.nearest(t, goal, start).part < own[worst] - REACHED:
+                    again = self.tracked(times, goals, start)
+                    found = [min(pair, key=lambda one: one.part) for pair in zip(found, again, strict=True)]
+        distance, turn = (np.array([getattr(one, name) for one in found]) for name in ("distance", "turn"))
+        return Shortfall(np.asarray(times, dtype=float), goals, distance, turn, own)
+
+    def scattered(self, t: float, q: Array, count: int) -> Iterator[Array]:
+        """Closed poses from bodies turned at random: other ways to put the mechanism together, as far as they close."""
+        random, angles = np.random.default_rng(0), [body.angle for body in self.system.bodies]
+        for _ in range(count):
+            turned = q.copy()
+            turned[angles] = random.uniform(-np.pi, np.pi, len(angles))
+            pose = self.closed(t, turned)
+            if pose is not None:
+                yield pose
+
+    @property
+    def _units(self) -> Array:
+        """What task coordinates are compared with: the size of the mechanism, 1 for an angle."""
+        return np.where(self.coordinates == 2, 1.0, self.system.size)
+
+    def _task(self, q: Array) -> tuple[Array, Array]:
+        """Task coordinates (tasks,) and their derivatives (tasks, n)."""
+        system = self.system
+        place, rows = marker_place(system, system.marker(self.point), q[None])
+        turn = np.zeros((1, system.n))
+        if not self.point.on_ground:
+            turn[0, system.body(self.point.body).angle] = 1.0
+        values = np.append(place[0], material_angle(system, self.point, q[None]))
+        return values[self.coordinates], np.vstack([rows[0], turn])[self.coordinates]
+
+    def _square(self, q: Array, goal: Array) -> float:
+        off = (self._task(q)[0] - goal) / self._units
+        return float(off @ off)
+
+    def _jacobian(self, q: Array) -> Array:
+        """Phi_q without dimension."""
+        return self.system.jacobian(q) * self.system.units / self.system.row_units[:, None]
+
+    def _slope(self, q: Array, goal: Array, multipliers: Array | None = None) -> tuple[Array, Array]:
+        """Gradient of half the square, with multipliers that of the Lagrangian; and Phi_q."""
+        values, rows = self._task(q)
+        jacobian = self._jacobian(q)
+        slope = (rows * self.system.units / self._units[:, None]).T @ ((values - goal) / self._units)
+        return (slope if multipliers is None else slope + jacobian.T @ multipliers), jacobian
+
+    def _step(self, goal: Array, q: Array, longest: float) -> Array:
+        """A step towards the nearest pose, along what the constraints allow, without dimension."""
+        slope, jacobian = self._slope(q, goal)
+        left, sizes, right = np.linalg.svd(jacobian)
+        rank = int(np.sum(sizes > _DEPENDENT * np.max(sizes, initial=0.0)))
+        free = right[rank:].T
+        multipliers = -left[:, :rank] @ ((right[:rank] @ slope) / sizes[:rank])
+        here = slope + jacobian.T @ multipliers
+        columns = [
+            self._slope(q + self.system.units * _DIFFERENCE * column, goal, multipliers)[0] - here for column in free.T
+        ]
+        curvature = free.T @ np.column_stack(columns) / _DIFFERENCE if columns else np.zeros((0, 0))
+        values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
+        along = vectors.T @ (free.T @ slope)
+        # Downhill whatever the sign of the curvature; from a place without a slope, where the distance curves down.
+        scale = np.maximum(np.abs(values), _FLAT)
+        move = -along / scale
+        if values.size and np.max(np.abs(along)) <= _FLAT and values[0] < -np.sqrt(_FLAT):
+            move[0] = longest
+        step = free @ (vectors @ move)
+        return step * min(1.0, longest / max(float(np.max(np.abs(step), initial=0.0)), longest))
