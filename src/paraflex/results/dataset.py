@@ -15,7 +15,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.mechanism import Mechanism
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
-from paraflex.results.metrics import SAME_TIME, ErrorSpan, Part, peak_torque, rms_torque, tracking_variables
+from paraflex.results.metrics import ErrorSpan, Part, peak_torque, rms_torque, too_short, tracking_variables
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
 from paraflex.results.storage import SCHEMA
@@ -231,9 +231,7 @@ def end_effector_point(mechanism: Mechanism) -> dict[str, str]:
 
 def part_of(path: Path, end: float) -> Part | None:
     """What runs that end then [s] do of a path that they are too short for; None where they are not."""
-    if end >= path.duration * (1.0 - SAME_TIME):
-        return None
-    return Part(end, path.duration, length_fraction(path, end))
+    return Part(end, path.duration, length_fraction(path, end)) if too_short(end, path.duration) else None
 
 
 def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> dict:

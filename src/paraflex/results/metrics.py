@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 # A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
-SAME_TIME = 1e-9
+_SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
 _DRIFT_DEGREE = 2
 # Fewer samples after the motion do not tell a vibration from a drift.
@@ -42,7 +42,7 @@ SPAN_WORDS = {ErrorSpan.MOTION: "during the motion", ErrorSpan.WHOLE: "over the 
 def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
     """Which samples at times t (k,) are of the motion, its end among them [s]; the others are after it."""
     end = np.real(motion_end)
-    return np.real(t) <= end + SAME_TIME * abs(end)
+    return np.real(t) <= end + _SAME_TIME * abs(end)
 
 
 def rms(values: NDArray[Any]) -> Any:
@@ -202,10 +202,15 @@ class Part:
         return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
 
 
+def too_short(end: float, path_duration: float) -> bool:
+    """Whether a run that ends then [s] does not come to the end of its path [s]."""
+    return end < path_duration * (1.0 - _SAME_TIME)
+
+
 def part_run(data: xr.Dataset) -> Part | None:
     """What the runs of a dataset were to do of a path that they were too short for; None where they were not."""
     end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
-    if "path_length_run" not in data.attrs or end >= path * (1.0 - SAME_TIME):
+    if "path_length_run" not in data.attrs or not too_short(end, path):
         return None
     return Part(end, path, float(data.attrs["path_length_run"]))
 
