@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.display import shown
 from paraflex.dynamics import (
     State,
@@ -24,7 +25,7 @@ from paraflex.dynamics import (
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError, as_enum
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
-from paraflex.kinematics import Path, RigidMotion, path_follower
+from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 from paraflex.validity import Following, Validity, assess, warn
 
@@ -46,6 +47,7 @@ class Ending(Enum):
     HOLD = "hold"
 
 
+@given_as("a task", "the task that plan_tracking makes")
 @dataclass(frozen=True)
 class TrackingTask:
     """A mechanism, a path, and the rigid motion along it: what the runs of all modes share.
@@ -91,14 +93,17 @@ class TrackingTask:
         """Whether brakes engage in its runs: they are asked for, and the runs go on after the path."""
         return self.after is Ending.HOLD and self.motion.t[-1] > self.path.duration * (1.0 + _SAME_TIME)
 
+    @checked_arguments()
     def mode(self, mode: str | ActuationMode) -> ActuationMode:
         """An actuation mode by name, signs or motor names."""
         return mode if isinstance(mode, ActuationMode) else parse_mode(self.mechanism, mode)
 
+    @checked_arguments()
     def torques(self, mode: str | ActuationMode) -> FeedForward:
         """Feed-forward torques of a mode: minimum norm, smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
 
+    @checked_arguments()
     def remodelled(self, mechanism: Mechanism) -> TrackingTask:
         """The same motion and torques for another model of the same bodies: rigid ones, another mesh or geometry.
 
@@ -115,6 +120,7 @@ class TrackingTask:
             start=_start(system, self.motion, self.carriers or _in_place(system)),
         )
 
+    @checked_arguments()
     def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
         """The same task for the virtual prototype of finite segments, driven by the same torques.
 
@@ -141,6 +147,7 @@ class TrackingTask:
             carriers=segmented.carriers,
         )
 
+    @checked_arguments()
     def balanced(self, mode: str | ActuationMode) -> TrackingTask:
         """The same task, starting from static equilibrium with the active motors of a mode held where the path begins.
 
@@ -171,6 +178,7 @@ class TrackingTask:
         return simulate(self, mode, method=method, options=options, after=after, warning=warning)
 
 
+@given_as("a run along a path", "a run that simulate returns")
 @dataclass(frozen=True)
 class TrackingRun:
     """One mode of a task, simulated.
@@ -227,9 +235,10 @@ class TrackingRun:
         return shown(self)
 
 
+@checked_arguments()
 def plan_tracking(
-    mechanism: Mechanism,
-    path: Path,
+    mechanism: Mechanism | ModelWithPaths,
+    path: Path | str,
     *,
     duration: float | None = None,
     samples: int = 701,
@@ -241,8 +250,10 @@ def plan_tracking(
 
     Parameters
     ----------
-    mechanism : Mechanism
-    path : Path
+    mechanism : Mechanism or Model
+        A model stands for its mechanism; nothing is taken from its [study].
+    path : Path or str
+        A path, or with a model the name of one of its paths.
     duration : float, optional
         Of the run, dwell included [s]; the path's own by default.
     samples : int
@@ -259,6 +270,7 @@ def plan_tracking(
     InputError, AssemblyError, UnreachablePathError
         See `kinematics.follow_path`.
     """
+    mechanism, path = _planned(mechanism, path)
     end = path.duration if duration is None else duration
     if not (np.isfinite(end) and end > 0.0):
         raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
@@ -281,6 +293,7 @@ def plan_tracking(
     )
 
 
+@checked_arguments()
 def simulate(
     task: TrackingTask,
     mode: str | ActuationMode,
@@ -339,6 +352,19 @@ def simulate(
     if warning:
         warn(run.validity, f"mode {torques.mode.name}: ")
     return run
+
+
+def _planned(given: Mechanism | ModelWithPaths, path: Path | str) -> tuple[Mechanism, Path]:
+    """The mechanism, and the path where it is one by the name it has in a model."""
+    mechanism = Mechanism.made_of(given)
+    if not isinstance(path, str):
+        return mechanism, path
+    if isinstance(given, Mechanism):
+        raise InputError(
+            "a mechanism has no paths by name", field="path", value=path,
+            remedy="give the model that paraflex.load reads instead of its mechanism, or a path such as Polygon",
+        )  # fmt: skip
+    return mechanism, given.path(path)
 
 
 def _drive(

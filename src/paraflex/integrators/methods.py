@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from types import MappingProxyType
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 
 
@@ -172,6 +173,7 @@ METHODS: Mapping[str, Method] = MappingProxyType({method.name: method for method
 DEFAULT_METHOD = "esdirk5"
 
 
+@checked_arguments()
 def find_method(name: str) -> Method:
     """A method by its name.
 

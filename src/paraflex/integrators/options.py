@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, as_enum
 from paraflex.integrators.events import Event
 from paraflex.integrators.methods import DEFAULT_METHOD, Method, Treatment, check_parameters, find_method
@@ -20,8 +21,9 @@ _REMEDIES = {
 }
 
 
+@given_as("IntegrationOptions", "them, say IntegrationOptions(tolerance=1e-6)")
 @dataclass(frozen=True)
-class IntegrationOptions:
+class IntegrationOptions(CheckedFields):
     """How to integrate.
 
     Attributes
@@ -69,6 +71,7 @@ class IntegrationOptions:
     events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name, remedy in _REMEDIES.items():
             value = getattr(self, name)
             if value is not None and not value > 0:
@@ -130,6 +133,7 @@ class IntegrationOptions:
             )  # fmt: skip
 
 
+@checked_arguments()
 def choose(method: str | None, options: IntegrationOptions | None) -> IntegrationOptions:
     """The options, by default the default ones, with the method where one is named.
 

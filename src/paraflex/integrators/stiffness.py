@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 import scipy
 
-from paraflex.errors import StiffnessWarning
+from paraflex.errors import StiffnessWarning, warn_user
 from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.run import Problem
 
@@ -41,9 +40,8 @@ def warn_if_stiff(form: OdeForm, problem: Problem, method: str) -> None:
     step = LIMITS[method] / rate if rate > 0.0 else math.inf
     steps = problem.span / step
     if steps > MANY_STEPS:
-        warnings.warn(
+        warn_user(
             f"{method} is explicit and this mechanism stiff: no step can be longer than about {step:.2g} s, "
             f"{steps:,.0f} steps for this run; an implicit method, such as tr-bdf2, takes steps by accuracy alone",
             StiffnessWarning,
-            stacklevel=2,
         )

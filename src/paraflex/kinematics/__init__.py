@@ -2,11 +2,13 @@
 
 from paraflex.kinematics.closure import RigidMotion, follow_path, path_follower
 from paraflex.kinematics.laws import TrapezoidalLaw
+from paraflex.kinematics.model import ModelWithPaths
 from paraflex.kinematics.paths import Circle, Line, Path, PathMotion, PointPath, Polygon, length_fraction
 
 __all__ = [
     "Circle",
     "Line",
+    "ModelWithPaths",
     "Path",
     "PathMotion",
     "PointPath",

@@ -8,16 +8,19 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.plots.runs import default_mode
 from paraflex.report.curves import DOTTED, compared, followed, look, plane_path, thinned, unit_for
 from paraflex.report.film import NO_SHAPES, film
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
+from paraflex.results.kinds import check_kind
 from paraflex.results.metrics import during_motion, headline, part_run, ranked_by_motion
 from paraflex.results.validity import validity_lines, validity_summary
 
 
+@checked_arguments()
 def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> Page:
     """The report of a tracking study.
 
@@ -28,6 +31,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     failed : mapping of str to str, optional
         Modes that could not start, each with its reason.
     """
+    check_kind(data, "tracking")
     data = data.transpose("mode", "time", ...)
     runs = [str(name) for name in data["mode"].values]
     run = asked(data)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, as_enum
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
@@ -101,6 +102,7 @@ def describe(data: xr.Dataset, name: str, label: str, unit: str) -> None:
         data[name].attrs["comment"] = _COMMENTS[name]
 
 
+@checked_arguments()
 def tracking_dataset(
     runs: Sequence[TrackingRun | Record],
     *,

@@ -13,6 +13,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
+from paraflex.results.kinds import check_kind
+
 # A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
 _SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
@@ -86,11 +89,13 @@ def _drift(t: NDArray[Any], position: NDArray[Any]) -> tuple[NDArray[Any], NDArr
     return basis, np.linalg.solve(basis.T @ basis, basis.T @ position), half
 
 
+@checked_arguments()
 def tracking_error(data: xr.Dataset) -> xr.DataArray:
     """Root mean square distance of the end-effector from its desired place over the samples (Eq. 64) [m]."""
     return tracking_variables(data)["tracking_rms"]
 
 
+@checked_arguments()
 def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
     """Root mean square distance of the end-effector after the motion's end from its drift [m]: see `vibration`.
 
@@ -123,6 +128,7 @@ def tracking_variables(data: xr.Dataset, motion_end: float | None = None) -> dic
     motion_end : float, optional
         End of the motion along the path [s]; that of the dataset by default.
     """
+    check_kind(data, "tracking", "verification")
     end = float(data.attrs["motion_end"]) if motion_end is None else motion_end
     place = data["end_effector"].transpose(..., "time", "axis")
     away = (data["end_effector_desired"] - data["end_effector"]).transpose(*place.dims).values
@@ -215,11 +221,13 @@ def part_run(data: xr.Dataset) -> Part | None:
     return Part(end, path, float(data.attrs["path_length_run"]))
 
 
+@checked_arguments()
 def peak_torque(data: xr.Dataset) -> xr.DataArray:
     """Largest magnitude of each motor's torque [N m]."""
     return abs(data["torque"]).max("time").assign_attrs(long_name="peak torque", units="N m")
 
 
+@checked_arguments()
 def rms_torque(data: xr.Dataset) -> xr.DataArray:
     """Root mean square of each motor's torque over the run [N m]."""
     return ((data["torque"] ** 2).mean("time") ** 0.5).assign_attrs(long_name="RMS torque", units="N m")

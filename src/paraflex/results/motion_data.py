@@ -10,12 +10,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.dataset import UNITS, describe, end_effector_point
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.joint_loads import joint_loads
+from paraflex.results.kinds import check_kind
 from paraflex.results.motion import point_motion, tip_deflection
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import FIGURES
@@ -31,6 +33,7 @@ _OWN_UNITS = {
 }
 
 
+@checked_arguments()
 def motion_dataset(
     run: MotionRun, *, options: IntegrationOptions | None = None, parameters: dict | None = None
 ) -> xr.Dataset:
@@ -121,8 +124,10 @@ def motion_dataset(
     return out
 
 
+@checked_arguments()
 def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     """The run's figures as plain numbers; None for what it did not reach."""
+    check_kind(data, "motion")
     last = data.isel(time=-1)
     figures: dict[str, Any] = {name: data[name].item() for name in FIGURES}
     figures = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in figures.items()}

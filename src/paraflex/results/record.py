@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import given_as
 from paraflex.dynamics import Marker, System, end_markers, material_angle
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, drawing, system_drawing
@@ -37,6 +38,7 @@ FIGURES = (
 BRAKE_ENERGY = "brake_energy"
 
 
+@given_as("a record", "what results.record makes of a run")
 @dataclass(frozen=True)
 class Record:
     """One run of a task, at the k sample times it reached; NaN for what a model does not tell.

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from paraflex.arguments import checked_arguments
+from paraflex.results.kinds import check_kind
 from paraflex.results.metrics import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.validity import validity_summary
 
@@ -23,6 +25,7 @@ _FIGURES = (
 )
 
 
+@checked_arguments()
 def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str, Any]:
     """Figures of every mode, parameters and version.
 
@@ -41,6 +44,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         which of the errors ranks the modes; `after`, what the motors do after the path; `part`, how much of the path a
         run did that was too short for all of it, else None; `parameters`; `version`. A figure not reached is None.
     """
+    check_kind(data, "tracking")
     modes, part = {}, part_run(data)
     for name in data["mode"].values:
         run = data.sel(mode=name)

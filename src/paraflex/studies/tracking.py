@@ -11,6 +11,7 @@ from typing import Protocol
 
 import xarray as xr
 
+from paraflex.arguments import checked_arguments, refused
 from paraflex.errors import IntegrationError, NumericalError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
@@ -62,6 +63,7 @@ class StudyResult:
         return study_html(self)
 
 
+@checked_arguments()
 def run_study(
     task: TrackingTask,
     modes: Sequence[str | ActuationMode],
@@ -103,6 +105,9 @@ def run_study(
     InputError
         A mode that is none of the mechanism's, before anything runs.
     """
+    if method is not None and not callable(method):
+        remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in a way of its own"
+        raise refused(method, "method", "a function", remedy)
     chosen = list(dict.fromkeys(task.mode(mode) for mode in modes))
     stop = threading.Event()
 

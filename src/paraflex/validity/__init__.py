@@ -6,11 +6,10 @@ both, and leaves out terms of fourth order in the slopes.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 from paraflex.dynamics import System
-from paraflex.errors import ValidityWarning
+from paraflex.errors import ValidityWarning, warn_user
 from paraflex.integrators import Solution
 from paraflex.validity.bending import bending_of
 from paraflex.validity.indicators import (
@@ -98,4 +97,4 @@ def assess(system: System, solution: Solution, following: Following | None = Non
 def warn(validity: Validity | None, whose: str = "") -> None:
     """Issue a `ValidityWarning` where a model does not hold; `whose` run it is stands before the verdict."""
     if validity is not None and not validity.holds:
-        warnings.warn(f"{whose}{validity.verdict}", ValidityWarning, stacklevel=3)
+        warn_user(f"{whose}{validity.verdict}", ValidityWarning)

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from paraflex.arguments import checked_arguments
 from paraflex.studies.optimisation.best import write_best
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, minimise
@@ -89,6 +90,7 @@ class OptimisationResult:
         return optimisation_html(self)
 
 
+@checked_arguments()
 def optimise(
     study: DesignStudy | str | Path,
     folder: str | Path,

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.compilation import compile_kernels_for
 from paraflex.errors import InputError, OutputError
 from paraflex.results import save_results
@@ -118,6 +119,7 @@ class SweepResult:
         return sweep_html(self)
 
 
+@checked_arguments()
 def sweep(
     study: SweepStudy | str | Path,
     folder: str | Path,
