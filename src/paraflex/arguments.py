@@ -328,8 +328,8 @@ _COUNTS = {2: "two", 3: "three"}
 _GIVEN_AS: dict[Any, tuple[str, str]] = {}
 
 
-def given_as(noun: str, wanted: str) -> Callable[[C], C]:
-    """Say what errors call objects of a class, and what they ask for: the class's own name by default."""
+def given_as(noun: str, wanted: str = "") -> Callable[[C], C]:
+    """Say what errors call objects of a class, and what they ask for: the names of the classes by default."""
 
     def register(kind: C) -> C:
         _GIVEN_AS[kind] = noun, wanted
@@ -363,8 +363,9 @@ def _noun(hint: Any) -> str:
 def _wanted(hint: Any) -> str:
     """What to give instead."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
-    if _stripped(hint) in _GIVEN_AS:
-        return _GIVEN_AS[_stripped(hint)][1]
+    wanted = _GIVEN_AS.get(_stripped(hint), ("", ""))[1]
+    if wanted:
+        return wanted
     if origin in _UNIONS:
         return _either([_wanted(kind) for kind in _members(inner)])
     if origin in _LISTS and not _is_row(hint):

@@ -96,7 +96,7 @@ class SingularDistance(CheckedFields):
 
 
 Event = JointLimit | DeflectionLimit | SingularDistance
-given_as("an event", "JointLimit, DeflectionLimit or SingularDistance")(Event)
+given_as("an event")(Event)
 
 
 def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:

@@ -57,6 +57,7 @@ class IntegrationOptions(CheckedFields):
         overlooked: where limits are grazed bound the step.
     """
 
+    _own = ("method",)
     tolerance: float = 1e-5
     alpha: float = 20.0
     beta: float = 20.0
@@ -72,6 +73,7 @@ class IntegrationOptions(CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "method", find_method(self.method).name)
         for name, remedy in _REMEDIES.items():
             value = getattr(self, name)
             if value is not None and not value > 0:

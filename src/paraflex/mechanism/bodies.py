@@ -297,7 +297,7 @@ class AssumedModesBeam(CheckedFields):
 
 
 Body = RigidBody | FlexibleBeam | AssumedModesBeam | ModalBody
-given_as("a body", "RigidBody, FlexibleBeam, AssumedModesBeam or ModalBody")(Body)
+given_as("a body")(Body)
 
 
 def given_shapes(bodies: Iterable[Body]) -> list[str]:

@@ -89,7 +89,7 @@ class LossFactor(CheckedFields):
 
 
 Damping = RayleighDamping | ModalDamping | LossFactor
-given_as("a damping", "RayleighDamping, ModalDamping or LossFactor, or leave it out")(Damping)
+given_as("a damping")(Damping)
 
 
 def stiffness_proportional(damping: Damping) -> float | None:

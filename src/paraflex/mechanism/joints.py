@@ -152,7 +152,7 @@ class SlidingJoint(CheckedFields):
 PointJoint = RevoluteJoint | WeldJoint
 AxisJoint = PrismaticJoint | SlotJoint | SlidingJoint
 Joint = PointJoint | AxisJoint
-given_as("a joint", "RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint or WeldJoint")(Joint)
+given_as("a joint")(Joint)
 
 
 @given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")

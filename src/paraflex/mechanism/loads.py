@@ -113,4 +113,4 @@ class AppliedTorque(CheckedFields):
 
 
 Load = PointForce | AppliedTorque
-given_as("a load", "PointForce or AppliedTorque")(Load)
+given_as("a load")(Load)

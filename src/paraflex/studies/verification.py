@@ -57,6 +57,7 @@ class VerificationOptions(CheckedFields):
         On the longest flexible beam; others get as many as their length takes.
     """
 
+    _own = ("method",)
     tolerance: float = 5e-6
     ked_step: float = 1e-4
     exudyn_step: float = 5e-5
@@ -66,7 +67,7 @@ class VerificationOptions(CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        find_method(self.method)
+        object.__setattr__(self, "method", find_method(self.method).name)
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ def _again(
     """The picked runs, why some cannot be made, and which come out otherwise than their rows say."""
     if not picked:
         return {}, {}, []
-    compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism, lambda _: None)
+    compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism)
     table = studied.table
 
     stop = threading.Event()

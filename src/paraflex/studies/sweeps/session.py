@@ -175,7 +175,7 @@ def sweep(
         began = time.perf_counter()
         interrupted = False
         if not session.finished:
-            compile_kernels_for(study.model().mechanism, lambda _: None)
+            compile_kernels_for(study.model().mechanism)
             made = open_engine(engine, workers, cluster) if isinstance(engine, str) else engine
             interrupted = session.go(made, partial(run, study.setting), limit)
         counts = session.end()
