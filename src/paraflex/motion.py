@@ -91,7 +91,7 @@ def simulate_motion(
         Of integration: that of the options by default; see `paraflex.METHODS`.
     options : IntegrationOptions, optional
     on_progress : callable, optional
-        Told the time reached [s].
+        Called with the time reached [s].
     warning : bool
         Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
 

@@ -318,7 +318,7 @@ def simulate(
         What the active motors do after the path, "free" or "hold": as the task says by default. Held, the joints of the
         active motors are locked where they are when the path ends: see `dynamics.brake`.
     on_progress : callable, optional
-        Told the time reached [s].
+        Called with the time reached [s].
     warning : bool
         Whether a run beyond what its model can describe issues a `ValidityWarning`; its `validity` says so either way.
 

@@ -32,9 +32,9 @@ from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary, save_results
 from paraflex.results.validity import validity_lines
 
-# Singular positions told one by one.
+# Singular positions listed one by one.
 _NAMED = 4
-# Points told where a run ends.
+# Points listed where a run ends.
 _POINTS = 20
 
 

@@ -77,7 +77,7 @@ from paraflex.mechanism import (
 
 @dataclass(frozen=True)
 class StudyDefaults:
-    """What a study of the model does unless told otherwise.
+    """What a study of the model does unless asked otherwise.
 
     Attributes
     ----------
@@ -150,13 +150,13 @@ class Model:
         from paraflex.mechanism.html import mechanism_html
 
         study = self.study
-        told = [
+        shown = [
             ("paths", list(self.paths)),
             ("study: path", study.path),
             ("study: modes", list(study.modes)),
             ("study: duration [s]", study.duration),
         ]
-        return page(f"Model {self.source}", facts(told), mechanism_html(self.mechanism))
+        return page(f"Model {self.source}", facts(shown), mechanism_html(self.mechanism))
 
     @checked_arguments()
     def path(self, name: str | None = None) -> Path:

@@ -35,7 +35,7 @@ from paraflex.plots.themes import Theme, theme
 
 Array = NDArray[np.float64]
 
-# Bodies told by name under a picture; of more there is no room.
+# Bodies named under a picture; of more there is no room.
 _NAMED = 9
 _MM = 1.0 / 25.4
 # Room above and below a drawing [mm].

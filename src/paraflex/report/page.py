@@ -313,7 +313,7 @@ def plotly_script() -> str:
 
 
 def _told(page: Page) -> dict[str, Any]:
-    """What the scripts are told."""
+    """What the scripts are given."""
     series = Series()
     time = series.add(page.time, exact=True)
     return {

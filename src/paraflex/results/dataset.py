@@ -116,7 +116,7 @@ def tracking_dataset(
     ----------
     runs : sequence of TrackingRun or Record
         Of one task; runs that did not finish hold NaN after their last sample and say so in `status`, and in `event`
-        and `event_time` where that stopped them. Runs of finite segments are told as the links they were cut from.
+        and `event_time` where that stopped them. Runs of finite segments are reported as the links they were cut from.
     options : IntegrationOptions, optional
         Kept as provenance.
     parameters : dict, optional

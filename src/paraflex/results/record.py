@@ -1,4 +1,4 @@
-"""A run told link by link: what every model of a mechanism can say, whoever computed it."""
+"""A run link by link: what every model of a mechanism can say, whoever computed it."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Record:
 
 
 def record(run: TrackingRun) -> Record:
-    """What a run of our own says of the links; finite segments are told as the links they were cut from."""
+    """What a run of our own says of the links; finite segments are reported as the links they were cut from."""
     task, solution = run.task, run.solution
     # The state at an event is a sample more than the task's times.
     k = solution.t.size - bool(solution.event)

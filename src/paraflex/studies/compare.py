@@ -93,10 +93,10 @@ def compare_methods(
     case : Case
         From `studies.tracking_case` or `studies.motion_case`.
     methods : sequence of str, optional
-        From `METHODS`; all by default. One that cannot run is told with its reason and the others go on.
+        From `METHODS`; all by default. One that cannot run is listed with its reason and the others go on.
     options : ComparisonOptions, optional
     on_progress : callable, optional
-        Told what begins, its number and how many runs there are at most.
+        Called with what begins, its number and how many runs there are at most.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def run_study(
     parameters : dict, optional
         Kept as provenance.
     on_progress : callable, optional
-        Told the mode's name and the time reached [s]; called from several threads.
+        Called with the mode's name and the time reached [s]; called from several threads.
     workers : int, optional
         Threads; as many as there are processors by default. The results do not depend on it.
     method : Simulator, optional

@@ -184,7 +184,7 @@ def verify(
         From FIDELITIES and engines.ENGINES.
     options : VerificationOptions, optional
     on_progress : callable, optional
-        Told what begins, its number and how many runs there are.
+        Called with what begins, its number and how many runs there are.
 
     Raises
     ------

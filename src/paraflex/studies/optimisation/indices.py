@@ -24,7 +24,7 @@ from paraflex.studies.sweeps.table import whole_file, write_json
 
 Array = NDArray[np.float64]
 INDICES, TABLE = "indices.json", "indices.parquet"
-# Base samples unless told otherwise, and the fewest of which anything can be said.
+# Base samples unless asked otherwise, and the fewest of which anything can be said.
 _SAMPLES, _FEWEST = 128, 8
 
 

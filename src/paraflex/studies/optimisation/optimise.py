@@ -23,7 +23,7 @@ from paraflex.studies.sweeps.table import write_json
 
 # So near a bound, as a share of the range, a parameter is at it.
 _AT_BOUND = 1e-4
-# Different reasons of failures that are told.
+# Different reasons of failures that are listed.
 _REASONS = 5
 
 
@@ -116,7 +116,7 @@ def optimise(
     cluster : str, optional
         Address of a Dask scheduler.
     on_progress : callable, optional
-        Told how far it is whenever a design is done.
+        Called with how far it is whenever a design is done.
     run : callable, optional
         What is done for a task: the simulation but in tests.
 

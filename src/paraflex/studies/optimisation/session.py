@@ -109,7 +109,7 @@ def search(
     solve : callable
         Asks for designs; tells why it ended.
     on_evaluated : callable, optional
-        Told each design as it is done.
+        Called with each design as it is done.
 
     Raises
     ------

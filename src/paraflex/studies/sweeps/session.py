@@ -148,7 +148,7 @@ def sweep(
     limit : int, optional
         Of runs in this session, rounded up to whole designs.
     on_progress : callable, optional
-        Told how far it is whenever a design is done.
+        Called with how far it is whenever a design is done.
     run : callable
         What is done for a task: `run_task` but in tests.
 
