@@ -3,7 +3,7 @@
     python benchmarks/cost_model.py [--quick] [--write]
 
 Measured are the time of a Newton iteration over bodies, loops and modes, and the number of iterations over tolerance
-and duration; each is fitted by a formula whose worst misfit is told. A study of a million runs of RAParM-I is
+and duration; each is fitted by a formula whose worst misfit is stated. A study of a million runs of RAParM-I is
 extrapolated from a run and its planning, and from how much slower a run gets while all processors of this machine do
 the same. With --write the part of docs/cost-model.md between its two marks is replaced. Takes some minutes.
 """

@@ -46,11 +46,11 @@ def _port(p: PackedSystem, port: np.void, n: int) -> int:
     """A joint's side: motion of its point from q, v, a, its part of the rows, the joint's force on the body."""
     if port["kind"] == ANGLE:
         return 8 * n + 6
-    bent = 0
+    second_order = 0
     if p.bending is not None and p.markers[port["marker"]]["bending"] >= 0:
         # f, f' and f'' from B u and B u'; the force works on B u.
-        bent = 4 * n**2 + 9 * n + 2 * n
-    return 12 * n + 46 + 12 + 4 * n + 12 + bent
+        second_order = 4 * n**2 + 9 * n + 2 * n
+    return 12 * n + 46 + 12 + 4 * n + 12 + second_order
 
 
 def solution(p: PackedSystem) -> int:
@@ -58,8 +58,8 @@ def solution(p: PackedSystem) -> int:
     total = 4 * int(p.rows.size)
     for body in p.bodies:
         n = int(body["nf"])
-        bent = p.bending is not None and body["slopes"]
-        total += 12 + (2 * (3 + n) ** 2 if bent else 13 * n + 24)
+        second_order = p.bending is not None and body["slopes"]
+        total += 12 + (2 * (3 + n) ** 2 if second_order else 13 * n + 24)
         for port in p.ports[body["port"] : body["port_end"]]:
             parts = 1 if port["kind"] == ANGLE else 2
             total += parts * (4 * (3 + n) + 8)
@@ -76,8 +76,8 @@ def norm(p: PackedSystem) -> int:
     total = 0
     for body in p.bodies:
         n = int(body["nf"])
-        bent = p.bending is not None and body["slopes"]
-        total += 6 + (2 * (3 + n) ** 2 if bent else 8 * n + 22)
+        second_order = p.bending is not None and body["slopes"]
+        total += 6 + (2 * (3 + n) ** 2 if second_order else 8 * n + 22)
     return total
 
 

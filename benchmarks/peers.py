@@ -8,7 +8,7 @@ Exudyn's exact beams and MuJoCo's segments have what our second-order geometry h
 curvature, 114 coordinates). The paper's linear beams (cantilever reference, shared curvature, 104 coordinates) leave
 the geometric stiffness out; they stand beside, under their own name. Settings are searched from coarse to fine; what
 counts is the median wall time of several runs of the first that is within the target together with the next finer
-one. Integration alone is timed, making and assembling the model is told beside it.
+one. Integration alone is timed, making and assembling the model is given beside it.
 
 Ours are tried with error control and with fixed steps, as all others have. Exudyn is tried with full and modified
 Newton, dense and sparse matrices and several numerical dampings; its torques are set by a function of Python before

@@ -112,9 +112,9 @@ def summary(target: str, method: str, runs: list[Passage]) -> dict[str, Any]:
     """What a table tells of a method's runs."""
     ratios = np.array([run.ratio for run in runs if run.ratio is not None])
     failed = sum(run.ratio is None for run in runs)
-    told = {"median": np.median(ratios), "p90": np.quantile(ratios, 0.9), "most": ratios.max()} if ratios.size else {}
+    spread = {"median": np.median(ratios), "p90": np.quantile(ratios, 0.9), "most": ratios.max()} if ratios.size else {}
     counts = {"target": target, "method": method, "runs": len(runs), "failed": failed}
-    return {**counts, "over_10": int(np.sum(ratios > 10.0)), **{key: float(value) for key, value in told.items()}}
+    return {**counts, "over_10": int(np.sum(ratios > 10.0)), **{key: float(value) for key, value in spread.items()}}
 
 
 def _cell(value: object) -> str:

@@ -108,7 +108,7 @@ PDF as TrueType. Colours are those of Okabe and Ito, and lines differ in their d
 apart in grey and by colour-blind readers. Files go to `figures/` in the folder of the results, or to `--output`;
 nothing is written over without `--force`.
 
-In Python each is a function of `paraflex.plots`:
+In Python each is a function of `paraflex.plots`, of results or of the folder they were written to:
 
 ```python
 import paraflex as pf

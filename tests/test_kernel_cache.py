@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import paraflex
-from paraflex.kernel import disk_cache
+from paraflex.kernel import disk_cache, notice
 from paraflex.kernel.compiling import Kernel
 
 # The row of a prescribed angle: a kernel of constraints.py calls one of joints.py, which writes a torque of one there.
@@ -101,3 +101,41 @@ def test_outdated_kernels_are_removed(tmp_path):
     others[0].mkdir()
     assert disk_cache.make_folder(tmp_path) == folder
     assert others[0].exists()
+
+
+# Two kernels that compile in no time.
+KERNELS = """
+import sys
+{0}
+import numpy as np
+from paraflex.kernel.dense import factor_dense, solve_factored
+matrix, order = np.eye(2), np.zeros(2, int)
+factor_dense(matrix, order)
+solve_factored(matrix, order, np.ones((2, 1)))
+print(len(factor_dense.from_python.stats.cache_hits))
+"""
+SILENT = "import logging; logging.getLogger('paraflex').setLevel('ERROR')"
+
+
+def streams(code, place):
+    """Standard output and standard error of a process with a place for its kernels."""
+    command, environment = [sys.executable, "-c", code], {**os.environ, "NUMBA_CACHE_DIR": str(place)}
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    return done.stdout, done.stderr
+
+
+def test_that_kernels_are_compiled_is_said_once_and_only_where_they_are(tmp_path):
+    assert streams(KERNELS.format(""), tmp_path / "a") == ("0\n", f"{notice.NOTICE}\n")
+    assert streams(KERNELS.format(""), tmp_path / "a") == ("1\n", "")
+    assert streams(KERNELS.format(SILENT), tmp_path / "b") == ("0\n", "")
+
+
+def test_workers_say_nothing_of_compiling(monkeypatch):
+    said = []
+    monkeypatch.setattr(notice, "_announced", False)
+    monkeypatch.setattr(notice.multiprocessing, "parent_process", lambda: "a process")
+    notice.announce_compiling(said.append)
+    monkeypatch.setattr(notice.multiprocessing, "parent_process", lambda: None)
+    for _ in range(2):
+        notice.announce_compiling(said.append)
+    assert said == [notice.NOTICE]

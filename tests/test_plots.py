@@ -149,7 +149,7 @@ def motion_of(data: xr.Dataset) -> xr.Dataset:
     run = run.assign_coords(time=0.075 * run["time"])
     for k, name in enumerate(("kinetic_energy", "strain_energy", "work")):
         run[name] = ("time", -120.0 * np.cos((k + 1) * 10.0 * data["time"].values))
-    return run
+    return run.assign_attrs(kind="motion")
 
 
 def figure_of(name: str, data: xr.Dataset, mode: str = FULL) -> Figure:

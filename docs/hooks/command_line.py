@@ -19,8 +19,8 @@ This page is made from the commands themselves; `paraflex COMMAND --help` says t
 Exit codes: 0 done, 1 numerical trouble (what was computed is kept and marked), 2 bad input (one line says which file,
 field and value, and what to do), 130 interrupted (what was computed is kept and marked).
 
-Commands of a model take its name or file as an argument or by `--mechanism`. An option takes one value, and a second one is
-an error, unless its text says *repeatable*.
+Commands of a model take its name or file as an argument or by `--mechanism`. An option takes one value; a second one
+is an error, unless its text says *repeatable*.
 
 A command that writes where results lie says what it replaces, before it computes; `--out` names another folder.
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import hashlib
+import logging
 import subprocess
 import sys
 from collections.abc import Callable
@@ -22,11 +23,10 @@ from paraflex.errors import as_enum
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.kernel.march import march
+from paraflex.kernel.notice import LOG, announce_compiling
 from paraflex.kinematics import Line
 from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
 from paraflex.simulate import plan_tracking
-
-NOTICE = "Compiling the kernels: once after an installation, about half a minute."
 
 
 def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:
@@ -34,35 +34,37 @@ def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:
     return _stamp(as_enum(Geometry, geometry, "geometry")).exists()
 
 
-def compile_kernels(geometry: Geometry | str = Geometry.SECOND_ORDER, announce: Callable[[str], None] = print) -> None:
+def compile_kernels(
+    geometry: Geometry | str = Geometry.SECOND_ORDER, announce: Callable[[str], None] | None = None
+) -> None:
     """Compile the kernels for beams of a geometry unless that has been done.
 
     Parameters
     ----------
     geometry : Geometry or str
         Kernels for linear geometry are compiled without all that second-order geometry needs.
-    announce : callable
-        Told that it takes a while, where it does.
+    announce : callable, optional
+        Called with a line where it takes a while, once a process; by default that is logged: see `kernel.notice`.
     """
     _compile([as_enum(Geometry, geometry, "geometry")], announce)
 
 
-def compile_all_kernels(announce: Callable[[str], None] = print) -> None:
+def compile_all_kernels(announce: Callable[[str], None] | None = None) -> None:
     """Compile the kernels for beams of every geometry, as far as that has not been done."""
     _compile(list(Geometry), announce)
 
 
-def compile_kernels_for(mechanism: Mechanism, announce: Callable[[str], None] = print) -> None:
+def compile_kernels_for(mechanism: Mechanism, announce: Callable[[str], None] | None = None) -> None:
     """Compile the kernels that a mechanism needs: see `compile_kernels`. Rigid bodies have no geometry of beams."""
-    bent = any(getattr(body, "flexible", False) for body in mechanism.bodies)
-    compile_kernels(mechanism.geometry if bent else Geometry.LINEAR, announce)
+    flexible = any(getattr(body, "flexible", False) for body in mechanism.bodies)
+    compile_kernels(mechanism.geometry if flexible else Geometry.LINEAR, announce)
 
 
-def _compile(geometries: list[Geometry], announce: Callable[[str], None]) -> None:
+def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None) -> None:
     missing = [geometry for geometry in geometries if not are_compiled(geometry)]
     if not missing:
         return
-    announce(NOTICE)
+    announce_compiling(announce)
     command = [sys.executable, "-m", "paraflex.compilation"]
     processes = [subprocess.Popen([*command, *share], stdout=subprocess.DEVNULL) for share in _shares(missing)]
     try:
@@ -121,6 +123,8 @@ _PARTS = {"time-loop": _call_time_loop, "start": _call_start, "plan": _call_plan
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
+        # Who started this process has said so.
+        LOG.setLevel(logging.ERROR)
         # Nothing that compiling makes is garbage before the end.
         gc.disable()
         for given in sys.argv[1:]:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.arguments import checked_arguments
 from paraflex.dynamics import BodyCoordinates, System, joint_coordinate, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
@@ -41,6 +42,7 @@ Array = NDArray[np.float64]
 _ROUNDING = 1e-9
 
 
+@checked_arguments()
 def simulate_ked(
     task: TrackingTask,
     mode: str | ActuationMode,

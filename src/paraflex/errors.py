@@ -7,7 +7,10 @@ carries what was computed until then.
 
 from __future__ import annotations
 
+import os
 import re
+import sys
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -15,6 +18,8 @@ from enum import Enum
 from typing import Any, TypeVar
 
 E = TypeVar("E", bound=Enum)
+
+_PACKAGE = os.path.dirname(__file__) + os.sep
 
 __all__ = [
     "ActuationError",
@@ -37,6 +42,7 @@ __all__ = [
     "ValidityWarning",
     "as_enum",
     "suggestion",
+    "warn_user",
 ]
 
 
@@ -101,6 +107,17 @@ def as_enum(kind: type[E], value: E | str, field: str) -> E:
         raise InputError(f"unknown {what}", field=field, value=value, remedy=remedy) from None
 
 
+def warn_user(warning: ParaflexWarning) -> None:
+    """Issue a warning that names the line outside of this package that led to it.
+
+    How many calls are between depends on decorators and short cuts, so that no constant `stacklevel` would do.
+    """
+    frame, level = sys._getframe(), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(warning, stacklevel=level)
+
+
 def suggestion(name: object, known: Iterable[str]) -> str:
     """A remedy for an unknown name: the nearest known one, or all of them."""
     known = list(known)
@@ -111,8 +128,14 @@ def suggestion(name: object, known: Iterable[str]) -> str:
 
 
 def _short(value: object, limit: int = 80) -> str:
+    """What was given, in one line: of an object that takes more its kind."""
     text = repr(value).replace("\n", " ")
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    if len(text) <= limit:
+        return text
+    kind = type(value)
+    if kind.__module__ == "builtins" or issubclass(kind, str):
+        return text[: limit - 3] + "..."
+    return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
 
 
 @dataclass(frozen=True)

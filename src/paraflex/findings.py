@@ -5,13 +5,12 @@ The codes are listed in `CODES`; the page "Findings" of the documentation is mad
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from paraflex.errors import ModelWarning, ParaflexWarning
+from paraflex.errors import ModelWarning, ParaflexWarning, warn_user
 
 __all__ = ["CODES", "Code", "Finding", "Level", "Verdict", "warn_of"]
 
@@ -189,9 +188,9 @@ class Verdict(Sequence[Finding]):
         return "\n".join([f"{one.level.value}: {one}" for one in self.findings] or [Level.SOUND.value])
 
 
-def warn_of(findings: Iterable[Finding], category: type[ParaflexWarning] = ModelWarning, stacklevel: int = 2) -> None:
+def warn_of(findings: Iterable[Finding], category: type[ParaflexWarning] = ModelWarning) -> None:
     """Issue a warning of a class of ours for each finding, which is its `finding`."""
     for one in findings:
         warning = category(str(one))
         warning.finding = one
-        warnings.warn(warning, stacklevel=stacklevel + 1)
+        warn_user(warning)

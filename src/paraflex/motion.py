@@ -9,15 +9,26 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.display import shown
-from paraflex.dynamics import State, System, build_system, consistent_state, constant_signals, pack_signals
+from paraflex.dynamics import (
+    State,
+    System,
+    build_system,
+    consistent_state,
+    constant_signals,
+    pack_signals,
+    start_state,
+)
 from paraflex.errors import InputError, IntegrationError, ResultWarning, suggestion
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
-from paraflex.mechanism import Mechanism
+from paraflex.kinematics import ModelWithPaths
+from paraflex.mechanism import Mechanism, Start
 from paraflex.validity import Validity, assess, doubtful_results, warn
 
 
+@given_as("a run without a path", "the run that simulate_motion returns")
 @dataclass(frozen=True)
 class MotionRun:
     """A mechanism's own motion.
@@ -52,14 +63,15 @@ class MotionRun:
         return shown(self)
 
 
+@checked_arguments()
 def simulate_motion(
-    mechanism: Mechanism,
+    mechanism: Mechanism | ModelWithPaths,
     duration: float,
     *,
     samples: int = 701,
     assembly: str | None = None,
     torques: Mapping[str, float] | None = None,
-    start: State | None = None,
+    start: State | Start | None = None,
     method: str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
@@ -69,7 +81,8 @@ def simulate_motion(
 
     Parameters
     ----------
-    mechanism : Mechanism
+    mechanism : Mechanism or Model
+        A model stands for its mechanism and its [start]; nothing is taken from its [study].
     duration : float
         [s]
     samples : int
@@ -78,13 +91,13 @@ def simulate_motion(
         Where it starts, at rest and undeformed; the first by default.
     torques : mapping of str to float, optional
         Constant torque of each motor by name [N m]; zero for the others.
-    start : State, optional
-        In place of the assembly: see `dynamics.consistent_state`.
+    start : State or Start, optional
+        In place of the assembly: see `dynamics.consistent_state` and `mechanism.Start`.
     method : str, optional
         Of integration: that of the options by default; see `paraflex.METHODS`.
     options : IntegrationOptions, optional
     on_progress : callable, optional
-        Told the time reached [s].
+        Called with the time reached [s].
     warning : bool
         Whether a run beyond what its model can describe issues a `ValidityWarning`, and one of implausible results a
         `ResultWarning`; its `validity` and `doubts` hold them either way.
@@ -98,6 +111,9 @@ def simulate_motion(
     IntegrationError
         The run could not be finished; it carries a MotionRun with what was computed.
     """
+    given, mechanism = mechanism, Mechanism.made_of(mechanism)
+    if start is None and not isinstance(given, Mechanism):
+        start = given.start
     options = choose(method, options)
     if not (np.isfinite(duration) and duration > 0.0):
         raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
@@ -111,7 +127,7 @@ def simulate_motion(
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: float((torques or {}).get(name, 0.0)) for name in names}
     system = build_system(mechanism)
-    state = consistent_state(system, mechanism.assembly(assembly)) if start is None else start
+    state = start if isinstance(start, State) else _state(system, start, assembly)
     times = np.linspace(state.time, state.time + duration, samples)
     end = float(times[-1])
     signals, knots = pack_signals(mechanism, constant_signals(list(values.values()), end), end)
@@ -131,3 +147,11 @@ def simulate_motion(
 
 def _run(system: System, times: NDArray[np.float64], torques: Mapping[str, float], solution: Solution) -> MotionRun:
     return MotionRun(system, solution.t if solution.event else times, torques, solution)
+
+
+def _state(system: System, start: Start | None, name: str | None) -> State:
+    """The state that a start describes, or an assembly at rest."""
+    mechanism = system.mechanism
+    if start is None:
+        return consistent_state(system, mechanism.assembly(name))
+    return start_state(system, start, mechanism.assembly(name) if name or mechanism.assemblies else None)

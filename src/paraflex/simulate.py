@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.display import shown
 from paraflex.dynamics import (
     State,
@@ -27,7 +28,7 @@ from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.integrators.beam_ends import leave_beam
-from paraflex.kinematics import Path, RigidMotion, path_follower
+from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn
 
@@ -49,6 +50,7 @@ class Ending(Enum):
     HOLD = "hold"
 
 
+@given_as("a task", "the task that plan_tracking makes")
 @dataclass(frozen=True)
 class TrackingTask:
     """A mechanism, a path, and the rigid motion along it: what the runs of all modes share.
@@ -94,14 +96,17 @@ class TrackingTask:
         """Whether brakes engage in its runs: they are asked for, and the runs go on after the path."""
         return self.after is Ending.HOLD and self.motion.t[-1] > self.path.duration * (1.0 + _SAME_TIME)
 
+    @checked_arguments()
     def mode(self, mode: str | ActuationMode) -> ActuationMode:
         """An actuation mode by name, signs or motor names."""
         return mode if isinstance(mode, ActuationMode) else parse_mode(self.mechanism, mode)
 
+    @checked_arguments()
     def torques(self, mode: str | ActuationMode) -> FeedForward:
         """Feed-forward torques of a mode: minimum norm, smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
 
+    @checked_arguments()
     def remodelled(self, mechanism: Mechanism) -> TrackingTask:
         """The same motion and torques for another model of the same bodies: rigid ones, another mesh or geometry.
 
@@ -118,6 +123,7 @@ class TrackingTask:
             start=_start(system, self.motion, self.carriers or _in_place(system)),
         )
 
+    @checked_arguments()
     def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
         """The same task for the virtual prototype of finite segments, driven by the same torques.
 
@@ -144,6 +150,7 @@ class TrackingTask:
             carriers=segmented.carriers,
         )
 
+    @checked_arguments()
     def balanced(self, mode: str | ActuationMode) -> TrackingTask:
         """The same task, starting balanced: the active motors of a mode stand, or move, as where the path begins.
 
@@ -173,6 +180,7 @@ class TrackingTask:
         return simulate(self, mode, method=method, options=options, after=after, warning=warning)
 
 
+@given_as("a run along a path", "a run that simulate returns")
 @dataclass(frozen=True)
 class TrackingRun:
     """One mode of a task, simulated.
@@ -254,9 +262,10 @@ class TrackingRun:
         return shown(self)
 
 
+@checked_arguments()
 def plan_tracking(
-    mechanism: Mechanism,
-    path: Path,
+    mechanism: Mechanism | ModelWithPaths,
+    path: Path | str,
     *,
     duration: float | None = None,
     samples: int = 701,
@@ -269,8 +278,10 @@ def plan_tracking(
 
     Parameters
     ----------
-    mechanism : Mechanism
-    path : Path
+    mechanism : Mechanism or Model
+        A model stands for its mechanism; nothing is taken from its [study].
+    path : Path or str
+        A path, or with a model the name of one of its paths.
     duration : float, optional
         Of the run, dwell included [s]; the path's own by default.
     samples : int
@@ -290,6 +301,7 @@ def plan_tracking(
     InputError, AssemblyError, UnreachablePathError
         See `kinematics.follow_path`; a path that takes a sliding point off its beam, where `at_end` says "error".
     """
+    mechanism, path = _planned(mechanism, path)
     end = path.duration if duration is None else duration
     if not (np.isfinite(end) and end > 0.0):
         raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
@@ -315,6 +327,7 @@ def plan_tracking(
     )
 
 
+@checked_arguments()
 def simulate(
     task: TrackingTask,
     mode: str | ActuationMode,
@@ -339,7 +352,7 @@ def simulate(
         What the active motors do after the path, "free" or "hold": as the task says by default. Held, the joints of the
         active motors are locked where they are when the path ends: see `dynamics.brake`.
     on_progress : callable, optional
-        Told the time reached [s].
+        Called with the time reached [s].
     warning : bool
         Whether a run beyond what its model can describe issues a `ValidityWarning`, and one of implausible results a
         `ResultWarning`; its `validity` and `doubts` hold them either way.
@@ -374,6 +387,19 @@ def simulate(
     if warning:
         run.warn()
     return run
+
+
+def _planned(given: Mechanism | ModelWithPaths, path: Path | str) -> tuple[Mechanism, Path]:
+    """The mechanism, and the path where it is one by the name it has in a model."""
+    mechanism = Mechanism.made_of(given)
+    if not isinstance(path, str):
+        return mechanism, path
+    if isinstance(given, Mechanism):
+        raise InputError(
+            "a mechanism has no paths by name", field="path", value=path,
+            remedy="give the model that paraflex.load reads instead of its mechanism, or a path such as Polygon",
+        )  # fmt: skip
+    return mechanism, given.path(path)
 
 
 def _drive(

@@ -34,9 +34,9 @@ _LINKS = {"angle": "angle [rad]", "angular_velocity": "angular velocity [rad/s]"
 def print_agreement(console: Console, figures: dict[str, Any], mode: str) -> None:
     """How the models of a mode agree, the evidence that each is converged, and the differences of every link."""
     models, distances = figures["modes"][mode]["models"], figures["modes"][mode]["distances"]
-    told = {name: values for name, values in models.items() if "tracking_error" in values}
+    finished = {name: values for name, values in models.items() if "tracking_error" in values}
     reference = figures["reference"]
-    compared = {name: values for name, values in told.items() if "distance_max" in values and name != reference}
+    compared = {name: values for name, values in finished.items() if "distance_max" in values and name != reference}
 
     def show(title: str, table: Table) -> None:
         # Not the table's own title: that is broken at the table's width.
@@ -48,8 +48,10 @@ def print_agreement(console: Console, figures: dict[str, Any], mode: str) -> Non
     show(
         f"{where}: tracking error {span}, and distance from the path of {_SHORT[reference]}", _errors(models, reference)
     )
-    show("Largest distance between the paths of two models [m]", _distances(told, distances))
-    show("Change of the path with a finer step and mesh, imbalance of energy, constraint violation", _soundness(told))
+    show("Largest distance between the paths of two models [m]", _distances(finished, distances))
+    show(
+        "Change of the path with a finer step and mesh, imbalance of energy, constraint violation", _soundness(finished)
+    )
     for key, what in _LINKS.items() if compared else ():
         show(f"RMS difference of each link's {what} from {_SHORT[reference]}", _links(figures["links"], compared, key))
 
@@ -69,16 +71,18 @@ def _errors(models: dict[str, Any], reference: str) -> Table:
     return table
 
 
-def _distances(told: dict[str, Any], distances: dict[str, Any]) -> Table:
-    table = _table("", *(_SHORT[name] for name in told))
-    for name in told:
-        table.add_row(_SHORT[name], *("" if other == name else number(distances[name][other], ".1e") for other in told))
+def _distances(finished: dict[str, Any], distances: dict[str, Any]) -> Table:
+    table = _table("", *(_SHORT[name] for name in finished))
+    for name in finished:
+        table.add_row(
+            _SHORT[name], *("" if other == name else number(distances[name][other], ".1e") for other in finished)
+        )
     return table
 
 
-def _soundness(told: dict[str, Any]) -> Table:
+def _soundness(finished: dict[str, Any]) -> Table:
     table = _table("model", *_SOUND)
-    for name, values in told.items():
+    for name, values in finished.items():
         table.add_row(_SHORT[name], *(number(values[key], ".1e") for key in _SOUND.values()))
     return table
 

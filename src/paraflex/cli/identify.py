@@ -37,10 +37,10 @@ def _report(result: IdentificationResult) -> None:
     if found.telling:
         console.print(f"condition of the Jacobian {found.condition:.3g}, degrees of freedom {found.freedom}")
     else:
-        told = ", ".join(f"{share:+.2f} {name}" for name, share in found.weakest.items())
+        described = ", ".join(f"{share:+.2f} {name}" for name, share in found.weakest.items())
         console.print(
             f"the targets cannot tell the parameters apart (condition {found.condition:.3g}): they hardly change along "
-            f"{told}, in shares of the ranges"
+            f"{described}, in shares of the ranges"
         )
 
 
@@ -48,5 +48,5 @@ def _deviations(result: IdentificationResult) -> dict[str, str]:
     """Half-widths of intervals of 68 %, or that there are none."""
     if result.confidence is None:
         return dict.fromkeys(result.values, "not given")
-    told = result.confidence.deviations
-    return {name: "not given" if value is None else f"{value:.2g}" for name, value in told.items()}
+    described = result.confidence.deviations
+    return {name: "not given" if value is None else f"{value:.2g}" for name, value in described.items()}

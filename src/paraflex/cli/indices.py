@@ -73,7 +73,7 @@ def _report(result: IndicesResult) -> None:
     console.print(table)
     for each in result.indices:
         if each.dropped:
-            told = (
+            left_out = (
                 f"{each.metric}, {each.path}, {each.mode}: {each.dropped} of {each.dropped + each.samples} base samples"
             )
-            console.print(f"{told} left out: not all their runs are complete", soft_wrap=True)
+            console.print(f"{left_out} left out: not all their runs are complete", soft_wrap=True)

@@ -34,9 +34,9 @@ from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary, save_results
 
-# Singular positions told one by one.
+# Singular positions listed one by one.
 _NAMED = 4
-# Points told where a run ends.
+# Points listed where a run ends.
 _POINTS = 20
 
 

@@ -12,7 +12,8 @@ from rich.console import Console
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.report import Page, motion_page, save_page, tracking_page, verification_page
-from paraflex.results.storage import kind_of, open_results, results_file
+from paraflex.results.kinds import kind_of
+from paraflex.results.storage import open_results, results_file
 
 
 def report_command(results: str, output: str | None, *, force: bool) -> None:

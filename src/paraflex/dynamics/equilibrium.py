@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import sparse_jacobian, stiffness_diagonal
@@ -39,6 +40,7 @@ _NO_MOVING_EQUILIBRIUM = (
 Motion = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 
+@checked_arguments()
 def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -> State:
     """The state of rest nearest a start: all forces balance, joints closed, the angles of held joints kept.
 

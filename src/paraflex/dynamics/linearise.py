@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
@@ -69,6 +70,7 @@ class Vibration:
         return np.sqrt(np.maximum(self.squares, 0.0))
 
 
+@checked_arguments()
 def natural_frequencies(
     system: System,
     state: State,

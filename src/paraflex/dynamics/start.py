@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.rank import DENSE_ROWS
@@ -31,10 +32,11 @@ _SAME = 1e-9
 _POSITION_STIFFNESS, _VELOCITY_STIFFNESS = 1.0, 1e3
 
 
+@checked_arguments()
 def start_state(
     system: System,
     start: Start,
-    assembly: Assembly | None = None,
+    assembly: Assembly | str | None = None,
     *,
     q: NDArray[np.float64] | None = None,
     time: float = 0.0,
@@ -45,8 +47,8 @@ def start_state(
     ----------
     system : System
     start : Start
-    assembly : Assembly, optional
-        Not needed where the coordinates of every body are given.
+    assembly : Assembly or str, optional
+        One, or its name. Not needed where the coordinates of every body are given.
     q : (n,) array, optional
         Coordinates from elsewhere, of a static equilibrium say: then the start gives velocities only.
     time : float
@@ -58,6 +60,8 @@ def start_state(
         See `check_start`; coordinates at which joints are open, or velocities they do not allow, with the residual.
     """
     check_start(system.mechanism, start)
+    if isinstance(assembly, str):
+        assembly = system.mechanism.assembly(assembly)
     signals = moment_signals(system.mechanism, time)
     if q is None:
         q = _coordinates(system, signals, start, assembly, time)

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.dynamics.projection import NAMED, gap_unit, joint_gaps, least_change, refuse_conflict
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
@@ -35,6 +36,7 @@ _LARGEST_DEFLECTION = 0.1
 _VELOCITY_STIFFNESS = 1e3
 
 
+@given_as("a state", "a state, as dynamics.consistent_state makes it")
 @dataclass(frozen=True)
 class State:
     """Coordinates q and velocities v of a system at a time."""
@@ -213,9 +215,10 @@ def project_velocity(
     return v
 
 
+@checked_arguments()
 def consistent_state(
     system: System,
-    assembly: Assembly,
+    assembly: Assembly | str | None,
     *,
     deflection: Mapping[str, NDArray[np.float64]] | None = None,
     velocity: NDArray[np.float64] | None = None,
@@ -226,7 +229,8 @@ def consistent_state(
     Parameters
     ----------
     system : System
-    assembly : Assembly
+    assembly : Assembly or str
+        One, or its name; the first of the mechanism where None.
     deflection : mapping of str to (n_nodal,) array, optional
         Nodal coordinates of a body (4 a node, then separate curvatures if any); what its mesh's reference condition
         allows of them is kept.
@@ -243,7 +247,8 @@ def consistent_state(
     InconsistentConstraintsError
         Nor can velocities or accelerations be found that all constraints allow.
     """
-    q = reference_pose(system, assembly)
+    chosen = assembly if isinstance(assembly, Assembly) else system.mechanism.assembly(assembly)
+    q = reference_pose(system, chosen)
     for name, nodal in (deflection or {}).items():
         body = system.body(name)
         q[body.flexible] = np.linalg.lstsq(body.integrals.D, nodal, rcond=None)[0]

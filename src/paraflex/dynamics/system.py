@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.dynamics.constraints import row_order
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
 from paraflex.dynamics.damping import damping_matrix
@@ -17,6 +18,7 @@ from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace,
 from paraflex.mechanism import Mechanism, PointRef
 
 
+@given_as("a system", "the system that dynamics.build_system makes")
 @dataclass(frozen=True)
 class System:
     """A mechanism as constant arrays. Made by `build_system`.
@@ -113,6 +115,7 @@ class System:
         return jacobian
 
 
+@checked_arguments()
 def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     """Turn a mechanism into a system; flexible coordinates are diagonalised per body.
 

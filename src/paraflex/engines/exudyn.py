@@ -90,7 +90,7 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     Returns
     -------
     Record
-        Told as links.
+        Reported as links.
 
     Raises
     ------

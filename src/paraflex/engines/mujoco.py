@@ -68,7 +68,7 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
     Returns
     -------
     Record
-        Told as links. Joint forces are not known.
+        Reported as links. Joint forces are not known.
 
     Raises
     ------

@@ -134,7 +134,7 @@ def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64])
     def value_of(name: str) -> Any:
         return Jet.time(t) if name == TIME else _look_up(name, parameters)
 
-    # What is not finite has no warning but is told with its time.
+    # What is not finite has no warning but is reported with its time.
     with np.errstate(all="ignore"):
         return _arithmetic(text, value_of)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.files.generators import generated_text, generator_names, is_generated
 
@@ -18,11 +19,13 @@ def library_names() -> list[str]:
     return sorted(entry.name.removesuffix(".toml") for entry in _folder().iterdir() if entry.name.endswith(".toml"))
 
 
+@checked_arguments()
 def library_file(name: str) -> Traversable:
     """The file of a library mechanism, to read or copy."""
     return _folder() / f"{name}.toml"
 
 
+@checked_arguments()
 def library_text(name: str) -> str:
     """What a library mechanism's file says, of those made by a number too ("four_bars:3").
 

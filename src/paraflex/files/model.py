@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path as FilePath
 from typing import Any
 
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.files.bodies import assumed_modes_beam, damping, modal_body
@@ -78,7 +79,7 @@ from paraflex.validity import doubtful_numbers
 
 @dataclass(frozen=True)
 class StudyDefaults:
-    """What a study of the model does unless told otherwise.
+    """What a study of the model does unless asked otherwise.
 
     Attributes
     ----------
@@ -120,6 +121,7 @@ class StudyDefaults:
     error: str = "motion"
 
 
+@given_as("a model", "the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Model:
     """What a model file says.
@@ -150,14 +152,15 @@ class Model:
         from paraflex.mechanism.html import mechanism_html
 
         study = self.study
-        told = [
+        shown = [
             ("paths", list(self.paths)),
             ("study: path", study.path),
             ("study: modes", list(study.modes)),
             ("study: duration [s]", study.duration),
         ]
-        return page(f"Model {self.source}", facts(told), mechanism_html(self.mechanism))
+        return page(f"Model {self.source}", facts(shown), mechanism_html(self.mechanism))
 
+    @checked_arguments()
     def path(self, name: str | None = None) -> Path:
         """A path by name, or the study's.
 
@@ -195,6 +198,7 @@ class Model:
         return path.duration * self.study.duration / self.paths[self.study.path].duration
 
 
+@checked_arguments(name_or_file="give a name of library_names(), or a file")
 def load(name_or_file: str | FilePath) -> Model:
     """Read a model from the library or from a TOML file; numbers that are not plausible issue a `ModelWarning` each.
 
@@ -217,6 +221,7 @@ def load(name_or_file: str | FilePath) -> Model:
     return model
 
 
+@checked_arguments(name_or_file="give a name of library_names(), or a file")
 def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:
     """What a model file says, parsed and not yet checked, and the name of its source; see `load` for the argument.
 
@@ -232,6 +237,7 @@ def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:
         raise (error if error.source else error.in_file(source)) from None
 
 
+@checked_arguments()
 def model_from(data: dict[str, Any], source: str) -> Model:
     """The model that parsed data describe; see `load` for what is raised.
 
@@ -267,6 +273,7 @@ def _read(name_or_file: str | FilePath) -> tuple[dict[str, Any], str, FilePath]:
     return read_toml(path, source), source, path.parent
 
 
+@checked_arguments()
 def load_path(file: str | FilePath) -> Path:
     """Read a path from a TOML file with one [path] table.
 

@@ -395,7 +395,7 @@ PathTable = Annotated[PolygonTable | LineTable | CircleTable | PointsTable, Fiel
 
 
 class StudyTable(_Table):
-    """What `paraflex run` does unless told otherwise."""
+    """What `paraflex run` does unless asked otherwise."""
 
     path: Text | None = Field(default=None, description="the name of a [path.NAME] table")
     modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")

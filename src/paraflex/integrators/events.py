@@ -6,12 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism import AtEnd, FlexibleBeam, Mechanism, RigidBody, SlidingJoint, WeldJoint
 
 
 @dataclass(frozen=True)
-class JointLimit:
+class JointLimit(CheckedFields):
     """A joint between stops: the run ends where its coordinate reaches one of them.
 
     Attributes
@@ -27,6 +28,7 @@ class JointLimit:
     high: float = math.inf
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.low < self.high or (math.isinf(self.low) and math.isinf(self.high)):
             raise InputError(
                 "no limits that a joint can be between", field=f"limit of joint {self.joint}",
@@ -38,7 +40,7 @@ class JointLimit:
 
 
 @dataclass(frozen=True)
-class DeflectionLimit:
+class DeflectionLimit(CheckedFields):
     """A link that must not bend further.
 
     Attributes
@@ -54,6 +56,7 @@ class DeflectionLimit:
     limit: float
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not (math.isfinite(self.limit) and self.limit > 0.0):
             raise InputError(
                 "must be positive", field=f"deflection limit of {self.body}", value=self.limit,
@@ -65,7 +68,7 @@ class DeflectionLimit:
 
 
 @dataclass(frozen=True)
-class SingularDistance:
+class SingularDistance(CheckedFields):
     """A singular position that must not come nearer.
 
     Attributes
@@ -80,6 +83,7 @@ class SingularDistance:
     motors: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0.0 < self.distance < 1.0:
             raise InputError(
                 "not between 0 and 1", field="distance from singular positions", value=self.distance,
@@ -115,6 +119,7 @@ class BeamEnd:
 
 
 Event = JointLimit | DeflectionLimit | SingularDistance
+given_as("an event")(Event)
 
 
 def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:

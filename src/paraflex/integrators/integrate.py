@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import (
     ConstraintDriftError,
@@ -50,6 +51,7 @@ _CAUSES = {
 }
 
 
+@checked_arguments()
 def integrate(
     system: System,
     signals: Signals,

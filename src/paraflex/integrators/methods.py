@@ -172,14 +172,16 @@ METHODS: Mapping[str, Method] = MappingProxyType({method.name: method for method
 DEFAULT_METHOD = "esdirk5"
 
 
-def find_method(name: str) -> Method:
-    """A method by its name.
+def find_method(name: str | Method) -> Method:
+    """A method by its name, or itself.
 
     Raises
     ------
     InputError
         There is none of that name; the known ones are listed.
     """
+    if isinstance(name, Method):
+        return name
     if isinstance(name, str) and name in METHODS:
         return METHODS[name]
     near = suggestion(name, METHODS)

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, as_enum
 from paraflex.integrators.events import Event
 from paraflex.integrators.methods import DEFAULT_METHOD, Method, Treatment, check_parameters, find_method
@@ -20,8 +21,9 @@ _REMEDIES = {
 }
 
 
+@given_as("IntegrationOptions", "them, say IntegrationOptions(tolerance=1e-6)")
 @dataclass(frozen=True)
-class IntegrationOptions:
+class IntegrationOptions(CheckedFields):
     """How to integrate.
 
     Attributes
@@ -57,6 +59,7 @@ class IntegrationOptions:
         overlooked: where limits are grazed bound the step.
     """
 
+    _own = ("method",)
     tolerance: float = 1e-5
     alpha: float = 20.0
     beta: float = 20.0
@@ -71,6 +74,8 @@ class IntegrationOptions:
     events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "method", find_method(self.method).name)
         for name, remedy in _REMEDIES.items():
             value = getattr(self, name)
             if value is not None and not value > 0:
@@ -132,6 +137,7 @@ class IntegrationOptions:
             )  # fmt: skip
 
 
+@checked_arguments()
 def choose(method: str | None, options: IntegrationOptions | None) -> IntegrationOptions:
     """The options, by default the default ones, with the method where one is named.
 

@@ -16,6 +16,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager
 
+from paraflex.kernel.notice import announce_compiling
 from paraflex.kernel.passes import kernel_passes, remembered_signatures
 
 # Level of optimisation, of three.
@@ -91,6 +92,9 @@ class SeparateCode(CompilerBase):
         """Compile a function."""
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.called_from_python = not self.state.flags.no_cpython_wrapper
+        if library.called_from_python:
+            # Not in the cache on disk, or it would not have come to this.
+            announce_compiling()
         library.enable_object_caching()
         self.state.library = library
         with remembered_signatures():

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.dynamics import (
     System,
     build_system,
@@ -77,6 +78,7 @@ class RigidMotion:
         return self.path.evaluate(self.t)
 
 
+@checked_arguments()
 def follow_path(
     mechanism: Mechanism,
     path: Path,
@@ -118,6 +120,7 @@ def follow_path(
     return path_follower(mechanism, path, end, assembly=assembly, orientation=orientation)(times)
 
 
+@checked_arguments()
 def path_follower(
     mechanism: Mechanism,
     path: Path,

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError
 from paraflex.kinematics.laws import TrapezoidalLaw
 
@@ -27,6 +28,7 @@ class PathMotion(NamedTuple):
     acceleration: NDArray[np.float64]
 
 
+@given_as("a path", "a path: Polygon, Line, Circle or PointPath, or one that paraflex.load_path reads")
 @runtime_checkable
 class Path(Protocol):
     """A motion of a point in the plane: from rest to rest, then dwell."""
@@ -46,8 +48,13 @@ class Path(Protocol):
         ...
 
 
+given_as("a path", "a path such as Polygon, Line, Circle or PointPath; or with a model the name of one of its paths")(
+    Path | str
+)
+
+
 @dataclass(frozen=True)
-class Polygon:
+class Polygon(CheckedFields):
     """Straight segments from corner to corner, each from rest to rest under the modified trapezoidal law.
 
     Attributes
@@ -60,11 +67,13 @@ class Polygon:
         Whether the last corner leads back to the first.
     """
 
+    _own = ("corners",)
     corners: tuple[tuple[float, float], ...]
     max_acceleration: float
     closed: bool = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         corners = _points(self.corners, "corners", 2)
         object.__setattr__(self, "corners", tuple(map(tuple, corners.tolist())))
         _acceleration(self.max_acceleration)
@@ -118,6 +127,7 @@ class Polygon:
         return PathMotion(position, velocity, acceleration)
 
 
+@checked_arguments()
 def Line(start: Sequence[float], end: Sequence[float], max_acceleration: float) -> Polygon:
     """A straight line from rest to rest: a polygon of one segment.
 
@@ -132,7 +142,7 @@ def Line(start: Sequence[float], end: Sequence[float], max_acceleration: float) 
 
 
 @dataclass(frozen=True)
-class Circle:
+class Circle(CheckedFields):
     """An arc under the modified trapezoidal law along its length.
 
     Attributes
@@ -149,6 +159,7 @@ class Circle:
         Angle swept, positive counter-clockwise; a full turn by default [rad].
     """
 
+    _own = ("centre",)
     centre: tuple[float, float]
     radius: float
     max_acceleration: float
@@ -156,6 +167,7 @@ class Circle:
     sweep: float = 2.0 * pi
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "centre", _pair(self.centre, "centre"))
         if not (np.isfinite(self.radius) and self.radius > 0.0):
             raise InputError("must be positive", field="radius", value=self.radius, remedy="give it in metres")
@@ -196,7 +208,7 @@ class Circle:
 
 
 @dataclass(frozen=True)
-class PointPath:
+class PointPath(CheckedFields):
     """A smooth motion through points: a quintic spline in time, from rest to rest without acceleration.
 
     Attributes
@@ -207,10 +219,12 @@ class PointPath:
         From the first point to the last [s]; points are passed at times in proportion to the chords between them.
     """
 
+    _own = ("points",)
     points: tuple[tuple[float, ...], ...]
     motion_time: float
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         points = _points(self.points, "points", 2, (2, 3))
         object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
         if not (np.isfinite(self.motion_time) and self.motion_time > 0.0):
@@ -254,6 +268,7 @@ class PointPath:
         return np.stack([self._spline(x), *(np.where(inside, self._spline(x, k), 0.0) for k in (1, 2))])
 
 
+@checked_arguments()
 def length_fraction(path: Path, end: float) -> float:
     """How much of a path's length has been passed by a time [s]: from 0 to 1."""
     if end >= path.duration:

@@ -8,6 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import TypeVar
 
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, as_enum
 from paraflex.fem import (
     AssumedShapes,
@@ -27,7 +28,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Section:
+class Section(CheckedFields):
     """Cross-section of a beam.
 
     Attributes
@@ -40,19 +41,24 @@ class Section:
         Of a rectangle: out of the plane of motion and in it [m].
     """
 
+    _table = "section"
+
     area: float
     second_moment: float
     sides: tuple[float, float] | None = None
 
     @classmethod
+    @checked_arguments()
     def rectangle(cls, width: float, thickness: float) -> Section:
         """A rectangle: width out of the plane of motion, thickness in it [m]."""
         return cls(width * thickness, width * thickness**3 / 12.0, (width, thickness))
 
 
 @dataclass(frozen=True)
-class Material:
+class Material(CheckedFields):
     """Linear elastic material: Young's modulus [Pa] and density [kg/m^3]."""
+
+    _table = "material"
 
     youngs_modulus: float
     density: float
@@ -74,8 +80,10 @@ class Curvature(Enum):
 
 
 @dataclass(frozen=True)
-class LumpedMass:
+class LumpedMass(CheckedFields):
     """A mass [kg] and moment of inertia [kg m^2] sitting on a named point of a beam."""
+
+    _table = "lump"
 
     point: str
     mass: float
@@ -83,7 +91,7 @@ class LumpedMass:
 
 
 @dataclass(frozen=True)
-class RigidBody:
+class RigidBody(CheckedFields):
     """A rigid body.
 
     Attributes
@@ -99,6 +107,8 @@ class RigidBody:
         Named points in the body frame [m].
     """
 
+    _table = "body"
+
     name: str
     mass: float
     inertia: float
@@ -107,7 +117,7 @@ class RigidBody:
 
 
 @dataclass(frozen=True)
-class FlexibleBeam:
+class FlexibleBeam(CheckedFields):
     """A straight flexible beam along the x axis of its body frame, which starts at its first end.
 
     Attributes
@@ -138,6 +148,8 @@ class FlexibleBeam:
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
 
+    _table = "body"
+
     name: str
     length: float
     section: Section | tuple[Section, ...]
@@ -152,6 +164,7 @@ class FlexibleBeam:
     flexible: bool = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name, kind in (("reference", ReferenceCondition), ("curvature", Curvature)):
             object.__setattr__(self, name, as_enum(kind, getattr(self, name), f"body.{self.name}.{name}"))
 
@@ -217,7 +230,7 @@ def _per_span(value: T | tuple[T, ...], count: int, field: str) -> tuple[T, ...]
 
 
 @dataclass(frozen=True)
-class AssumedModesBeam:
+class AssumedModesBeam(CheckedFields):
     """A straight bar along the x axis of its body frame that deforms in shape functions of the user's choice.
 
     The functions fix the frame: they must contain no rigid motion of the bar. Its geometry is linear, whatever that of
@@ -244,6 +257,8 @@ class AssumedModesBeam:
     flexible : bool
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
+
+    _table = "body"
 
     name: str
     length: float
@@ -285,6 +300,7 @@ class AssumedModesBeam:
 
 
 Body = RigidBody | FlexibleBeam | AssumedModesBeam | ModalBody
+given_as("a body")(Body)
 
 
 def given_shapes(bodies: Iterable[Body]) -> list[str]:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import CheckedFields, given_as
+
 
 @dataclass(frozen=True)
-class RayleighDamping:
+class RayleighDamping(CheckedFields):
     """Damping in proportion to mass and stiffness: D = mass M + stiffness K.
 
     The part in proportion to mass is that of the body's vibration as its joints hold it (`ModalDamping`); the part in
@@ -23,6 +25,8 @@ class RayleighDamping:
         [s]
     """
 
+    _table = "damping"
+
     mass: float = 0.0
     stiffness: float = 0.0
 
@@ -32,7 +36,7 @@ class RayleighDamping:
 
 
 @dataclass(frozen=True)
-class ModalDamping:
+class ModalDamping(CheckedFields):
     """Damping by a ratio for each mode of the body as its joints hold it, whatever its reference condition.
 
     The modes are those of the body alone, ascending in frequency, with what its joints hold of it held still: see
@@ -44,6 +48,8 @@ class ModalDamping:
         Parts of critical damping; the last serves all modes that follow.
     """
 
+    _table = "damping"
+
     ratios: tuple[float, ...]
 
     def coefficients(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -53,7 +59,7 @@ class ModalDamping:
 
 
 @dataclass(frozen=True)
-class LossFactor:
+class LossFactor(CheckedFields):
     """Damping of the material by its loss factor at one frequency: D = loss_factor / (2 pi frequency) K.
 
     A vibration at that frequency has the damping ratio loss_factor / 2, one at another frequency more or less in
@@ -66,6 +72,8 @@ class LossFactor:
     frequency : float
         Of the vibration that it is meant for [Hz].
     """
+
+    _table = "damping"
 
     loss_factor: float
     frequency: float
@@ -81,6 +89,7 @@ class LossFactor:
 
 
 Damping = RayleighDamping | ModalDamping | LossFactor
+given_as("a damping")(Damping)
 
 
 def stiffness_proportional(damping: Damping) -> float | None:

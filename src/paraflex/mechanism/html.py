@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Constraint rows of a joint.
 _ROWS = {RevoluteJoint: 2, WeldJoint: 3, PrismaticJoint: 2, SlotJoint: 1, SlidingJoint: 1}
-# Bodies, joints or modes told one by one.
+# Bodies, joints or modes listed one by one.
 _MOST = 40
 
 

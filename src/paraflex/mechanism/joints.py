@@ -16,19 +16,33 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, as_enum
 
 GROUND = "ground"
 
 
+@given_as("a point", 'a point, "body.point", say "link1.B1"')
 @dataclass(frozen=True, order=True)
-class PointRef:
+class PointRef(CheckedFields):
     """A named point of a body, or of the ground: written "link1.B1" or "ground.A1" in files."""
+
+    _table = "point"
 
     body: str
     point: str
 
     @classmethod
+    def taken_from(cls, given: object, field: str) -> PointRef | None:
+        """A point from "body.point", or from the two names; None from anything else."""
+        if isinstance(given, str):
+            return cls.parse(given, str(field))
+        if isinstance(given, tuple | list) and len(given) == 2:
+            return cls(given[0], given[1])
+        return None
+
+    @classmethod
+    @checked_arguments()
     def parse(cls, text: str, field: str = "point") -> PointRef:
         """Read "body.point".
 
@@ -52,12 +66,14 @@ class PointRef:
 
 
 @dataclass(frozen=True)
-class RevoluteJoint:
+class RevoluteJoint(CheckedFields):
     """Two points held together: p_b - p_a = 0.
 
     The joint's angle is that of body b relative to body a (or to the ground), each turned by the slope of its
     beam at the joint.
     """
+
+    _table = "joint"
 
     name: str
     a: PointRef
@@ -65,7 +81,7 @@ class RevoluteJoint:
 
 
 @dataclass(frozen=True)
-class PrismaticJoint:
+class PrismaticJoint(CheckedFields):
     """Body b slides along an axis that body a carries, and does not turn against it.
 
     The axis goes through point a, at `direction` against body a's x axis there (against the ground's, on the ground);
@@ -81,6 +97,8 @@ class PrismaticJoint:
         Of body b against body a, constant [rad]; slopes of beams included.
     """
 
+    _table = "joint"
+
     name: str
     a: PointRef
     b: PointRef
@@ -89,11 +107,13 @@ class PrismaticJoint:
 
 
 @dataclass(frozen=True)
-class SlotJoint:
+class SlotJoint(CheckedFields):
     """A pin in a slot: point b stays on an axis through point a of body a, and body b turns freely.
 
     The axis is that of a `PrismaticJoint`, and so is the joint's coordinate.
     """
+
+    _table = "joint"
 
     name: str
     a: PointRef
@@ -102,8 +122,10 @@ class SlotJoint:
 
 
 @dataclass(frozen=True)
-class WeldJoint:
+class WeldJoint(CheckedFields):
     """Two points held together, and body b at a constant angle [rad] against body a, slopes of beams included."""
+
+    _table = "joint"
 
     name: str
     a: PointRef
@@ -131,7 +153,7 @@ class AtEnd(Enum):
 
 
 @dataclass(frozen=True)
-class SlidingJoint:
+class SlidingJoint(CheckedFields):
     """Point b slides along the centre line of a beam, bent as it is, and body b turns freely.
 
     Point a says which beam. The joint's coordinate is how far point b is beyond point a along the x axis of the beam's
@@ -144,6 +166,8 @@ class SlidingJoint:
     at_end : AtEnd or str
         What a run does where point b comes to an end of the beam; a value is taken for the member.
     """
+
+    _table = "joint"
 
     name: str
     a: PointRef
@@ -159,8 +183,10 @@ class SlidingJoint:
 PointJoint = RevoluteJoint | WeldJoint
 AxisJoint = PrismaticJoint | SlotJoint | SlidingJoint
 Joint = PointJoint | AxisJoint
+given_as("a joint")(Joint)
 
 
+@given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")
 @runtime_checkable
 class AngleLaw(Protocol):
     """An angle given in time."""
@@ -176,7 +202,7 @@ class AngleLaw(Protocol):
 
 
 @dataclass(frozen=True)
-class SampledAngle:
+class SampledAngle(CheckedFields):
     """An angle law from three functions of time: the angle and its first two derivatives."""
 
     angle: Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -190,8 +216,10 @@ class SampledAngle:
 
 
 @dataclass(frozen=True)
-class PrescribedAngle:
+class PrescribedAngle(CheckedFields):
     """A rheonomic constraint: the angle of a revolute joint follows a law in time."""
+
+    _table = "prescribed"
 
     name: str
     joint: str
@@ -199,11 +227,13 @@ class PrescribedAngle:
 
 
 @dataclass(frozen=True)
-class Motor:
+class Motor(CheckedFields):
     """A motor at a revolute joint; positive torque turns body b of the joint relative to body a.
 
     The torque acts on the material at the joint: on the body's angle and on the slope of the beam there.
     """
+
+    _table = "motor"
 
     name: str
     joint: str

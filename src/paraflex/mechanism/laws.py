@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
 from paraflex.mechanism.joints import AngleLaw
 
@@ -23,8 +24,10 @@ _DEGREE = 5
 
 
 @dataclass(frozen=True)
-class ConstantSpeed:
+class ConstantSpeed(CheckedFields):
     """A start value [rad or m] and a constant speed [rad/s or m/s]."""
+
+    _table = "law"
 
     angle: float
     speed: float
@@ -36,7 +39,7 @@ class ConstantSpeed:
 
 
 @dataclass(frozen=True)
-class PiecewiseLaw:
+class PiecewiseLaw(CheckedFields):
     """Laws one after the other; their accelerations may jump where one takes over, nothing else may.
 
     Attributes
@@ -52,10 +55,13 @@ class PiecewiseLaw:
         Ends that do not ascend, or a jump of the law or its rate.
     """
 
+    _table = "law"
+
     pieces: tuple[AngleLaw, ...]
     ends: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for before, end in pairwise((0.0, *self.ends)):
             if not end > before:
                 raise InputError(
@@ -93,7 +99,7 @@ class PiecewiseLaw:
 
 
 @dataclass(frozen=True)
-class TabulatedLaw:
+class TabulatedLaw(CheckedFields):
     """A quintic spline through values at times: four continuous derivatives.
 
     Fewer than six points are passed by the polynomial through them.
@@ -111,11 +117,14 @@ class TabulatedLaw:
         Too few rows, numbers that are not finite, or times that do not ascend.
     """
 
+    _table = "law"
+
     times: tuple[float, ...]
     values: tuple[float, ...]
     knots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if len(self.times) < 2 or len(self.times) != len(self.values):
             raise InputError(
                 "a table needs two rows", field="table", value=len(self.times), remedy="give at least 2 of [t, value]"

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from paraflex.arguments import CheckedFields, given_as
 from paraflex.mechanism.joints import PointRef
 
 
 @dataclass(frozen=True)
-class TorsionalSpring:
+class TorsionalSpring(CheckedFields):
     """A linear spring at a revolute joint: torque -stiffness (angle of body b less that of body a, less rest) on b.
 
     Like a motor it acts on the material at the joint. Stiffness in N m/rad, rest in rad.
     """
+
+    _table = "spring"
 
     name: str
     joint: str
@@ -21,11 +24,13 @@ class TorsionalSpring:
 
 
 @dataclass(frozen=True)
-class TorsionalDamper:
+class TorsionalDamper(CheckedFields):
     """Viscous friction at a revolute joint: torque -coefficient (rate of body b less that of body a) on b.
 
     Like a motor it acts on the material at the joint. Coefficient in N m s/rad.
     """
+
+    _table = "damper"
 
     name: str
     joint: str
@@ -33,7 +38,7 @@ class TorsionalDamper:
 
 
 @dataclass(frozen=True)
-class JointFriction:
+class JointFriction(CheckedFields):
     """Dry friction at a joint, regularised: force or torque -limit tanh(rate / speed) against the joint's rate.
 
     It acts as a damper of limit / speed below that speed and as Coulomb's friction well above it.
@@ -48,6 +53,8 @@ class JointFriction:
         At which three quarters of the limit are reached [rad/s or m/s].
     """
 
+    _table = "friction"
+
     name: str
     joint: str
     limit: float
@@ -55,7 +62,7 @@ class JointFriction:
 
 
 @dataclass(frozen=True)
-class LinearSpring:
+class LinearSpring(CheckedFields):
     """A spring with a damper between two points, at most one of them on the ground.
 
     It pulls with stiffness (distance - length) + damping (rate of the distance). Explicit in Newton's iteration: very
@@ -73,6 +80,8 @@ class LinearSpring:
         [N s/m]
     """
 
+    _table = "linear_spring"
+
     name: str
     a: PointRef
     b: PointRef
@@ -82,8 +91,10 @@ class LinearSpring:
 
 
 @dataclass(frozen=True)
-class PointForce:
+class PointForce(CheckedFields):
     """A constant force [N] at a named point of a body, given in the ground frame."""
+
+    _table = "load"
 
     name: str
     point: PointRef
@@ -91,8 +102,10 @@ class PointForce:
 
 
 @dataclass(frozen=True)
-class AppliedTorque:
+class AppliedTorque(CheckedFields):
     """A constant torque [N m] on the material at a named point of a body."""
+
+    _table = "load"
 
     name: str
     point: PointRef
@@ -100,3 +113,4 @@ class AppliedTorque:
 
 
 Load = PointForce | AppliedTorque
+given_as("a load")(Load)

@@ -6,8 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
+from typing import TypeVar
 
-from paraflex.errors import InputError, as_enum
+from paraflex.arguments import CheckedFields, checked_arguments, given_as, refused
+from paraflex.errors import InputError, as_enum, suggestion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
@@ -21,19 +23,25 @@ from paraflex.mechanism.joints import (
 )
 from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
 
+T = TypeVar("T")
+
 TASK_COORDINATES = ("x", "y", "angle")
 # The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
 _SIGNS = str.maketrans({"⊕": "+", "⊖": "-", "−": "-", "–": "-"})
 
 
 @dataclass(frozen=True)
-class EndEffector:
+class EndEffector(CheckedFields):
     """The point whose motion is prescribed, and which of its coordinates are the task: "x", "y", "angle", each once."""
 
+    _table = "end_effector"
+
+    _own = ("coordinates",)
     point: PointRef
     coordinates: tuple[str, ...] = ("x", "y")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         given = self.coordinates
         listed = not isinstance(given, str) and all(name in TASK_COORDINATES for name in given)
         if not (listed and given and len(set(given)) == len(given)):
@@ -45,9 +53,14 @@ class EndEffector:
             )
         object.__setattr__(self, "coordinates", tuple(given))
 
+    @classmethod
+    def taken_from(cls, given: object, field: str) -> EndEffector | None:
+        """That at a point; None of anything that is none."""
+        return cls(PointRef.parse(given, str(field))) if isinstance(given, str) else None
+
 
 @dataclass(frozen=True)
-class Assembly:
+class Assembly(CheckedFields):
     """One way of putting the mechanism together, given by an approximate angle [rad] of each body.
 
     The solver closes the loops from there; several assemblies of one mechanism differ in their elbows.
@@ -61,17 +74,25 @@ class Assembly:
         Approximate places in the ground frame [m].
     """
 
+    _table = "assembly"
+
     name: str
     angles: Mapping[str, float]
     points: Mapping[PointRef, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class ActuationMode:
+class ActuationMode(CheckedFields):
     """A set of active motors; the others turn freely."""
+
+    _table = "mode"
 
     name: str
     motors: tuple[str, ...]
+
+
+_MODE = 'a mode by its name, its signs such as "+-+-", or its motors such as "tau1,tau5"'
+given_as("an actuation mode", _MODE)(str | ActuationMode)
 
 
 class Geometry(Enum):
@@ -89,8 +110,9 @@ class Geometry(Enum):
     SECOND_ORDER = "second-order"
 
 
+@given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
-class Mechanism:
+class Mechanism(CheckedFields):
     """A planar mechanism of rigid bodies and flexible beams. Checked when it is made.
 
     Attributes
@@ -144,9 +166,30 @@ class Mechanism:
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
 
+    @classmethod
+    def taken_from(cls, given: object, field: str = "mechanism") -> Mechanism | None:
+        """The mechanism of a model; None of anything else, a task or a run among them."""
+        paths, mechanism = getattr(given, "paths", None), getattr(given, "mechanism", None)
+        return mechanism if isinstance(paths, Mapping) and isinstance(mechanism, cls) else None
+
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
+
+    @classmethod
+    def made_of(cls, given: object) -> Mechanism:
+        """A mechanism, or that of a model.
+
+        Raises
+        ------
+        InputError
+            Anything else.
+        """
+        taken = given if isinstance(given, cls) else cls.taken_from(given)
+        if taken is None:
+            raise refused(given, "mechanism", "a mechanism", "give a Mechanism, or the model that paraflex.load reads")
+        return taken
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -155,12 +198,18 @@ class Mechanism:
         return mechanism_html(self)
 
     def body(self, name: str) -> Body:
-        """The body of that name."""
-        return self._bodies_by_name[name]
+        """The body of that name; an `InputError` if there is none."""
+        return self._by_name("body", name, self._bodies_by_name)
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name."""
-        return self._joints_by_name[name]
+        """The joint of that name; an `InputError` if there is none."""
+        return self._by_name("joint", name, self._joints_by_name)
+
+    def _by_name(self, kind: str, name: str, members: Mapping[str, T]) -> T:
+        try:
+            return members[name]
+        except (KeyError, TypeError):
+            raise InputError(f"unknown {kind}", field=kind, value=name, remedy=suggestion(name, members)) from None
 
     @cached_property
     def _bodies_by_name(self) -> dict[str, Body]:
@@ -193,11 +242,13 @@ class Mechanism:
                 return assembly
         raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {known}")
 
+    @checked_arguments()
     def with_bodies(self, bodies: Iterable[Body]) -> Mechanism:
         """The same mechanism with other bodies in place of those of the same names."""
         new = {body.name: body for body in bodies}
         return replace(self, bodies=tuple(new.get(body.name, body) for body in self.bodies))
 
+    @checked_arguments()
     def rigid(self, names: Sequence[str] | None = None) -> Mechanism:
         """The mechanism with the named bodies rigid, or all of them: then it is the RDM of Remark 3.
 
@@ -207,13 +258,14 @@ class Mechanism:
             If a name is not that of a body.
         """
         names = [body.name for body in self.bodies] if names is None else list(names)
-        known = {body.name for body in self.bodies}
+        known = [body.name for body in self.bodies]
         for name in names:
             if name not in known:
                 raise InputError("unknown body", field="rigid", value=name, remedy=f"choose from {', '.join(known)}")
         bodies = [self.body(name) for name in names]
         return self.with_bodies(body.as_rigid() for body in bodies if not isinstance(body, RigidBody))
 
+    @checked_arguments()
     def with_beams(
         self,
         *,
@@ -256,6 +308,7 @@ class Mechanism:
         bodies = [body for body in changed.bodies if not isinstance(body, RigidBody)]
         return changed.with_bodies(replace(body, modes=modes) for body in bodies)
 
+    @checked_arguments()
     def refined(self, factor: int) -> Mechanism:
         """The mechanism with so many times the elements on every span of its flexible beams.
 
@@ -281,6 +334,7 @@ class Mechanism:
                 remedy="change them in the body itself, or leave it out",
             )
 
+    @checked_arguments()
     def with_geometry(self, geometry: Geometry | str) -> Mechanism:
         """The mechanism with linear or second-order geometry of its flexible beams.
 
@@ -292,6 +346,7 @@ class Mechanism:
         return replace(self, geometry=as_enum(Geometry, geometry, "geometry"))
 
 
+@checked_arguments()
 def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:
     """The mode a sign string names, one sign a motor: "+" active, "-" passive (Table 1).
 
@@ -312,6 +367,7 @@ def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:
     return ActuationMode(plain, tuple(name for name, sign in zip(names, plain, strict=True) if sign == "+"))
 
 
+@checked_arguments()
 def mode_of_motors(mechanism: Mechanism, names: Sequence[str]) -> ActuationMode:
     """The mode in which just these motors are active, named by its sign string.
 
@@ -329,6 +385,7 @@ def mode_of_motors(mechanism: Mechanism, names: Sequence[str]) -> ActuationMode:
     return mode_of_signs(mechanism, "".join("+" if name in names else "-" for name in known))
 
 
+@checked_arguments()
 def parse_mode(mechanism: Mechanism, text: str) -> ActuationMode:
     """Read a mode: its name in the mechanism, signs ("+-+-"), or motor names ("tau1,tau5")."""
     for mode in mechanism.modes:

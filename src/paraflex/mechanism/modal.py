@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
 from paraflex.fem import ShapeIntegrals
 from paraflex.mechanism.damping import Damping
@@ -22,7 +23,7 @@ _SMALLEST = 1e-12
 
 
 @dataclass(frozen=True)
-class ModalPoint:
+class ModalPoint(CheckedFields):
     """A material point of a body of given matrices; nf flexible coordinates.
 
     Attributes
@@ -35,16 +36,20 @@ class ModalPoint:
         Turn of the material there per flexible coordinate, N2'.
     """
 
+    _table = "point"
+
+    _own = ("position", "shape", "slope")
     position: Row
     shape: Matrix
     slope: Row
 
     def __post_init__(self) -> None:
-        _freeze(self, ("position", "shape", "slope"))
+        super().__post_init__()
+        _freeze(self, self._own)
 
 
 @dataclass(frozen=True)
-class ModalBody:
+class ModalBody(CheckedFields):
     """A flexible body whose constants are given, its displacement linear in nf flexible coordinates u of any kind.
 
     The symbols are those of the theory, with s0 the place of a mass element dm in the undeformed body and N its
@@ -83,6 +88,9 @@ class ModalBody:
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
 
+    _table = "body"
+
+    _own = ("first_moment", "mass_matrix", "stiffness", "S2", "I1", "G1", "G2", "I2")
     name: str
     mass: float
     first_moment: Row
@@ -100,7 +108,8 @@ class ModalBody:
     flexible: bool = True
 
     def __post_init__(self) -> None:
-        _freeze(self, ("first_moment", "mass_matrix", "stiffness", "S2", "I1", "G1", "G2", "I2"))
+        super().__post_init__()
+        _freeze(self, self._own)
 
     @property
     def n_flexible(self) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from typing import TYPE_CHECKING
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body, RigidBody
 from paraflex.mechanism.joints import GROUND, PointJoint, PointRef
@@ -28,6 +29,7 @@ class Pose:
     position: Place | None = None
 
 
+@checked_arguments()
 def approximate_poses(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:
     """The pose of every body, undeformed: its angle as given, or from two of its points that are known.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import pi
 
+from paraflex.arguments import checked_arguments
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Curvature, FlexibleBeam, LumpedMass, Material, Section
 from paraflex.mechanism.joints import Motor, PointRef, RevoluteJoint
@@ -18,6 +19,7 @@ TABLE_1 = ("+-+-", "-+-+", "+--+", "-++-", "+++-", "++-+", "+-++", "-+++", "++++
 MOTORS = ("tau1", "tau2", "tau5", "tau6")
 
 
+@checked_arguments()
 def raparm_i(
     *,
     e: float = 0.100,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import pi
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import RigidBody
 from paraflex.mechanism.joints import PointRef, RevoluteJoint
@@ -13,6 +14,7 @@ from paraflex.mechanism.mechanism import Assembly, Mechanism
 GRAVITY = (0.0, -9.81)
 
 
+@checked_arguments()
 def four_bars_in_a_row(n: int) -> Mechanism:
     """Build n four-bars side by side, neighbours sharing a crank: benchmark A02 of the IFToMM library.
 
@@ -54,6 +56,7 @@ def four_bars_in_a_row(n: int) -> Mechanism:
     )
 
 
+@checked_arguments()
 def chain_of_segments(
     n: int, *, length: float = 1.0, mass: float = 1.0, bending_stiffness: float = 0.02, angle: float = 0.0
 ) -> Mechanism:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import SpanProperties
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
@@ -36,6 +37,7 @@ class Segmented:
     carriers: Mapping[str, tuple[str, float]]
 
 
+@checked_arguments()
 def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, int]:
     """Numbers of segments of about one length: so many on the longest flexible beam, others by their length.
 
@@ -47,6 +49,7 @@ def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, i
     return {name: ceil(longest * length / most - 1e-9) for name, length in lengths.items()}
 
 
+@checked_arguments()
 def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8) -> Segmented:
     """Replace each flexible beam by n equal rigid segments, hinged in a row with springs of n E I / L between them.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import RigidBody
 from paraflex.mechanism.joints import PointRef
@@ -13,7 +14,7 @@ from paraflex.mechanism.quantities import known
 
 
 @dataclass(frozen=True)
-class Deflection:
+class Deflection(CheckedFields):
     """How far a point of a beam is off its place along the tangent at the first end; None leaves it to the others.
 
     Of a body of given shapes, off its place in the body frame.
@@ -26,13 +27,15 @@ class Deflection:
         [rad]
     """
 
+    _table = "deflection"
+
     axial: float | None = None
     transverse: float | None = None
     slope: float | None = None
 
 
 @dataclass(frozen=True)
-class BodyValues:
+class BodyValues(CheckedFields):
     """All coordinates of a body, or their rates.
 
     Attributes
@@ -44,6 +47,8 @@ class BodyValues:
         modal ones. Zeros where None.
     """
 
+    _table = "coordinates"
+
     x: float
     y: float
     phi: float
@@ -51,7 +56,7 @@ class BodyValues:
 
 
 @dataclass(frozen=True)
-class Start:
+class Start(CheckedFields):
     """What is known of the start of a motion.
 
     Attributes
@@ -67,6 +72,8 @@ class Start:
         Taken as they are.
     """
 
+    _table = "start"
+
     deflection: Mapping[str, Mapping[str, Deflection]] = field(default_factory=dict)
     angular: Mapping[str, float] = field(default_factory=dict)
     point: Mapping[PointRef, tuple[float, float]] = field(default_factory=dict)
@@ -79,6 +86,7 @@ class Start:
         return bool(self.deflection or self.coordinates)
 
 
+@checked_arguments()
 def check_start(mechanism: Mechanism, start: Start) -> None:
     """Nothing, if a start speaks of bodies and points that exist, and says each thing once.
 

@@ -10,11 +10,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, mode_label, peak, symbol
 from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, draw_curves, select_run, shade_rest
 from paraflex.plots.scales import mark_powers
-from paraflex.plots.style import BLUE, VERMILLION, journal_style, keep_flat, look_of
+from paraflex.plots.style import BLUE, VERMILLION, keep_flat, look_of
 from paraflex.plots.time_series import most_deflected
 from paraflex.plots.workspace import deviated_paths
 
@@ -66,7 +67,7 @@ def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
     return None if ours is None or other is None else (ours, other)
 
 
-@journal_style()
+@drawn
 def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure:
     """Angle and angular velocity of every link in two models (Fig. 22).
 
@@ -107,7 +108,7 @@ def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure
     return lay_out(figure, axes, panel_height=21.5)
 
 
-@journal_style()
+@drawn
 def compared_deflections(data: xr.Dataset, mode: str) -> Figure:
     """Transverse tip displacement of links in every model that has it, a panel a link.
 
@@ -140,7 +141,7 @@ def compared_deflections(data: xr.Dataset, mode: str) -> Figure:
     return lay_out(figure, axes, panel_height=44.0)
 
 
-@journal_style()
+@drawn
 def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnification: float | None = None) -> Figure:
     """Paths of the end-effector in two models, deviations from the desired one magnified (Fig. 23).
 
@@ -164,7 +165,7 @@ def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnifica
     return deviated_paths(dict(zip(map(printed, models), runs, strict=True)), magnification, _PAIR)
 
 
-@journal_style()
+@drawn
 def model_distances(data: xr.Dataset) -> Figure:
     """Distance of the end-effector from its desired place, and from where the reference has it, in every model.
 

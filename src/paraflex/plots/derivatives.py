@@ -9,16 +9,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import metric_name, mode_label
 from paraflex.plots.layout import MM, is_narrow, lay_out, panels
-from paraflex.plots.style import COLOURS, STYLE, ZERO, journal_style
+from paraflex.plots.style import COLOURS, STYLE, ZERO
 
 # Height of a metric's group of bars, and of one bar in it, [mm]; width of a letter of a metric's name, [em].
 _GROUP, _BAR, _LETTER = 2.4, 1.9, 0.2
 _EM = STYLE["font.size"] / 72.0 * 25.4
 
 
-@journal_style()
+@drawn
 def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
     """By how many per cent each metric changes with one per cent of each parameter: a group of bars a metric.
 

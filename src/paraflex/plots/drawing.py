@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import mode_label, three_digits
 from paraflex.plots.layout import page_width
 from paraflex.plots.scene import (
@@ -30,12 +31,11 @@ from paraflex.plots.scene import (
     support,
     zigzag,
 )
-from paraflex.plots.style import journal_style
 from paraflex.plots.themes import Theme, theme
 
 Array = NDArray[np.float64]
 
-# Bodies told by name under a picture; of more there is no room.
+# Bodies named under a picture; of more there is no room.
 _NAMED = 9
 _MM = 1.0 / 25.4
 # Room above and below a drawing [mm].
@@ -163,7 +163,7 @@ def caption(shown: Scene) -> str:
     return "links drawn stiff" if shown.magnified == 0.0 else f"deflections × {shown.magnified:g}"
 
 
-@journal_style()
+@drawn
 def mechanism_drawing(
     data: xr.Dataset,
     mode: str | None = None,

@@ -11,18 +11,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label, plain
 from paraflex.plots.layout import ONE_COLUMN, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_curves, select_run, shade_rest
 from paraflex.plots.scales import mark_powers
-from paraflex.plots.style import BLUE, GREEN, VERMILLION, journal_style
+from paraflex.plots.style import BLUE, GREEN, VERMILLION
 from paraflex.results.metrics import headline, ranked_by_motion
 
 # Height of a line of a list [mm].
 _LINE = 5.5
 
 
-@journal_style()
+@drawn
 def actuation_condition(data: xr.Dataset) -> Figure:
     """Condition number of the actuation matrix along the path in every mode: large near a Type II singularity.
 
@@ -44,7 +45,7 @@ def actuation_condition(data: xr.Dataset) -> Figure:
     return lay_out(figure, axes, panel_height=56.0)
 
 
-@journal_style()
+@drawn
 def tracking_distance(data: xr.Dataset) -> Figure:
     """Distance of the end-effector from its desired place in time, all modes in one panel.
 
@@ -68,7 +69,7 @@ def tracking_distance(data: xr.Dataset) -> Figure:
     return lay_out(figure, axes, panel_height=56.0)
 
 
-@journal_style()
+@drawn
 def mode_comparison(data: xr.Dataset) -> Figure:
     """RMS tracking error (of the motion, or the whole run), residual vibration and largest torque of every mode.
 
@@ -102,7 +103,7 @@ def mode_comparison(data: xr.Dataset) -> Figure:
     return lay_out(figure, axes, panel_height=_LINE * len(modes) + 2.0)
 
 
-@journal_style()
+@drawn
 def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Worst condition number of the actuation matrix along a path, a bar a mode; modes that cannot drive it are pale.
 

@@ -6,17 +6,18 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak
 from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_curves, one_run, shade_rest
 from paraflex.plots.scales import mark_powers
-from paraflex.plots.style import ZERO, journal_style
+from paraflex.plots.style import ZERO
 
 # Names of the curves, in every figure of energies.
 ENERGIES = {"kinetic_energy": "kinetic energy", "strain_energy": "strain energy", "work": "work done on it"}
 
 
-@journal_style()
+@drawn
 def energies(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Kinetic and strain energy and the work done on the mechanism; strain energy alone; how far they do not balance.
 

@@ -159,7 +159,7 @@ def write_film(
         Its ending says the kind: .mp4, .gif, .svg; .png is one picture; without one a folder of PNG pictures, made if
         it is not there. Files of the same names are written over.
     on_progress : callable, optional
-        Told how many pictures are drawn, and of how many.
+        Called with how many pictures are drawn, and of how many.
 
     Raises
     ------

@@ -6,16 +6,16 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_curves, one_run, shade_rest
-from paraflex.plots.style import journal_style
 
 # Lines that can still be told apart in one panel.
 _MOST = 7
 
 
-@journal_style()
+@drawn
 def joint_forces(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Magnitude of the force in every joint in time; of more than seven, in those with the largest.
 

@@ -6,10 +6,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, plain, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_curves
-from paraflex.plots.style import journal_style, keep_flat, look_of
+from paraflex.plots.style import keep_flat, look_of
 from paraflex.plots.workspace import finish_workspace, workspace_panel
 
 # Lines that can still be told apart in one panel; a point that moves less than this share of all stands still.
@@ -20,7 +21,7 @@ _NOTHING = 1e-12
 _KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1e3)}
 
 
-@journal_style()
+@drawn
 def coordinates(data: xr.Dataset) -> Figure:
     """Generalised coordinates in time: places and angles of the bodies' frames, and flexible coordinates.
 
@@ -55,7 +56,7 @@ def coordinates(data: xr.Dataset) -> Figure:
     return lay_out(figure, axes, panel_height=34.0)
 
 
-@journal_style()
+@drawn
 def point_paths(data: xr.Dataset) -> Figure:
     """Where named points go in the plane; of more than seven those that go furthest.
 

@@ -57,10 +57,10 @@ def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", s
     short : bool
         Whether the symbol is enough, if there is one: below a title that names the quantity.
     """
-    told = QUANTITIES[quantity]
-    mark = told.symbol.replace("{}", direction)
-    text = " ".join(part for part in ("" if short and mark else told.name, mark) if part)
-    unit = told.unit if unit is None else unit
+    described = QUANTITIES[quantity]
+    mark = described.symbol.replace("{}", direction)
+    text = " ".join(part for part in ("" if short and mark else described.name, mark) if part)
+    unit = described.unit if unit is None else unit
     return text if unit == "1" else f"{text} [{unit}]"
 
 

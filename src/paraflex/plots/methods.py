@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from paraflex.errors import InputError
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, power_of_ten
 from paraflex.plots.layout import lay_out, panels
-from paraflex.plots.style import BLACK, COLOURS, SHADE, journal_style
+from paraflex.plots.style import BLACK, COLOURS, SHADE
 
 # A family shares mark and dashes; its members differ in colour.
 _FAMILIES: Mapping[str, dict[str, Any]] = {
@@ -34,7 +35,7 @@ def method_look(family: str, number: int) -> dict[str, Any]:
     }
 
 
-@journal_style()
+@drawn
 def work_precision(figures: Mapping[str, Any]) -> Figure:
     """Wall time and accepted steps of every method over its error, both axes logarithmic.
 

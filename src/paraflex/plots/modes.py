@@ -10,17 +10,18 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label, peak, symbol, three_digits
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, samples, select_run, shade_rest
-from paraflex.plots.style import BLUE, VERMILLION, ZERO, journal_style, keep_flat, look_of
+from paraflex.plots.style import BLUE, VERMILLION, ZERO, keep_flat, look_of
 from paraflex.results.metrics import headline, ranked_by_motion
 
 # Of a mode and the names of its passive motors, as many as fit above a panel.
 _TITLE_LETTERS = 22
 
 
-@journal_style()
+@drawn
 def motor_torques(data: xr.Dataset) -> Figure:
     """Torque of every motor, a panel for each mode; the panels of a row share their scale (Fig. 12).
 
@@ -59,7 +60,7 @@ def motor_torques(data: xr.Dataset) -> Figure:
     return lay_out(figure, axes, panel_height=38.0)
 
 
-@journal_style()
+@drawn
 def tracking_errors(data: xr.Dataset) -> Figure:
     """Actual less desired place of the end-effector in x and y, a panel for each mode (Fig. 18).
 

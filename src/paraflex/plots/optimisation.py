@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import metric_name, mode_label
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panels
-from paraflex.plots.style import BLUE, VERMILLION, ZERO, journal_style
+from paraflex.plots.style import BLUE, VERMILLION, ZERO
 
 _FAINT = "0.6"
 # Heights of a panel, and of a line of one that is a list [mm].
@@ -21,7 +22,7 @@ _PANEL, _LINE = 50.0, 5.5
 _HIGHEST = 3.0
 
 
-@journal_style()
+@drawn
 def convergence(figures: Mapping[str, Any]) -> Figure:
     """The objective, or root mean square residual, of every design, and the least until then.
 
@@ -63,7 +64,7 @@ def convergence(figures: Mapping[str, Any]) -> Figure:
     return lay_out(figure, axes, panel_height=_PANEL)
 
 
-@journal_style()
+@drawn
 def targets_reached(figures: Mapping[str, Any]) -> Figure:
     """Every target: what the start and the best design make of it, as a multiple of it.
 
@@ -95,7 +96,7 @@ def targets_reached(figures: Mapping[str, Any]) -> Figure:
     return lay_out(figure, axes, panel_height=_LINE * len(targets) + 2.0)
 
 
-@journal_style()
+@drawn
 def sobol_bars(figures: Mapping[str, Any]) -> Figure:
     """First-order and total indices of every parameter with their intervals of 95 %; a panel a metric, path and mode.
 

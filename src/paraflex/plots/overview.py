@@ -6,15 +6,16 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
-from paraflex.plots.style import COLOURS, DASHES, journal_style, keep_flat, look_of
+from paraflex.plots.style import COLOURS, DASHES, keep_flat, look_of
 
 # Lines that can still be told apart in one panel.
 _MOST = 7
 
 
-@journal_style()
+@drawn
 def motion_overview(data: xr.Dataset) -> Figure:
     """Angle and angular velocity of the first bodies, and the energies.
 

@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.plots.designs import DesignTable
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import mode_label, plain, three_digits
 from paraflex.plots.layout import is_narrow, lay_out, panels
-from paraflex.plots.style import VERMILLION, journal_style
+from paraflex.plots.style import VERMILLION
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ _METRICS, _AXES, _LINES, _ROW = 3, 10, 2000, 10.0
 _LIGHTEST = 0.85  # Of the colour map, whose light end is too light on paper.
 
 
-@journal_style()
+@drawn
 def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
     """Every design as a line over axes of its numbers, in the colour of the first metric; the least is thick.
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, symbol
 from paraflex.plots.layout import is_narrow, lay_out, panels
 from paraflex.plots.runs import START, draw_actual, draw_desired, one_run, select_run
-from paraflex.plots.style import BLUE, journal_style, keep_flat
+from paraflex.plots.style import BLUE, keep_flat
 
 # Bodies that have a panel.
 _MOST = 8
 
 
-@journal_style()
+@drawn
 def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
     """Velocity over displacement and acceleration over velocity in x and y, desired and actual (Fig. 17).
 
@@ -57,7 +58,7 @@ def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
     return lay_out(figure, axes, panel_height=50.0)
 
 
-@journal_style()
+@drawn
 def link_phases(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Angular velocity over angle of every body, of at most eight of them.
 

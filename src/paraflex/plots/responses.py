@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable, in_conflict, undominated
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import mode_label, peak, plain, power_of_ten
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
-from paraflex.plots.style import journal_style, look_of
+from paraflex.plots.style import look_of
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ _MOST_PARAMETERS, _MOST_METRICS = 3, 3
 _GROUPS = 12
 
 
-@journal_style()
+@drawn
 def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
     """Metrics over parameters: a row a metric, a column a parameter, each run a mark, its path and mode by colour.
 
@@ -98,7 +99,7 @@ def _series_name(pair: tuple[str, str], table: DesignTable) -> str:
     return (f"{plain(path)}, " if several else "") + f"mode {mode_label(mode)}"
 
 
-@journal_style()
+@drawn
 def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
     """Two metrics of every design, less of both being better, and the designs that no other is better than in both.
 

@@ -9,17 +9,20 @@ from typing import Any
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, OutputError, suggestion
 from paraflex.plots.catalogue import Drawing, drawings, figures_of
 from paraflex.plots.layout import column_width
 from paraflex.plots.sources import Source
 from paraflex.plots.style import journal_style
+from paraflex.results.kinds import check_kind
 
 # Files that do not depend on when they were written.
 _METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 FORMATS = tuple(_METADATA)
 
 
+@checked_arguments()
 def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) -> list[Path]:
     """Write figures 11 to 18 as PNG (200 dpi) and SVG, named like `fig11_desired_path.png`.
 
@@ -48,6 +51,7 @@ def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) 
     return _save_written("tracking", data, Path(folder), mode)
 
 
+@checked_arguments()
 def save_agreement_figures(data: xr.Dataset, folder: str | Path) -> list[Path]:
     """Write figures 22 and 23 of every mode, and the distances of all models, as PNG and SVG.
 
@@ -71,6 +75,7 @@ def save_agreement_figures(data: xr.Dataset, folder: str | Path) -> list[Path]:
     return _save_written("verification", data, Path(folder))
 
 
+@checked_arguments()
 def save_overview(data: xr.Dataset, folder: str | Path) -> list[Path]:
     """Write the overview of a run without a path as PNG and SVG.
 
@@ -82,6 +87,7 @@ def save_overview(data: xr.Dataset, folder: str | Path) -> list[Path]:
     return _save_written("motion", data, Path(folder))
 
 
+@checked_arguments()
 def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
     """Write the figure of a comparison of methods as PNG and SVG; none where no run got to its end.
 
@@ -93,6 +99,7 @@ def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[
     return _save_written("methods", figures, Path(folder))
 
 
+@checked_arguments()
 def save_search_figures(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
     """Write the figures of an optimisation, an identification or of Sobol indices as PNG and SVG.
 
@@ -113,6 +120,7 @@ def save_search_figures(figures: Mapping[str, Any], folder: str | Path) -> list[
     return _save_written(kind, figures, Path(folder))
 
 
+@checked_arguments()
 def save_elasticities(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
     """Write a figure of elasticities for each run of a sensitivity study, as PNG and SVG.
 
@@ -193,6 +201,8 @@ def write_figures(
 
 def _save_written(kind: str, data: Any, folder: Path, mode: str | None = None) -> list[Path]:
     """The figures that the command which makes results of a kind writes beside them."""
+    if isinstance(data, xr.Dataset):
+        check_kind(data, kind)
     source = Source(kind, data, folder)
     written: list[Path] = []
     for figure in figures_of(source):

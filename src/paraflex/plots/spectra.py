@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.integrators import METHODS
 from paraflex.integrators.spectra import MULTISTEP, Spectrum, spectrum
 from paraflex.plots.labels import power_of_ten
@@ -28,6 +29,7 @@ _SHOWN, _GROWN = (1e-6, 1.0), 1.5
 
 
 @journal_style()
+@checked_arguments(curves='give pairs of a method and an order or None, such as [("bdf", 2)]')
 def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figure:
     """Damping ratio, period error and spectral radius over h omega (x'' = -omega^2 x, steps of h).
 

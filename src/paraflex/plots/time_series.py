@@ -9,10 +9,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, symbol
 from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, draw_curves, draw_desired, one_run, run_label, select_run, shade_rest
-from paraflex.plots.style import journal_style, keep_flat
+from paraflex.plots.style import keep_flat
 
 # Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
 _ALIKE = 0.9
@@ -22,7 +23,7 @@ _MOST = 7
 _MOST_NARROW = 4
 
 
-@journal_style()
+@drawn
 def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = None) -> Figure:
     """Axial and transverse displacement and slope of links' last ends from the tangents at their first ends (Fig. 13).
 
@@ -79,7 +80,7 @@ def most_deflected(run: xr.Dataset) -> list[str]:
     return [name for name in peaks if name in chosen]
 
 
-@journal_style()
+@drawn
 def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Transverse displacement of links' last ends from the tangents at their first; of more than seven, of the largest.
 
@@ -111,7 +112,7 @@ def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
     return lay_out(figure, axes, panel_height=56.0)
 
 
-@journal_style()
+@drawn
 def link_motions(data: xr.Dataset, mode: str) -> Figure:
     """Angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14).
 
@@ -146,7 +147,7 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
     return lay_out(figure, axes, panel_height=21.5)
 
 
-@journal_style()
+@drawn
 def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
     """Displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16).
 

@@ -13,11 +13,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.plots.given import drawn
 from paraflex.plots.labels import peak
 from paraflex.plots.layout import ONE_COLUMN, equal_scales_height, is_narrow, lay_out, panels
 from paraflex.plots.mechanism import draw_mechanism
 from paraflex.plots.runs import START, draw_actual, draw_desired, run_label, select_run
-from paraflex.plots.style import BLUE, journal_style
+from paraflex.plots.style import BLUE
 
 # Room round what is drawn, and the height of a panel beside its width, at least and at most.
 _MARGIN, _FLATTEST, _TALLEST = 0.06, 0.3, 1.3
@@ -26,7 +27,7 @@ _TALLEST_WIDE = 0.75  # Over two columns.
 _SHOWN_DEVIATION = 0.15
 
 
-@journal_style()
+@drawn
 def desired_path(data: xr.Dataset) -> Figure:
     """The path the end-effector should follow, and the mechanism in its start pose (Fig. 11).
 
@@ -44,7 +45,7 @@ def desired_path(data: xr.Dataset) -> Figure:
     return finish_workspace(figure, axes)
 
 
-@journal_style()
+@drawn
 def end_effector_path(data: xr.Dataset, mode: str, magnification: float | None = None) -> Figure:
     """Desired and actual path; the deviation from one to the other is drawn magnified (Fig. 15).
 

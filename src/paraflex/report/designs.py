@@ -18,7 +18,7 @@ from paraflex.report.curves import unit_for
 from paraflex.report.page import Column
 from paraflex.report.text import symbol
 
-# Reasons of failures that are told.
+# Reasons of failures that are listed.
 _REASONS = 12
 _COMPLETE = "complete"
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")

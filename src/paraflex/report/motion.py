@@ -7,6 +7,7 @@ import json
 import numpy as np
 import xarray as xr
 
+from paraflex.arguments import checked_arguments
 from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, Unit, followed, look, thinned, unit_for
 from paraflex.report.film import NO_SHAPES, film
 from paraflex.report.page import Chart, Curve, Page, Panel
@@ -14,6 +15,7 @@ from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import count, number, pairs, symbol
 from paraflex.report.tracking import energies, largest
 from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.kinds import check_kind
 from paraflex.results.validity import validity_line, validity_summary
 
 _ALONE = ("",)
@@ -21,8 +23,10 @@ _ALONE = ("",)
 _MOST = 60
 
 
+@checked_arguments()
 def motion_page(data: xr.Dataset) -> Page:
     """The report of a run from `results.motion_dataset`."""
+    check_kind(data, "motion")
     data = data.transpose("time", ...)
     moving = film(data, ())
     few = data.isel(time=thinned(data.sizes["time"]))

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError, OutputError
 from paraflex.report.film import Film
 from paraflex.report.packing import Series
@@ -185,6 +186,7 @@ class Panel:
     charts: Sequence[Chart]
 
 
+@given_as("a page", "what tracking_page or motion_page returns")
 @dataclass(frozen=True)
 class Page:
     """What a report says.
@@ -243,6 +245,7 @@ class Page:
     notes: Sequence[str] = ()
 
 
+@checked_arguments()
 def render(page: Page) -> str:
     """The page as HTML."""
     return Template(_asset("page.html")).substitute(
@@ -266,6 +269,7 @@ def render(page: Page) -> str:
     )
 
 
+@checked_arguments()
 def save_page(page: Page, path: str | Path) -> None:
     """Write the page; the file appears whole or not at all.
 
@@ -309,7 +313,7 @@ def plotly_script() -> str:
 
 
 def _told(page: Page) -> dict[str, Any]:
-    """What the scripts are told."""
+    """What the scripts are given."""
     series = Series()
     time = series.add(page.time, exact=True)
     return {

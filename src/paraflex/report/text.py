@@ -114,8 +114,8 @@ def _data_run(run: int | None) -> str:
 def _data_keys(keys: Mapping[str, Sequence[float | str | None]] | None, name: str) -> str:
     if keys is None:
         return ""
-    told = [None if isinstance(key, float) and not math.isfinite(key) else key for key in keys[name]]
-    return f' data-keys="{escape(json.dumps(told))}"'
+    plain = [None if isinstance(key, float) and not math.isfinite(key) else key for key in keys[name]]
+    return f' data-keys="{escape(json.dumps(plain))}"'
 
 
 def _row_head(name: str, run: int | None) -> str:

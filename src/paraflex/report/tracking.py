@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.plots.runs import default_mode
 from paraflex.report.curves import (
     DOTTED,
@@ -26,10 +27,12 @@ from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
 from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.kinds import check_kind
 from paraflex.results.metrics import during_motion, headline, ranked_by_motion
 from paraflex.results.validity import validity_line, validity_summary
 
 
+@checked_arguments()
 def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> Page:
     """The report of a tracking study.
 
@@ -40,6 +43,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     failed : mapping of str to str, optional
         Modes that could not start, each with its reason.
     """
+    check_kind(data, "tracking")
     data = data.transpose("mode", "time", ...)
     runs = [str(name) for name in data["mode"].values]
     run = asked(data)

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.plots.agreement import printed
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.curves import TIP_LABEL, TIP_TITLE, look, thinned, unit_for
@@ -17,6 +18,7 @@ from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, verify_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
 from paraflex.report.tracking import errors, torque_unit
+from paraflex.results.kinds import check_kind
 from paraflex.results.metrics import SPAN_WORDS, ErrorSpan
 
 _ENGINES = ("exudyn", "mujoco")
@@ -53,6 +55,7 @@ class _Runs:
         ]  # fmt: skip
 
 
+@checked_arguments()
 def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
     """The report of a verification.
 
@@ -63,6 +66,7 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
     figures : mapping
         From `studies.agreement`: what `verify.json` holds.
     """
+    check_kind(data, "verification")
     runs, asked_for = _Runs(data), asked(data)
     reference = str(data.attrs["reference"])
     moving = film(data, ("mode", "model"))

@@ -13,15 +13,16 @@ from paraflex.results.summary import summary
 
 if TYPE_CHECKING:
     from paraflex.results.dataset import tracking_dataset
+    from paraflex.results.kinds import kind_of
     from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
     from paraflex.results.motion_data import motion_dataset, motion_summary
-    from paraflex.results.storage import kind_of, load_results, open_results, results_file, save_results
+    from paraflex.results.storage import load_results, open_results, results_file, save_results
 
 _HOME = {
     "load_results": "storage",
     "motion_dataset": "motion_data",
     "motion_summary": "motion_data",
-    "kind_of": "storage",
+    "kind_of": "kinds",
     "open_results": "storage",
     "peak_torque": "metrics",
     "residual_vibration": "metrics",

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
@@ -17,7 +18,7 @@ from paraflex.kinematics import Path, length_fraction
 from paraflex.mechanism import Mechanism
 from paraflex.results.doubts import MODE, keep_findings
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
-from paraflex.results.metrics import SAME_TIME, ErrorSpan, Part, peak_torque, rms_torque, tracking_variables
+from paraflex.results.metrics import ErrorSpan, Part, peak_torque, rms_torque, too_short, tracking_variables
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
 from paraflex.results.storage import SCHEMA
@@ -104,6 +105,7 @@ def describe(data: xr.Dataset, name: str, label: str, unit: str) -> None:
         data[name].attrs["comment"] = _COMMENTS[name]
 
 
+@checked_arguments()
 def tracking_dataset(
     runs: Sequence[TrackingRun | Record],
     *,
@@ -118,7 +120,7 @@ def tracking_dataset(
     ----------
     runs : sequence of TrackingRun or Record
         Of one task; runs that did not finish hold NaN after their last sample and say so in `status`, and in `event`
-        and `event_time` where that stopped them. Runs of finite segments are told as the links they were cut from.
+        and `event_time` where that stopped them. Runs of finite segments are reported as the links they were cut from.
     options : IntegrationOptions, optional
         Kept as provenance.
     parameters : dict, optional
@@ -252,9 +254,7 @@ def end_effector_point(mechanism: Mechanism) -> dict[str, str]:
 
 def part_of(path: Path, end: float) -> Part | None:
     """What runs that end then [s] do of a path that they are too short for; None where they are not."""
-    if end >= path.duration * (1.0 - SAME_TIME):
-        return None
-    return Part(end, path.duration, length_fraction(path, end))
+    return Part(end, path.duration, length_fraction(path, end)) if too_short(end, path.duration) else None
 
 
 def _provenance(one: Record, options: IntegrationOptions, parameters: dict) -> dict:

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, OutputError, suggestion
 from paraflex.results.storage import save_results
 
@@ -48,6 +49,7 @@ class Table:
         return next(column for column in self.columns if column.name == name)
 
 
+@checked_arguments()
 def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, Table]:
     """Results as tidy tables, a row an observation.
 
@@ -115,6 +117,7 @@ def _told(array: xr.DataArray) -> tuple[str, str]:
     return ("" if unit == "1" else unit), str(array.attrs.get("long_name", ""))
 
 
+@checked_arguments()
 def export_results(
     data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = False, force: bool = False
 ) -> list[Path]:

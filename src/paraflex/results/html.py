@@ -14,7 +14,7 @@ from paraflex.results.motion import point_motion
 from paraflex.results.outlines import deflections
 from paraflex.simulate import TrackingRun
 
-# Points told one by one.
+# Points listed one by one.
 _MOST = 20
 
 

@@ -13,10 +13,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.findings import Finding
+from paraflex.results.kinds import check_kind
 
 # A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
-SAME_TIME = 1e-9
+_SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
 _DRIFT_DEGREE = 2
 # Fewer samples after the motion do not tell a vibration from a drift.
@@ -44,7 +46,7 @@ SPAN_WORDS = {ErrorSpan.MOTION: "during the motion", ErrorSpan.WHOLE: "over the 
 def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
     """Which samples at times t (k,) are of the motion, its end among them [s]; the others are after it."""
     end = np.real(motion_end)
-    return np.real(t) <= end + SAME_TIME * abs(end)
+    return np.real(t) <= end + _SAME_TIME * abs(end)
 
 
 def rms(values: NDArray[Any]) -> Any:
@@ -88,11 +90,13 @@ def _drift(t: NDArray[Any], position: NDArray[Any]) -> tuple[NDArray[Any], NDArr
     return basis, np.linalg.solve(basis.T @ basis, basis.T @ position), half
 
 
+@checked_arguments()
 def tracking_error(data: xr.Dataset) -> xr.DataArray:
     """Root mean square distance of the end-effector from its desired place over the samples (Eq. 64) [m]."""
     return tracking_variables(data)["tracking_rms"]
 
 
+@checked_arguments()
 def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
     """Root mean square distance of the end-effector after the motion's end from its drift [m]: see `vibration`.
 
@@ -125,6 +129,7 @@ def tracking_variables(data: xr.Dataset, motion_end: float | None = None) -> dic
     motion_end : float, optional
         End of the motion along the path [s]; that of the dataset by default.
     """
+    check_kind(data, "tracking", "verification")
     end = float(data.attrs["motion_end"]) if motion_end is None else motion_end
     place = data["end_effector"].transpose(..., "time", "axis")
     away = (data["end_effector_desired"] - data["end_effector"]).transpose(*place.dims).values
@@ -209,19 +214,26 @@ class Part:
         return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
 
 
+def too_short(end: float, path_duration: float) -> bool:
+    """Whether a run that ends then [s] does not come to the end of its path [s]."""
+    return end < path_duration * (1.0 - _SAME_TIME)
+
+
 def part_run(data: xr.Dataset) -> Part | None:
     """What the runs of a dataset were to do of a path that they were too short for; None where they were not."""
     end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
-    if "path_length_run" not in data.attrs or end >= path * (1.0 - SAME_TIME):
+    if "path_length_run" not in data.attrs or not too_short(end, path):
         return None
     return Part(end, path, float(data.attrs["path_length_run"]))
 
 
+@checked_arguments()
 def peak_torque(data: xr.Dataset) -> xr.DataArray:
     """Largest magnitude of each motor's torque [N m]."""
     return abs(data["torque"]).max("time").assign_attrs(long_name="peak torque", units="N m")
 
 
+@checked_arguments()
 def rms_torque(data: xr.Dataset) -> xr.DataArray:
     """Root mean square of each motor's torque over the run [N m]."""
     return ((data["torque"] ** 2).mean("time") ** 0.5).assign_attrs(long_name="RMS torque", units="N m")

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.findings import Finding
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
@@ -19,6 +20,7 @@ from paraflex.results.dataset import UNITS, describe, end_effector_point
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.joint_loads import joint_loads
+from paraflex.results.kinds import check_kind
 from paraflex.results.motion import point_motion, tip_deflection
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import FIGURES
@@ -35,6 +37,7 @@ _OWN_UNITS = {
 }
 
 
+@checked_arguments()
 def motion_dataset(
     run: MotionRun,
     *,
@@ -133,8 +136,10 @@ def motion_dataset(
     return out
 
 
+@checked_arguments()
 def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     """The run's figures as plain numbers; `final` is its last sample, None for one that reached none."""
+    check_kind(data, "motion")
     reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
     last = data.isel(time=reached[-1] if reached.size else 0)
     figures: dict[str, Any] = {name: data[name].item() for name in FIGURES}

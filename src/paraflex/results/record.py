@@ -1,4 +1,4 @@
-"""A run told link by link: what every model of a mechanism can say, whoever computed it."""
+"""A run link by link: what every model of a mechanism can say, whoever computed it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import given_as
 from paraflex.dynamics import Marker, System, end_markers, material_angle
 from paraflex.findings import Finding
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
@@ -38,6 +39,7 @@ FIGURES = (
 BRAKE_ENERGY = "brake_energy"
 
 
+@given_as("a record", "what results.record makes of a run")
 @dataclass(frozen=True)
 class Record:
     """One run of a task, at the k sample times it reached; NaN for what a model does not tell.
@@ -112,7 +114,7 @@ class Record:
 
 
 def record(run: TrackingRun) -> Record:
-    """What a run of our own says of the links; finite segments are told as the links they were cut from."""
+    """What a run of our own says of the links; finite segments are reported as the links they were cut from."""
     task, solution = run.task, run.solution
     # The state at an event is a sample more than the task's times.
     k = solution.t.size - bool(solution.event)

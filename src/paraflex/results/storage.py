@@ -6,6 +6,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, OutputError, suggestion
 from paraflex.results.metrics import tracking_variables
 
@@ -25,6 +26,7 @@ _NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
 _PARQUET = b"PAR1"
 
 
+@checked_arguments()
 def save_results(data: xr.Dataset, path: str | Path) -> None:
     """Write a dataset as netCDF, compressed; the file appears whole or not at all.
 
@@ -54,6 +56,7 @@ def _encoding(data: xr.Dataset) -> dict[str, dict[str, object]]:
     }
 
 
+@checked_arguments()
 def open_results(path: str | Path) -> xr.Dataset:
     """The dataset that a command or `save_results` wrote, read into memory.
 
@@ -73,18 +76,13 @@ def open_results(path: str | Path) -> xr.Dataset:
     return _checked(_read(file), file)
 
 
+@checked_arguments()
 def load_results(path: str | Path) -> xr.Dataset:
     """Read a dataset that `save_results` wrote: the same as `open_results`."""
     return open_results(path)
 
 
-def kind_of(data: xr.Dataset) -> str:
-    """What a dataset is of: a "verification", a "motion" without a path, or "tracking"."""
-    if "model" in data.dims:
-        return "verification"
-    return "motion" if data.attrs.get("kind") == "motion" else "tracking"
-
-
+@checked_arguments()
 def results_file(path: str | Path) -> Path:
     """The netCDF file that a folder of results or a file name means.
 

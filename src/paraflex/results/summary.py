@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from paraflex.arguments import checked_arguments
 from paraflex.results.doubts import verdict_of
+from paraflex.results.kinds import check_kind
 from paraflex.results.metrics import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.validity import validity_summary
 
@@ -24,6 +26,7 @@ _FIGURES = (
 )
 
 
+@checked_arguments()
 def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str, Any]:
     """Figures of every mode, parameters and version.
 
@@ -43,6 +46,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         after the path; `part`, how much of the path a run did that was too short for all of it, else None;
         `parameters`; `version`. A figure not reached is None.
     """
+    check_kind(data, "tracking")
     modes, part = {}, part_run(data)
     for name in data["mode"].values:
         run = data.sel(mode=name)

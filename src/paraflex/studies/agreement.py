@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import as_enum
 from paraflex.results.dataset import part_of
 from paraflex.results.metrics import ErrorSpan, during_motion
@@ -16,6 +17,7 @@ from paraflex.simulate import TrackingTask
 from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model
 
 
+@checked_arguments()
 def agreement(verification: Verification, error: ErrorSpan | str = ErrorSpan.MOTION) -> dict[str, Any]:
     """The agreement of all models as plain numbers: what `verify.json` holds. None for what a run did not reach.
 

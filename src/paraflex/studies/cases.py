@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.dynamics import State, System, build_system
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution
@@ -20,6 +21,7 @@ from paraflex.simulate import TrackingRun, TrackingTask, simulate
 Progress = Callable[[float], None]
 
 
+@given_as("a case", "what tracking_case or motion_case returns")
 @dataclass(frozen=True)
 class Case:
     """A motion to be integrated again and again.
@@ -53,6 +55,7 @@ class Case:
         return np.stack([point_motion(self.system, point, q, v, a).position for point in self.points], axis=1)
 
 
+@checked_arguments()
 def tracking_case(task: TrackingTask, mode: str | ActuationMode) -> Case:
     """One mode of a task; the error is the end-effector's.
 
@@ -73,6 +76,7 @@ def tracking_case(task: TrackingTask, mode: str | ActuationMode) -> Case:
     return Case(name, task.system, float(times[-1] - times[0]), times.size, (effector.point,), solve)
 
 
+@checked_arguments()
 def motion_case(
     mechanism: Mechanism,
     duration: float,

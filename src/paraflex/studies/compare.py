@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.methods import Family, Method, find_method
@@ -38,7 +39,7 @@ _FIGURES = (
 
 
 @dataclass(frozen=True)
-class ComparisonOptions:
+class ComparisonOptions(CheckedFields):
     """How methods are compared.
 
     Attributes
@@ -59,6 +60,7 @@ class ComparisonOptions:
     repetitions: int = 3
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         named = [("tolerances", x) for x in self.tolerances] + [("steps", x) for x in self.steps]
         for field, value in [*named, ("limit", self.limit), ("repetitions", self.repetitions)]:
             if not (math.isfinite(value) and value > 0):
@@ -76,6 +78,7 @@ class _TooSlowError(Exception):
     """A run beyond the limit of time."""
 
 
+@checked_arguments()
 def compare_methods(
     case: Case,
     methods: Sequence[str] | None = None,
@@ -90,10 +93,10 @@ def compare_methods(
     case : Case
         From `studies.tracking_case` or `studies.motion_case`.
     methods : sequence of str, optional
-        From `METHODS`; all by default. One that cannot run is told with its reason and the others go on.
+        From `METHODS`; all by default. One that cannot run is listed with its reason and the others go on.
     options : ComparisonOptions, optional
     on_progress : callable, optional
-        Told what begins, its number and how many runs there are at most.
+        Called with what begins, its number and how many runs there are at most.
 
     Raises
     ------

@@ -11,6 +11,7 @@ from typing import Protocol
 
 import xarray as xr
 
+from paraflex.arguments import checked_arguments, refused
 from paraflex.errors import IntegrationError, NumericalError
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
@@ -62,6 +63,7 @@ class StudyResult:
         return study_html(self)
 
 
+@checked_arguments()
 def run_study(
     task: TrackingTask,
     modes: Sequence[str | ActuationMode],
@@ -85,7 +87,7 @@ def run_study(
     parameters : dict, optional
         Kept as provenance.
     on_progress : callable, optional
-        Told the mode's name and the time reached [s]; called from several threads.
+        Called with the mode's name and the time reached [s]; called from several threads.
     workers : int, optional
         Threads; as many as there are processors by default. The results do not depend on it.
     method : Simulator, optional
@@ -107,6 +109,9 @@ def run_study(
     InputError
         A mode that is none of the mechanism's, before anything runs.
     """
+    if method is not None and not callable(method):
+        remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in a way of its own"
+        raise refused(method, "method", "a function", remedy)
     chosen = list(dict.fromkeys(task.mode(mode) for mode in modes))
     stop = threading.Event()
 

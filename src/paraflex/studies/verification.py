@@ -9,6 +9,7 @@ from functools import partial
 
 import xarray as xr
 
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
@@ -41,7 +42,7 @@ class Refinement(Enum):
 
 
 @dataclass(frozen=True)
-class VerificationOptions:
+class VerificationOptions(CheckedFields):
     """How fine the runs are; the finer ones take a quarter of the tolerance, half the step, or twice the mesh.
 
     Attributes
@@ -56,6 +57,7 @@ class VerificationOptions:
         On the longest flexible beam; others get as many as their length takes.
     """
 
+    _own = ("method",)
     tolerance: float = 5e-6
     ked_step: float = 1e-4
     exudyn_step: float = 5e-5
@@ -64,7 +66,8 @@ class VerificationOptions:
     method: str = DEFAULT_METHOD
 
     def __post_init__(self) -> None:
-        find_method(self.method)
+        super().__post_init__()
+        object.__setattr__(self, "method", find_method(self.method).name)
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,7 @@ class ModelRuns:
         return self.finished(Refinement.NONE)
 
 
+@given_as("a verification", "what verify returns")
 @dataclass(frozen=True)
 class Verification:
     """Runs of all models in all modes.
@@ -149,6 +153,7 @@ class Verification:
         return data.assign(method=("model", methods))
 
 
+@checked_arguments()
 def reference_model(models: Sequence[str]) -> str:
     """What the others are compared with: second-order geometry, or else the first that has flexible links."""
     for name in ("second-order", "exudyn", "segments", "mujoco", "linear", "ked"):
@@ -157,6 +162,7 @@ def reference_model(models: Sequence[str]) -> str:
     return models[0]
 
 
+@checked_arguments()
 def verify(
     task: TrackingTask,
     modes: Sequence[str | ActuationMode],
@@ -178,7 +184,7 @@ def verify(
         From FIDELITIES and engines.ENGINES.
     options : VerificationOptions, optional
     on_progress : callable, optional
-        Told what begins, its number and how many runs there are.
+        Called with what begins, its number and how many runs there are.
 
     Raises
     ------
@@ -258,6 +264,7 @@ def run_model(
     return simulate_mujoco(segments, mode, MuJoCoOptions(step=half * options.mujoco_step))
 
 
+@checked_arguments()
 def check_model(name: str, mechanism: Mechanism) -> None:
     """Nothing, if a mechanism can be run in a model.
 

@@ -109,4 +109,4 @@ def assess(system: System, solution: Solution, following: Following | None = Non
 def warn(validity: Validity | None, whose: str = "") -> None:
     """Issue a `ValidityWarning` where a model does not hold; `whose` run it is, say "mode ++", stands before it."""
     if validity is not None and not validity.holds:
-        warn_of([validity.finding(whose)], ValidityWarning, stacklevel=3)
+        warn_of([validity.finding(whose)], ValidityWarning)

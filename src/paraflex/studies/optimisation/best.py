@@ -26,10 +26,10 @@ def write_best(folder: Path, study: DesignStudy, design: tuple[float, ...]) -> P
     """
     setting = study.setting
     data = overlaid(dict(setting.data), setting.numbers(design))
-    told = [f"# {setting.source}, with the numbers that the study {json.dumps(study.name)} found:"]
-    told += [f"#   {json.dumps(name)}: {value!r}" for name, value in zip(setting.names, design, strict=True)]
+    lines = [f"# {setting.source}, with the numbers that the study {json.dumps(study.name)} found:"]
+    lines += [f"#   {json.dumps(name)}: {value!r}" for name, value in zip(setting.names, design, strict=True)]
     with whole_file(folder / BEST) as unfinished:
-        unfinished.write_text("\n".join([*told, "", toml_text(data)]), encoding="utf-8")
+        unfinished.write_text("\n".join([*lines, "", toml_text(data)]), encoding="utf-8")
     return folder / BEST
 
 

@@ -79,7 +79,7 @@ class Evaluate:
     run : callable
         What is done for a task: `run_task` but in tests.
     on_evaluated : callable, optional
-        Told each design as it is done.
+        Called with each design as it is done.
     run_slopes : callable, optional
         What is done for exact derivatives: its rows hold what `slopes.run_slopes` finds.
     """

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from paraflex.arguments import checked_arguments
 from paraflex.studies.optimisation.best import write_best
 from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
@@ -114,6 +115,7 @@ class IdentificationResult:
         return identification_html(self)
 
 
+@checked_arguments()
 def identify(
     study: DesignStudy | str | Path,
     folder: str | Path,

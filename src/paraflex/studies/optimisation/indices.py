@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.studies.optimisation.study import read_study
 from paraflex.studies.sweeps.engines import THREADS, Engine
@@ -23,7 +24,7 @@ from paraflex.studies.sweeps.table import whole_file, write_json
 
 Array = NDArray[np.float64]
 INDICES, TABLE = "indices.json", "indices.parquet"
-# Base samples unless told otherwise, and the fewest of which anything can be said.
+# Base samples unless asked otherwise, and the fewest of which anything can be said.
 _SAMPLES, _FEWEST = 128, 8
 
 
@@ -127,6 +128,7 @@ class IndicesResult:
         return indices_html(self)
 
 
+@checked_arguments()
 def load_indices(
     file: str | Path, metrics: list[str] | None = None, samples: int | None = None, seed: int | None = None
 ) -> IndicesStudy:
@@ -165,6 +167,7 @@ def load_indices(
     return IndicesStudy(study, columns, number, chosen)
 
 
+@checked_arguments()
 def sobol_indices(
     study: IndicesStudy | str | Path,
     folder: str | Path,

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from paraflex.arguments import checked_arguments
 from paraflex.studies.optimisation.best import write_best
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, minimise
@@ -22,7 +23,7 @@ from paraflex.studies.sweeps.table import write_json
 
 # So near a bound, as a share of the range, a parameter is at it.
 _AT_BOUND = 1e-4
-# Different reasons of failures that are told.
+# Different reasons of failures that are listed.
 _REASONS = 5
 
 
@@ -89,6 +90,7 @@ class OptimisationResult:
         return optimisation_html(self)
 
 
+@checked_arguments()
 def optimise(
     study: DesignStudy | str | Path,
     folder: str | Path,
@@ -114,7 +116,7 @@ def optimise(
     cluster : str, optional
         Address of a Dask scheduler.
     on_progress : callable, optional
-        Told how far it is whenever a design is done.
+        Called with how far it is whenever a design is done.
     run : callable, optional
         What is done for a task: the simulation but in tests.
 

@@ -129,9 +129,9 @@ def running_start(study: DesignStudy, evaluate: Evaluate) -> Evaluated:
     """
     (start,) = evaluate([study.start])
     if not start.complete:
-        told = ", ".join(f"{name} = {value:g}" for name, value in zip(study.setting.names, study.start, strict=True))
+        values = ", ".join(f"{name} = {value:g}" for name, value in zip(study.setting.names, study.start, strict=True))
         raise InputError(
-            f"the start cannot be run ({start.reason})", field="vary", value=told, remedy="give another start"
+            f"the start cannot be run ({start.reason})", field="vary", value=values, remedy="give another start"
         )
     return start
 

@@ -109,7 +109,7 @@ def search(
     solve : callable
         Asks for designs; tells why it ended.
     on_evaluated : callable, optional
-        Told each design as it is done.
+        Called with each design as it is done.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def search(
         began = time.perf_counter()
         exact = _slopes_run(study, workers)
         record = Record(folder, record_schema(study, slopes=exact is not None))
-        compile_kernels_for(study.base.model().mechanism, lambda _: None)
+        compile_kernels_for(study.base.model().mechanism)
         engine = workers.open()
         evaluate = Evaluate(study, record, engine, workers.run or run_task, on_evaluated, exact)
         stopped = _solved(evaluate, solve)

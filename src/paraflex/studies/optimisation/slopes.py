@@ -19,7 +19,7 @@ from paraflex.studies.sweeps.study import Setting
 
 Array = NDArray[np.float64]
 EXACT, DIFFERENCES = "exact", "differences"
-# Bounds of a step that is chosen against noise, as a share of the ranges: what is bent is no straight line beyond.
+# Bounds of a step that is chosen against noise, as a share of the ranges: what is curved is no straight line beyond.
 _LEAST_STEP, _MOST_STEP = 1e-3, 0.05
 
 

@@ -10,6 +10,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError, suggestion
 from paraflex.files.read import read_toml, validate
 from paraflex.mechanism import quantities
@@ -69,6 +70,7 @@ class Search:
             quantities.known(self.gradients, get_args(GradientsName), "search.gradients", "kind of derivatives")
 
 
+@given_as("a study", "a DesignStudy")
 @dataclass(frozen=True)
 class DesignStudy:
     """A mechanism, the parameters that are free within bounds, and what is looked for.
@@ -145,6 +147,7 @@ class DesignStudy:
         return self.base.content() | more
 
 
+@checked_arguments()
 def load_optimisation(file: str | FilePath) -> DesignStudy:
     """Read the study file of an optimisation.
 
@@ -161,6 +164,7 @@ def load_optimisation(file: str | FilePath) -> DesignStudy:
     return _load(file, _optimisation)
 
 
+@checked_arguments()
 def load_identification(file: str | FilePath) -> DesignStudy:
     """Read the study file of an identification; see `load_optimisation`."""
     return _load(file, _identification)

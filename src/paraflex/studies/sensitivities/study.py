@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.files.read import read_toml, validate
 from paraflex.studies.sensitivities.gradient import ModeGradients, mode_gradients
@@ -150,6 +151,7 @@ class Sensitivities:
                     }
 
 
+@checked_arguments()
 def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> SensitivityStudy:
     """Read a study file: that of a sweep, in which parameters need no values and nothing is sampled.
 
@@ -184,6 +186,7 @@ def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> Sensiti
     return SensitivityStudy(table.name, setting, parameters)
 
 
+@checked_arguments()
 def sensitivities(study: SensitivityStudy | str | Path, *, at: Mapping[str, float] | None = None) -> Sensitivities:
     """Derivatives of the metrics of a study's runs by its parameters.
 

@@ -94,7 +94,7 @@ def run_again(
         Of the parameters.
     path, mode : str
     watch : callable, optional
-        Told the time reached in the run [s]; a KeyboardInterrupt from it abandons the run.
+        Called with the time reached in the run [s]; a KeyboardInterrupt from it abandons the run.
 
     Raises
     ------

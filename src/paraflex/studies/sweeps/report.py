@@ -28,7 +28,7 @@ from paraflex.studies.sweeps.table import RESULTS, parts
 from paraflex.studies.sweeps.units import unit_of
 
 _FOUND = "result.json"
-# So much a metric may differ from its row's before the reader is told: other machines round otherwise.
+# So much a metric may differ from its row's before the reader is warned: other machines round otherwise.
 _SAME = 1e-6
 
 
@@ -42,7 +42,7 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
     folder : str or Path
         That `sweep`, `optimise` or `identify` wrote.
     on_progress : callable, optional
-        Told what is done now, in a few words.
+        Called with what is done now, in a few words.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def _again(
     """The picked runs, why some cannot be made, and which come out otherwise than their rows say."""
     if not picked:
         return {}, {}, []
-    compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism, lambda _: None)
+    compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism)
     table = studied.table
 
     stop = threading.Event()

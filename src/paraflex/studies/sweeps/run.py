@@ -66,7 +66,7 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     setting : Setting
     task : Task
     watch : callable, optional
-        Told the time reached in a run [s]; a KeyboardInterrupt from it abandons the task.
+        Called with the time reached in a run [s]; a KeyboardInterrupt from it abandons the task.
 
     Raises
     ------

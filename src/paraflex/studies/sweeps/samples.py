@@ -195,8 +195,8 @@ def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, s
     if kind == LIST:
         lengths = {p.name: len(p.values or ()) for p in parameters}
         if len(set(lengths.values())) > 1:
-            told = ", ".join(f"{name}: {length}" for name, length in lengths.items())
-            raise InputError(f"lists of different lengths ({told})", field="vary", remedy="give one value a design")
+            listed = ", ".join(f"{name}: {length}" for name, length in lengths.items())
+            raise InputError(f"lists of different lengths ({listed})", field="vary", remedy="give one value a design")
 
 
 def _check_total(total: int, field: str) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.compilation import compile_kernels_for
 from paraflex.errors import InputError, OutputError
 from paraflex.results import save_results
@@ -118,6 +119,7 @@ class SweepResult:
         return sweep_html(self)
 
 
+@checked_arguments()
 def sweep(
     study: SweepStudy | str | Path,
     folder: str | Path,
@@ -146,7 +148,7 @@ def sweep(
     limit : int, optional
         Of runs in this session, rounded up to whole designs.
     on_progress : callable, optional
-        Told how far it is whenever a design is done.
+        Called with how far it is whenever a design is done.
     run : callable
         What is done for a task: `run_task` but in tests.
 
@@ -173,7 +175,7 @@ def sweep(
         began = time.perf_counter()
         interrupted = False
         if not session.finished:
-            compile_kernels_for(study.model().mechanism, lambda _: None)
+            compile_kernels_for(study.model().mechanism)
             made = open_engine(engine, workers, cluster) if isinstance(engine, str) else engine
             interrupted = session.go(made, partial(run, study.setting), limit)
         counts = session.end()

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError, as_enum, suggestion
 from paraflex.files import Model, library_names, load_data, model_from
 from paraflex.files.generators import is_generated
@@ -139,6 +140,7 @@ class Setting:
         return IntegrationOptions(**{name: value for name, value in given.items() if value is not None})
 
 
+@given_as("a sweep", "a SweepStudy")
 @dataclass(frozen=True)
 class SweepStudy:
     """A sweep: a mechanism, what varies in it, what is run and what is kept.
@@ -192,6 +194,7 @@ class SweepStudy:
         }
 
 
+@checked_arguments()
 def load_sweep(file: str | FilePath) -> SweepStudy:
     """Read a study file.
 

@@ -23,7 +23,7 @@ _TOLD = re.compile(rf"\bin ({'|'.join(map(re.escape, _UNITS))})(?=[\s,.)]|$)")
 
 @cache
 def unit_of(place: Place) -> str:
-    """The unit of a number of a mechanism's file, or of a study's [integration]; empty where none is told."""
+    """The unit of a number of a mechanism's file, or of a study's [integration]; empty where none is given."""
     descriptions = list(_descriptions((ModelTable, IntegrationTable, SweepTable), place))
     found = [match.group(1) for match in map(_TOLD.search, descriptions) if match]
     return found[0] if found and len(set(found)) == 1 else ""

@@ -1,0 +1,394 @@
+"""What is given for an argument or a field: taken where it is clear what is meant, else refused by its name.
+
+Annotations say what is wanted: those of a function under `checked_arguments`, those of the fields of a dataclass that
+derives from `CheckedFields`. Whether numbers make sense, and names exist, is checked by whoever uses them.
+"""
+
+from __future__ import annotations
+
+import collections.abc as abc
+import sys
+import typing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache, reduce, wraps
+from inspect import signature
+from numbers import Integral, Number
+from operator import or_
+from pathlib import PurePath
+from types import NoneType, UnionType
+from typing import Any, ParamSpec, TypeVar
+
+from paraflex.errors import InputError, as_enum
+
+P = ParamSpec("P")
+R = TypeVar("R")
+C = TypeVar("C")
+
+_UNIONS = (typing.Union, UnionType)
+_LISTS = (tuple, list, abc.Sequence, abc.Iterable)
+_TABLES = (dict, abc.Mapping)
+
+# Takes what is given and the name of its field; returns what is wanted.
+Take = Callable[[Any, str], Any]
+
+
+def checked_arguments(**remedies: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Take the arguments of a function as their annotations say.
+
+    Parameters
+    ----------
+    **remedies : str
+        Of arguments whose types alone do not say how one comes by them: "give a dataset, as ... makes it".
+
+    Raises
+    ------
+    InputError
+        From the function: an argument that is something else.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        names = tuple(signature(function).parameters)
+
+        @wraps(function)
+        def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+            takes = _of_function(function)
+            given: list[Any] = list(args)
+            named: dict[str, Any] = dict(kwargs)
+            try:
+                for k, name in enumerate(names[: len(given)]):
+                    if name in takes:
+                        given[k] = takes[name](given[k], name)
+                for name, value in named.items():
+                    if name in takes:
+                        named[name] = takes[name](value, name)
+            except InputError as error:
+                raise _with_remedy(error, remedies) from None
+            return function(*given, **named)  # type: ignore[reportCallIssue]
+
+        return checked
+
+    return decorate
+
+
+class CheckedFields:
+    """Base of dataclasses whose fields are taken as their annotations say.
+
+    A dataclass with a `__post_init__` of its own calls this one first. `_table` is what errors name before the fields,
+    with the name of the object where it has one.
+    """
+
+    _table = ""
+    # Fields whose class checks them itself, in words of its own.
+    _own: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, take in _of_class(type(self)).items():
+            value = getattr(self, name)
+            taken = take(value, _Field(self, name))  # type: ignore[arg-type]
+            if taken is not value:
+                object.__setattr__(self, name, taken)
+
+
+class _Field:
+    """The name of a field, written only where an error names it."""
+
+    __slots__ = ("name", "owner")
+
+    def __init__(self, owner: CheckedFields, name: str) -> None:
+        self.owner, self.name = owner, name
+
+    def __str__(self) -> str:
+        own = getattr(self.owner, "name", "")
+        parts = (self.owner._table, own if isinstance(own, str) and self.owner._table else "", self.name)
+        return ".".join(part for part in parts if part)
+
+
+def refused(value: object, field: object, what: str, remedy: str) -> InputError:
+    """The error for something else than what is wanted."""
+    if value is None:
+        return InputError("is not given", field=str(field), remedy=remedy)
+    return InputError(f"not {what}", field=str(field), value=value, remedy=remedy)
+
+
+def _with_remedy(error: InputError, remedies: Mapping[str, str]) -> InputError:
+    remedy = remedies.get(error.field, error.remedy)
+    return InputError(error.problem, field=error.field, value=error.value, remedy=remedy, source=error.source)
+
+
+@cache
+def _of_function(function: Callable[..., Any]) -> dict[str, Take]:
+    given = signature(function).parameters
+    hints = {name: each.annotation for name, each in given.items() if each.annotation is not each.empty}
+    return _takes(hints, function.__module__)
+
+
+@cache
+def _of_class(kind: type) -> dict[str, Take]:
+    found: dict[str, Take] = {}
+    for base in reversed(kind.__mro__):
+        if is_dataclass(base):
+            own = vars(base).get("__annotations__", ())
+            hints = {each.name: each.type for each in fields(base) if each.name in own}
+            found |= _takes(hints, base.__module__)
+    for name in getattr(kind, "_own", ()):
+        found.pop(name, None)
+    return found
+
+
+def _takes(hints: Mapping[str, Any], module: str) -> dict[str, Take]:
+    names = vars(sys.modules[module])
+    found = {name: take_as(_resolved(hint, names)) for name, hint in hints.items()}
+    return {name: take for name, take in found.items() if take is not None}
+
+
+def _resolved(hint: Any, names: dict[str, Any]) -> Any:
+    """An annotation as a type; Any where its names are known to type checkers alone."""
+    try:
+        return eval(hint, names) if isinstance(hint, str) else hint
+    except NameError:
+        return Any
+
+
+@cache
+def take_as(hint: Any) -> Take | None:
+    """How what is given is taken as a type; None where anything is."""
+    if hint in _PLAIN:
+        return _PLAIN[hint]
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if origin in _UNIONS:
+        return _as_one_of(hint, inner)
+    if _is_row(hint):
+        return _as_row(hint, inner)
+    if origin in _LISTS:
+        return _as_many(hint, inner[0], tuple if origin is tuple else list)
+    if origin in _TABLES or hint is dict:
+        return _as_table(hint, inner)
+    if origin is abc.Callable:
+        return _as_callable(hint)
+    return _as_instance(hint) if isinstance(hint, type) and origin is None else None
+
+
+def _is_row(hint: Any) -> bool:
+    """Whether a type is of so many values: a place, and not a list of any length."""
+    return typing.get_origin(hint) is tuple and typing.get_args(hint)[-1:] != (Ellipsis,)
+
+
+def _as_number(value: Any, field: str) -> Any:
+    if isinstance(value, float | Number) or getattr(value, "ndim", None) == 0:
+        return value
+    raise refused(value, field, "a number", "give a number")
+
+
+def _as_whole(value: Any, field: str) -> Any:
+    if isinstance(value, Integral) and not isinstance(value, bool):
+        return value
+    raise refused(value, field, "a whole number", "give a whole number")
+
+
+def _as_text(value: Any, field: str) -> Any:
+    """A text; of what has a name, its name."""
+    if isinstance(value, str):
+        return value
+    name = getattr(value, "name", None)
+    if is_dataclass(value) and isinstance(name, str):
+        return name
+    raise refused(value, field, "a text", "give a text in quotes")
+
+
+def _as_truth(value: Any, field: str) -> Any:
+    if isinstance(value, bool) or getattr(getattr(value, "dtype", None), "kind", "") == "b":
+        return value
+    raise refused(value, field, "True or False", "give one of the two")
+
+
+_PLAIN: dict[Any, Take | None] = {
+    float: _as_number, int: _as_whole, str: _as_text, bool: _as_truth, Any: None, object: None, NoneType: None,
+}  # fmt: skip
+
+
+def _as_instance(kind: type) -> Take | None:
+    """An object of a class, or what its `taken_from` makes of something else."""
+    if getattr(kind, "_is_protocol", False) and not getattr(kind, "_is_runtime_protocol", False):
+        return None
+    if issubclass(kind, Enum):
+        return lambda value, field: as_enum(kind, value, str(field))
+    make = getattr(kind, "taken_from", None)
+
+    def take(value: Any, field: str) -> Any:
+        if isinstance(value, kind):
+            return value
+        made = None if make is None else make(value, field)
+        if made is not None:
+            return made
+        raise refused(value, field, _noun(kind), f"give {_wanted(kind)}")
+
+    return take
+
+
+def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
+    """One of several types: what is of one of them, else what one of them can be made from."""
+    takes = {kind: take_as(kind) for kind in kinds if kind is not NoneType}
+    if any(isinstance(kind, type) and issubclass(kind, PurePath) for kind in kinds):
+        # The name of an object is no name of a file.
+        takes.pop(str, None)
+    if any(take is None for take in takes.values()):
+        return None
+    if len(takes) == 1 and str not in kinds:
+        (only,) = takes.values()
+        return lambda value, field: None if value is None else only(value, field)  # type: ignore[misc]
+    optional = NoneType in kinds
+    classes = tuple(kind for kind in kinds if isinstance(kind, type) and typing.get_origin(kind) is None)
+    plain = tuple(kind for kind in classes if kind is str or (kind not in _PLAIN and not issubclass(kind, Enum)))
+
+    def take(value: Any, field: str) -> Any:
+        if (value is None and optional) or isinstance(value, plain) or type(value) in classes:
+            return value
+        for each in takes.values():
+            try:
+                return each(value, field)  # type: ignore[misc]
+            except InputError:
+                continue
+        raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+
+    return take
+
+
+def _as_row(hint: Any, kinds: Sequence[Any]) -> Take:
+    """So many values, each of its type: a place in the plane."""
+    takes = [take_as(kind) for kind in kinds]
+
+    def take(value: Any, field: str) -> Any:
+        if isinstance(value, str | Mapping) or not isinstance(value, Iterable) or _length(value) != len(takes):
+            raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+        return _same(value, tuple(each(one, field) if each else one for each, one in zip(takes, value, strict=True)))
+
+    return take
+
+
+def _as_many(hint: Any, kind: Any, collect: Callable[[Iterable[Any]], Any]) -> Take:
+    """Any number of one type; one alone is a list of one."""
+    one = take_as(kind)
+
+    def take(value: Any, field: str) -> Any:
+        if isinstance(value, str | Mapping) or is_dataclass(value) or not isinstance(value, Iterable):
+            if value is None or one is None:
+                raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+            return collect([one(value, field)])
+        if one is None or hasattr(value, "dtype"):
+            return value
+        return _same(value, collect(one(each, field) for each in value))
+
+    return take
+
+
+def _as_table(hint: Any, kinds: Sequence[Any]) -> Take:
+    """Values by their keys."""
+    key, item = (take_as(kind) for kind in kinds) if kinds else (None, None)
+
+    def take(value: Any, field: str) -> Any:
+        if not isinstance(value, Mapping):
+            raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+        if key is None and item is None:
+            return value
+        names, items = list(value.keys()), list(value.values())
+        made_names = [key(name, field) for name in names] if key else names
+        made = [item(each, f"{field}.{name}") for name, each in zip(names, items, strict=True)] if item else items
+        return (
+            value
+            if _same(names, made_names) is names and _same(items, made) is items
+            else dict(zip(made_names, made, strict=True))
+        )
+
+    return take
+
+
+def _as_callable(hint: Any) -> Take:
+    def take(value: Any, field: str) -> Any:
+        if callable(value):
+            return value
+        raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+
+    return take
+
+
+def _length(value: Any) -> int:
+    return len(value) if hasattr(value, "__len__") else -1
+
+
+def _same(given: Any, made: Any) -> Any:
+    """What was given, where it is what was made."""
+    return given if type(given) is type(made) and all(a is b for a, b in zip(given, made, strict=True)) else made
+
+
+_NOUNS = {float: "a number", int: "a whole number", str: "a text", bool: "True or False"}
+_COUNTS = {2: "two", 3: "three"}
+# What objects of a class are called, and how one comes by them.
+_GIVEN_AS: dict[Any, tuple[str, str]] = {}
+
+
+def given_as(noun: str, wanted: str = "") -> Callable[[C], C]:
+    """Say what errors call objects of a class, and what they ask for: the names of the classes by default."""
+
+    def register(kind: C) -> C:
+        _GIVEN_AS[kind] = noun, wanted
+        return kind
+
+    return register
+
+
+def _noun(hint: Any) -> str:
+    """What a type is called in the message of an error."""
+    if hint in _NOUNS:
+        return _NOUNS[hint]
+    if _stripped(hint) in _GIVEN_AS:
+        return _GIVEN_AS[_stripped(hint)][0]
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if origin in _UNIONS:
+        return _either([_noun(kind) for kind in _members(inner)])
+    if _is_row(hint):
+        return f"{_COUNTS.get(len(inner), str(len(inner)))} numbers" if set(inner) == {float} else "such a row"
+    if origin in _LISTS:
+        return "a list"
+    if origin in _TABLES or hint is dict:
+        return "a dictionary"
+    if origin is abc.Callable:
+        return "a function"
+    if issubclass(hint, PurePath):
+        return "a file name"
+    return f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
+
+
+def _wanted(hint: Any) -> str:
+    """What to give instead."""
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    wanted = _GIVEN_AS.get(_stripped(hint), ("", ""))[1]
+    if wanted:
+        return wanted
+    if origin in _UNIONS:
+        return _either([_wanted(kind) for kind in _members(inner)])
+    if origin in _LISTS and not _is_row(hint):
+        return f"a list, each {_wanted(inner[0])}"
+    if origin in _TABLES and inner and Any not in inner:
+        return f"a dictionary, {{{_noun(inner[0]).replace('a text', 'name')}: {_noun(inner[1])}}}"
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return "one of " + ", ".join(f'"{member.value}"' for member in hint)
+    return _noun(hint)
+
+
+def _stripped(hint: Any) -> Any:
+    """A type that may be None, without that."""
+    kinds = [kind for kind in typing.get_args(hint) if kind is not NoneType]
+    return reduce(or_, kinds) if typing.get_origin(hint) in _UNIONS and kinds else hint
+
+
+def _members(kinds: Sequence[Any]) -> list[Any]:
+    """Of a union, without None; names of files and words to choose from are more than texts."""
+    named = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, PurePath | Enum)]
+    return [kind for kind in kinds if kind is not NoneType and not (named and kind is str)]
+
+
+def _either(names: Sequence[str]) -> str:
+    names = list(dict.fromkeys(names))
+    return " or ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]

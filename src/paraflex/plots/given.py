@@ -1,0 +1,88 @@
+"""What figures are drawn of: results, or the folder or file they were written to; and of which kind they must be."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from functools import cache, partial, wraps
+from inspect import signature
+from pathlib import Path
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from paraflex.arguments import checked_arguments
+from paraflex.errors import InputError
+from paraflex.plots.style import journal_style
+from paraflex.results.kinds import kind_of, wrong_kind
+
+D = TypeVar("D")
+P = ParamSpec("P")
+
+
+def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate[D | str | Path, P], Figure]:
+    """Make the function of a figure: in this style, of results or of the folder or file that holds them.
+
+    Raises
+    ------
+    InputError
+        From the function: no results, those of another kind than the catalogue has for it, or a wrong argument.
+    """
+    take: Callable[..., Figure] = checked_arguments(
+        figures="give what the study's result has as plain numbers, or the folder it was written to",
+        table="give the folder of a study of many runs",
+    )(function)
+
+    first = next(iter(signature(function).parameters))
+
+    @wraps(function)
+    def draw(*args: Any, **kwargs: Any) -> Figure:
+        data: Any = args[0] if args else kwargs.pop(first, None)
+        if isinstance(data, str | os.PathLike):
+            data = _read(Path(data), function.__name__)
+        elif isinstance(data, xr.Dataset):
+            _check_kind(data, function.__name__)
+        with journal_style():
+            return _drawn(data, first, partial(take, data, *args[1:], **kwargs))
+
+    return draw
+
+
+def _drawn(data: Any, field: str, draw: Callable[[], Figure]) -> Figure:
+    """A figure; of numbers that lack what it shows, an error that says so."""
+    try:
+        return draw()
+    except KeyError as error:
+        if isinstance(data, Mapping) and not isinstance(data, xr.Dataset) and error.args[0] not in data:
+            remedy = "give what the study's result has as plain numbers, or the folder it was written to"
+            raise InputError(f'lacks "{error.args[0]}"', field=field, remedy=remedy) from error
+        raise
+
+
+def _read(path: Path, figure: str) -> Any:
+    from paraflex.plots.sources import open_source
+
+    source = open_source(path)
+    kinds = _kinds()[figure]
+    if source.kind not in kinds:
+        raise wrong_kind(source.kind, kinds, str(path))
+    return source.designs if kinds[source.kind] == "designs" else source.data
+
+
+def _check_kind(data: xr.Dataset, figure: str) -> None:
+    kinds = _kinds()[figure]
+    if kind_of(data) not in kinds:
+        raise wrong_kind(kind_of(data), kinds)
+
+
+@cache
+def _kinds() -> dict[str, dict[str, str]]:
+    """Of every figure the kinds of results that it can be drawn of, each with what its function takes."""
+    from paraflex.plots.catalogue import CATALOGUE
+
+    found: dict[str, dict[str, str]] = {}
+    for kind, figures in CATALOGUE.items():
+        for figure in figures:
+            found.setdefault(figure.name, {})[kind] = figure.takes
+    return found

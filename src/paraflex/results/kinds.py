@@ -1,0 +1,50 @@
+"""Which of the three kinds a dataset of results is, and what becomes of another than is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import xarray as xr
+
+from paraflex.arguments import checked_arguments, given_as
+from paraflex.errors import InputError
+
+given_as("a dataset of results", "a dataset: what tracking_dataset or open_results returns, or the data of a study")(
+    xr.Dataset
+)
+
+# What makes a dataset of each kind.
+_MADE_BY = {
+    "tracking": "tracking_dataset or run_study",
+    "motion": "motion_dataset",
+    "verification": "Verification.dataset",
+}
+
+
+@checked_arguments()
+def kind_of(data: xr.Dataset) -> str:
+    """What a dataset is of: a "verification", a "motion" without a path, or "tracking"."""
+    if "model" in data.dims:
+        return "verification"
+    return "motion" if data.attrs.get("kind") == "motion" else "tracking"
+
+
+def check_kind(data: xr.Dataset, *kinds: str) -> None:
+    """None if a dataset is of one of some kinds.
+
+    Raises
+    ------
+    InputError
+        It is of another.
+    """
+    if kind_of(data) not in kinds:
+        raise wrong_kind(kind_of(data), kinds)
+
+
+def wrong_kind(kind: str, kinds: Iterable[str], field: str = "data") -> InputError:
+    """The error for results of another kind than is wanted."""
+    wanted = list(kinds)
+    makers = [_MADE_BY[each] for each in wanted if each in _MADE_BY]
+    remedy = "give those of the kind " + " or ".join(f'"{each}"' for each in wanted)
+    remedy += f", as {' or '.join(makers)} makes them" if len(makers) == len(wanted) else ""
+    return InputError(f'results of the kind "{kind}"', field=field, remedy=remedy)
