@@ -320,7 +320,7 @@ def test_a_link_too_short_to_assemble_tells_the_gap_and_where(tmp_path):
     done = paraflex("run", "-m", str(short), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
     assert re.search(r"broken\.toml: assembly: the loops do not close: a gap of 0\.\d+ m remains in \w+ ", done.stderr)
-    assert "correct its angles or the lengths" in done.stderr
+    assert "; correct angles of the assembly, lengths or places of points" in done.stderr
     # The motors at these joints come to nothing, and the arm is as short as it is thick.
     *warned, error = done.stderr.splitlines()
     assert error.startswith("error: ")

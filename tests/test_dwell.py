@@ -262,7 +262,7 @@ def test_runs_stop_and_fail_in_the_dwell_with_what_was_computed():
         task.simulate("+-++", options=IntegrationOptions(tolerance=1e-4, max_steps=whole.solution.steps - 3))
     partial = caught.value.partial
     # Of the whole run, not of its part with brakes.
-    assert caught.value.cause == f"no end after {whole.solution.steps - 3} steps"
+    assert caught.value.cause == f"the run has not ended after {whole.solution.steps - 3} steps,"
     assert caught.value.moment.step == partial.solution.steps > 100
     assert partial.solution.t[-1] <= caught.value.moment.time < 2.0 * SIDE.duration
     assert SIDE.duration < partial.solution.t[-1] < 2.0 * SIDE.duration

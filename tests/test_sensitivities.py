@@ -380,7 +380,7 @@ def test_unknown_point_and_a_run_that_fails(tmp_path):
     stopped = replace(
         study, setting=replace(study.setting, integration=dict(study.setting.integration) | {"max_steps": 3})
     )
-    with pytest.raises(NumericalError, match="no end after 3 steps"):
+    with pytest.raises(NumericalError, match="has not ended after 3 steps, at t = "):
         sensitivities(stopped)
 
 

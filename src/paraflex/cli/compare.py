@@ -22,6 +22,7 @@ from paraflex.cli.request import (
     at_fault,
     find_modes,
     find_path,
+    of_assembly,
     plan_study,
     results_folder,
     write_json,
@@ -126,9 +127,7 @@ def _motion(model: Model, request: CompareRequest) -> Case:
             start = consistent_state(system, model.mechanism.assembly(assembly))
         return motion_case(model.mechanism, duration, samples=samples, torques=dict(model.study.torques), start=start)
     except AssemblyError as error:
-        raise InputError(
-            str(error), field="assembly", remedy="correct its angles or the lengths", source=model.source
-        ) from error
+        raise of_assembly(error, model) from error
     except InputError as error:
         raise at_fault(error, model) from None
 

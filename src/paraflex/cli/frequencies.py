@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.checks import BALANCED
+from paraflex.cli.request import UNBALANCED
 from paraflex.dynamics import (
     State,
     System,
@@ -83,7 +84,7 @@ def _balanced(system: System, state: State, held: list[str]) -> State:
     try:
         return static_equilibrium(system, state, held)
     except AssemblyError as error:
-        raise InputError(error.cause, field="--balanced", remedy="leave it out") from error
+        raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
 
 
 def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:

@@ -18,8 +18,10 @@ from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
     TROUBLE,
+    UNBALANCED,
     StudyRequest,
     at_fault,
+    of_assembly,
     report_too,
     results_folder,
     write_json,
@@ -124,9 +126,7 @@ def _simulate(
     except IntegrationError as error:
         return error.partial
     except AssemblyError as error:
-        raise InputError(
-            str(error), field="assembly", remedy="correct its angles or the lengths", source=model.source
-        ) from error
+        raise of_assembly(error, model) from error
     except InputError as error:
         raise at_fault(error, model) from None
     finally:
@@ -152,7 +152,7 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     try:
         found = balanced_state(system, undeformed, {motor.joint: JointMotion() for motor in mechanism.motors})
     except AssemblyError as error:
-        raise InputError(error.cause, field="--balanced", remedy="leave it out") from error
+        raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
     return found if model.start is None else start_state(system, model.start, q=found.q)
 
 

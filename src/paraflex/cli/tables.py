@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -101,9 +101,13 @@ def _table(title: str) -> Table:
 
 def warn_of_doubts(console: Console, figures: Mapping[str, Any]) -> None:
     """What makes results doubtful, before a number of theirs is printed."""
+    print_findings(console, [Finding.from_dict(kept) for kept in figures["verdict"]["findings"]])
+
+
+def print_findings(console: Console, findings: Sequence[Finding]) -> None:
+    """A line for each finding, which is not printed again when the command ends."""
     from paraflex.results.doubts import doubt_lines  # with xarray, which descriptions of mechanisms do without
 
-    findings = [Finding.from_dict(kept) for kept in figures["verdict"]["findings"]]
     for line in doubt_lines(findings):
         console.print(line, soft_wrap=True)
     printed(findings)
