@@ -36,7 +36,7 @@ from paraflex.mechanism import (
     Start,
     four_bars_in_a_row,
 )
-from paraflex.results.motion import point_motion
+from paraflex.dynamics.points import point_motion
 
 NUMBERS, TARGET, LIMIT, REPEATS = (1, 2, 5, 10, 20, 50), 1e-5, 20.0, 3
 DURATION, SAMPLES = 0.3, 31

@@ -26,7 +26,7 @@ from paraflex.compilation import compile_kernels
 from paraflex.errors import IntegrationError
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.results.motion import point_motion
+from paraflex.dynamics.points import point_motion
 from paraflex.simulate import TrackingTask, plan_tracking
 from paraflex.studies import load_sweep, sweep
 

@@ -13,6 +13,7 @@ import scipy.optimize
 import twins
 from paraflex import elastodynamics
 from paraflex.dynamics import build_system, constant_signals, pack_signals
+from paraflex.dynamics.points import tip_deflection
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import ActuationError, InputError, IntegrationError
 from paraflex.fem import ReferenceCondition
@@ -34,7 +35,6 @@ from paraflex.mechanism import (
     Section,
 )
 from paraflex.results import tracking_dataset
-from paraflex.results.motion import tip_deflection
 from paraflex.simulate import plan_tracking
 
 LENGTH, WIDTH, THICKNESS = 0.4, 0.02, 0.004

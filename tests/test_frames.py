@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from paraflex.dynamics import build_system, natural_frequencies, start_state, static_equilibrium
+from paraflex.dynamics.points import point_motion
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism import (
     AppliedTorque,
@@ -29,7 +30,6 @@ from paraflex.mechanism import (
     Start,
     WeldJoint,
 )
-from paraflex.results.motion import point_motion
 
 CANTILEVER, PINNED, FREE = ReferenceCondition
 LINEAR, SECOND_ORDER = Geometry

@@ -8,6 +8,7 @@ import pytest
 
 import twins
 from paraflex.dynamics import build_system, consistent_state, pack_signals
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions, integrate
@@ -31,7 +32,6 @@ from paraflex.mechanism import (
     Section,
     raparm_i,
 )
-from paraflex.results.motion import point_motion
 from paraflex.simulate import plan_tracking
 
 RUBBER = Material(youngs_modulus=5e6, density=1100.0)

@@ -12,6 +12,7 @@ import xarray as xr
 import paraflex as pf
 from conftest import make_linkage
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
@@ -37,7 +38,6 @@ from paraflex.mechanism import (
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset
 from paraflex.results.drawing import drawing_coordinates, system_drawing
-from paraflex.results.motion import point_motion
 from paraflex.results.outlines import Hold, Outline, outline, outline_motion, stiff_shape
 from paraflex.results.storage import SCHEMA
 

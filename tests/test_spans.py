@@ -10,6 +10,7 @@ import scipy.optimize
 
 from paraflex.cli.inspect import describe
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
+from paraflex.dynamics.points import tip_deflection
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import load
@@ -27,7 +28,6 @@ from paraflex.mechanism import (
     Section,
     finite_segments,
 )
-from paraflex.results.motion import tip_deflection
 from test_cli import paraflex
 from test_segments import first_frequency
 

@@ -7,6 +7,7 @@ import pytest
 import scipy.optimize
 
 from paraflex.dynamics import State, build_system, consistent_state, pack_signals
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.mechanism import (
@@ -20,7 +21,6 @@ from paraflex.mechanism import (
     Section,
     TorsionalSpring,
 )
-from paraflex.results.motion import point_motion
 
 MASS, INERTIA, REACH = 1.3, 0.02, 0.4
 

@@ -12,6 +12,7 @@ from paraflex.dynamics import (
     moment_signals,
     start_state,
 )
+from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.start import point_rows, static_shape
 from paraflex.dynamics.state import mass_matrix, point_position
 from paraflex.errors import AssemblyError, InputError
@@ -36,7 +37,6 @@ from paraflex.mechanism import (
     Start,
 )
 from paraflex.motion import simulate_motion
-from paraflex.results.motion import point_motion
 from test_cli import paraflex
 
 LENGTH, EI = 0.8, 70e9 * 0.02 * 0.004**3 / 12

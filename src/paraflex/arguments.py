@@ -272,7 +272,8 @@ def _as_many(hint: Any, kind: Any, collect: Callable[[Iterable[Any]], Any]) -> T
     one = take_as(kind)
 
     def take(value: Any, field: str) -> Any:
-        if isinstance(value, str | Mapping) or is_dataclass(value) or not isinstance(value, Iterable):
+        alone = is_dataclass(value) and not isinstance(value, Sequence)
+        if isinstance(value, str | Mapping) or alone or not isinstance(value, Iterable):
             if value is None or one is None:
                 raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
             return collect([one(value, field)])

@@ -52,7 +52,7 @@ def study_findings(
 
         part = part_of(chosen, duration)
         if part is not None:
-            yield part.finding
+            yield part.finding()
     yield from path_findings(model, chosen, name, duration)
     try:
         task = _planned(model, chosen, duration, assembly)

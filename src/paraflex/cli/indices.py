@@ -9,7 +9,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from paraflex.cli.request import COMPLETE, INTERRUPTED, study_folder
 from paraflex.cli.search import plain_table
-from paraflex.cli.tables import number, plain_console, warn_of_parts
+from paraflex.cli.tables import number, plain_console, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
 from paraflex.studies import IndicesResult, SweepProgress, load_indices, sobol_indices
@@ -50,10 +50,11 @@ def indices_command(request: IndicesRequest) -> int:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED
     save_search_figures(result.figures(), folder / "figures")
+    verdict = study.sweep.setting.verdict()
+    warn_of(console if request.json else plain_console(), verdict)
     if request.json:
-        print(json.dumps(result.figures(), indent=2))
+        print(json.dumps(result.figures() | {"verdict": verdict.to_dict()}, indent=2))
     else:
-        warn_of_parts(plain_console(), study.sweep.setting.parts())
         _report(result)
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)
     return COMPLETE

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, study_folder
-from paraflex.cli.tables import plain_console, warn_of_parts
+from paraflex.cli.tables import plain_console, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
 from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
@@ -51,10 +51,12 @@ def search_command(
         console.print("interrupted before the first design was done")
         return INTERRUPTED
     save_search_figures({"kind": _kind(result)} | result.figures(), request.folder / "figures")
+    verdict = study.base.setting.verdict()
+    warn_of(console if request.json else plain_console(), verdict)
     if request.json:
-        print(json.dumps(result.figures() | {"folder": str(result.folder), "fresh": result.fresh}, indent=2))
+        more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
+        print(json.dumps(result.figures() | more, indent=2))
     else:
-        warn_of_parts(plain_console(), study.base.setting.parts())
         report(result)
         _say_end(console, result, request.folder)
     if result.interrupted:

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import COMPLETE, study_folder
-from paraflex.cli.tables import number, plain_console, warn_of_parts
+from paraflex.cli.tables import number, plain_console, warn_of_doubts
 from paraflex.errors import InputError, OutputError
 from paraflex.plots import save_elasticities
 from paraflex.studies import Sensitivities, load_sensitivities, sensitivities
@@ -53,14 +53,14 @@ def sensitivity_command(request: SensitivityRequest) -> int:
         _claim(folder, asked)
         say_replaced(folder, "sensitivity")
         found = sensitivities(study, at=at)
-        figures = {"content": asked} | found.told()
+        figures = {"content": asked, "verdict": setting.verdict().to_dict()} | found.told()
         _write(folder, figures, found)
         save_elasticities(figures, folder / FIGURES)
     console = plain_console()
+    warn_of_doubts(plain_console(stderr=True) if request.json else console, figures)
     if request.json:
         print(json.dumps(figures, indent=2))
         return COMPLETE
-    warn_of_parts(console, setting.parts())
     for row in range(len(found.rows)):
         _print(console, found, row)
     console.print(f"{folder / RESULTS}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)

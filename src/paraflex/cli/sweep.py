@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, study_folder
-from paraflex.cli.tables import plain_console, warn_of_parts
+from paraflex.cli.tables import plain_console, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.studies import SweepProgress, SweepResult, load_sweep, sweep
 from paraflex.studies.sweeps import SweepStudy
@@ -42,11 +42,12 @@ def sweep_command(request: SweepRequest) -> int:
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
     told = request.report and bool(result.done) and _write_report(console, folder)
+    verdict = study.setting.verdict()
+    warn_of(console if request.json else plain_console(), verdict)
     if request.json:
         parts = {path: part.figures() for path, part in study.setting.parts().items()}
-        print(json.dumps(_figures(result) | {"part": parts}, indent=2))
+        print(json.dumps(_figures(result) | {"part": parts, "verdict": verdict.to_dict()}, indent=2))
     else:
-        warn_of_parts(plain_console(), study.setting.parts())
         _report(console, result)
         if told:
             console.print(f"report: {folder / REPORT}", soft_wrap=True)

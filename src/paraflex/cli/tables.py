@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -14,7 +14,6 @@ from paraflex.findings import Finding
 
 if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
-    from paraflex.results.metrics import Part
     from paraflex.simulate import TrackingTask
     from paraflex.studies import StudyResult
 
@@ -27,16 +26,19 @@ def plain_console(*, stderr: bool = False) -> Console:
     return Console(highlight=False, markup=False, stderr=stderr)
 
 
-def warn_of_part(console: Console, part: Mapping[str, Any] | None) -> None:
-    """Say which part of a path was run, where it was not the whole."""
-    if part is not None:
-        console.print(f"warning: {part['message']}", soft_wrap=True)
+def warn_of(console: Console, findings: Iterable[Finding]) -> None:
+    """A line for each finding."""
+    from paraflex.results.doubts import doubt_lines  # with xarray, which descriptions of mechanisms do without
+
+    findings = list(findings)
+    for line in doubt_lines(findings):
+        console.print(line, soft_wrap=True)
+    printed(findings)
 
 
-def warn_of_parts(console: Console, parts: Mapping[str, Part]) -> None:
-    """The same of a study's paths."""
-    for path, part in parts.items():
-        console.print(f'warning: path "{path}": {part}', soft_wrap=True)
+def warn_of_doubts(console: Console, figures: Mapping[str, Any]) -> None:
+    """What makes results doubtful, by their summary, before a number of theirs is printed."""
+    warn_of(console, map(Finding.from_dict, figures["verdict"]["findings"]))
 
 
 def print_study(console: Console, figures: dict[str, Any], task: TrackingTask, model: str) -> None:
@@ -97,20 +99,6 @@ def _table(title: str) -> Table:
     table = Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
     table.add_column("mode", no_wrap=True)
     return table
-
-
-def warn_of_doubts(console: Console, figures: Mapping[str, Any]) -> None:
-    """What makes results doubtful, before a number of theirs is printed."""
-    print_findings(console, [Finding.from_dict(kept) for kept in figures["verdict"]["findings"]])
-
-
-def print_findings(console: Console, findings: Sequence[Finding]) -> None:
-    """A line for each finding, which is not printed again when the command ends."""
-    from paraflex.results.doubts import doubt_lines  # with xarray, which descriptions of mechanisms do without
-
-    for line in doubt_lines(findings):
-        console.print(line, soft_wrap=True)
-    printed(findings)
 
 
 def validity(console: Console, verdicts: Mapping[str, Any]) -> None:

@@ -25,7 +25,7 @@ from paraflex.cli.request import (
     with_frames,
     write_json,
 )
-from paraflex.cli.tables import plain_console, warn_of_part
+from paraflex.cli.tables import plain_console, warn_of_doubts
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
@@ -79,11 +79,11 @@ def verify_command(request: VerifyRequest) -> int:
     figures = agreement(verification, model.study.error) | {"parameters": parameters}
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
         _write(verification, figures, parameters, folder, report=request.report)
+    warn_of_doubts(console if request.json else plain_console(), figures)
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
         out = plain_console()
-        warn_of_part(out, figures["part"])
         for mode in figures["modes"]:
             print_agreement(out, figures, mode)
         console.print(f"{time.perf_counter() - began:.1f} s; numbers, figures{report_too(request)} in {folder}")

@@ -9,9 +9,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.dynamics.points import PointMotion
 from paraflex.fem import BeamMesh, SpanProperties
 from paraflex.mechanism import Joint, PointRef
-from paraflex.results.motion import PointMotion
 from paraflex.results.outlines import Outline
 
 Array = NDArray[np.float64]

@@ -19,6 +19,7 @@ from paraflex.dynamics import (
     records,
     reference_pose,
 )
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import AssemblyError, InputError, Moment, UnreachablePathError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import CLOSED, SINGULAR, close_path, make_closure_scratch, task_values
@@ -75,8 +76,14 @@ class RigidMotion:
 
     @property
     def desired(self) -> PathMotion:
-        """Of the end-effector at the times t."""
-        return self.path.evaluate(self.t)
+        """Of the end-effector at the times t: the path's, and its own where x or y is no task coordinate."""
+        planned, effector = self.path.evaluate(self.t), self.mechanism.end_effector
+        assert effector is not None
+        given = [name in effector.coordinates for name in ("x", "y")]
+        if all(given):
+            return planned
+        own = point_motion(self.system, effector.point, self.q, self.v, self.a)
+        return PathMotion(*(np.where(given, path, place) for path, place in zip(planned, own, strict=True)))
 
 
 @checked_arguments()

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.findings import Finding
 from paraflex.plots.agreement import printed
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.curves import TIP_LABEL, TIP_TITLE, look, thinned, unit_for
@@ -18,6 +19,7 @@ from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, verify_command_line
 from paraflex.report.text import NOTHING, count, number, symbol, table
 from paraflex.report.tracking import errors, torque_unit
+from paraflex.results.doubts import doubt_lines
 from paraflex.results.kinds import check_kind
 from paraflex.results.metrics import SPAN_WORDS, ErrorSpan
 
@@ -96,7 +98,8 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
         selected=runs.models.index(reference),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=[
+        notes=doubt_lines(map(Finding.from_dict, figures.get("verdict", {}).get("findings", [])))
+        + [
             f"Mode {name}, {printed(model)}: {one['message']}"
             for name, mode in figures["modes"].items()
             for model, one in mode["models"].items()

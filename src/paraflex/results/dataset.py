@@ -204,7 +204,7 @@ def _findings(records: Sequence[Record]) -> Iterator[Finding]:
     yield from doubtful_numbers(task.mechanism)
     part = part_of(task.path, float(task.motion.t[-1]))
     if part is not None:
-        yield part.finding
+        yield part.finding()
     beyond = [(one.validity, one.mode) for one in records if one.validity is not None and not one.validity.holds]
     for validity, mode in sorted(beyond, key=lambda pair: -pair[0].ratio):
         yield validity.finding(f"{MODE}{mode}")

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from paraflex.display import facts, page, sentence, table
+from paraflex.dynamics.points import point_motion
 from paraflex.integrators import METHODS, Solution
 from paraflex.motion import MotionRun
 from paraflex.results.metrics import during_motion, rms
-from paraflex.results.motion import point_motion
 from paraflex.results.outlines import deflections
 from paraflex.simulate import TrackingRun
 

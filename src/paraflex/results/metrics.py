@@ -204,10 +204,9 @@ class Part:
             "of its length; errors are of that part"
         )
 
-    @property
-    def finding(self) -> Finding:
+    def finding(self, place: str = "study.duration") -> Finding:
         """The same, to be kept with results."""
-        return Finding("path-cut-short", "study.duration", str(self), f"the path takes {self.path:.4g} s")
+        return Finding("path-cut-short", place, str(self), f"the path takes {self.path:.4g} s")
 
     def figures(self) -> dict[str, float | str]:
         """As plain numbers, and in words."""

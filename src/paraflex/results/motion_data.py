@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.dynamics.points import point_motion, tip_deflection
 from paraflex.findings import Finding
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
@@ -21,7 +22,6 @@ from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.joint_loads import joint_loads
 from paraflex.results.kinds import check_kind
-from paraflex.results.motion import point_motion, tip_deflection
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.record import FIGURES
 from paraflex.results.storage import SCHEMA

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import given_as
 from paraflex.dynamics import Marker, System, end_markers, material_angle
+from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.findings import Finding
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, drawing, system_drawing
 from paraflex.results.joint_loads import joint_loads
-from paraflex.results.motion import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.results.outlines import outline_motion, outlines, segment_motion
 from paraflex.simulate import TrackingRun, TrackingTask
 from paraflex.validity import Validity

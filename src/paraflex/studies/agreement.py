@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import as_enum
+from paraflex.findings import Finding, Verdict
 from paraflex.results.dataset import part_of
-from paraflex.results.metrics import ErrorSpan, during_motion
+from paraflex.results.metrics import ErrorSpan, Part, during_motion
 from paraflex.results.record import Record
 from paraflex.simulate import TrackingTask
 from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model
+from paraflex.validity import doubtful_numbers
 
 
 @checked_arguments()
@@ -35,6 +37,7 @@ def agreement(verification: Verification, error: ErrorSpan | str = ErrorSpan.MOT
         "mechanism": task.mechanism.name,
         "duration": float(task.motion.t[-1]),
         "samples": int(task.motion.t.size),
+        "verdict": Verdict(_findings(task, part)).to_dict(),
         "part": None if part is None else part.figures(),
         "reference": reference,
         "error": span.value,
@@ -43,6 +46,10 @@ def agreement(verification: Verification, error: ErrorSpan | str = ErrorSpan.MOT
         "interrupted": verification.interrupted,
         "modes": {mode: _of_mode(task, span, by_model, reference) for mode, by_model in verification.runs.items()},
     }
+
+
+def _findings(task: TrackingTask, part: Part | None) -> list[Finding]:
+    return [*doubtful_numbers(task.mechanism), *([] if part is None else [part.finding()])]
 
 
 def _of_mode(task: TrackingTask, span: ErrorSpan, by_model: Mapping[str, ModelRuns], reference: str) -> dict[str, Any]:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.dynamics import State, System, build_system
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution
 from paraflex.mechanism import ActuationMode, Mechanism, PointRef
 from paraflex.motion import MotionRun, simulate_motion
-from paraflex.results.motion import point_motion
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
 
 Progress = Callable[[float], None]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import joint_coordinate
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import InputError
-from paraflex.results.motion import point_motion
 from paraflex.results.outlines import deflections
 from paraflex.simulate import TrackingRun
 from paraflex.studies.sweeps.metrics import METRICS, Traces

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import joint_coordinate
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import IntegrationError, Moment
 from paraflex.results.metrics import drift_speed, during_motion, largest, rms, vibration
-from paraflex.results.motion import point_motion
 from paraflex.results.outlines import deflections
 from paraflex.simulate import TrackingRun
 

@@ -21,6 +21,7 @@ from paraflex.report.choice import MOST_RUNS, Picked, best_runs
 from paraflex.report.designs import Studied, read_studied
 from paraflex.report.survey import Step
 from paraflex.report.sweep import Parameter, StudyAccount, sweep_page
+from paraflex.results.doubts import doubt_lines
 from paraflex.studies.sweeps.metrics import VALIDITY, beyond_limits
 from paraflex.studies.sweeps.reopen import StudyFolder, open_study, reason_of, run_again
 from paraflex.studies.sweeps.run import Abandoned
@@ -144,7 +145,7 @@ def _notes(study: StudyFolder, studied: Studied, differ: Sequence[int]) -> list[
     notes = []
     if not studied.table.complete.any():
         notes.append("No run is complete: there is nothing to draw. The reasons stand below.")
-    notes += [f'Path "{path}": {part}.' for path, part in study.setting.parts().items()]
+    notes += doubt_lines(study.setting.verdict())
     beyond = int(np.sum(studied.table.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
     if beyond:
         notes.append(f"{beyond_limits(beyond)}.")

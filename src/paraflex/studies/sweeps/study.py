@@ -19,6 +19,7 @@ from paraflex.errors import InputError, as_enum, suggestion
 from paraflex.files import Model, library_names, load_data, model_from
 from paraflex.files.generators import is_generated
 from paraflex.files.read import read_toml, validate
+from paraflex.findings import Verdict
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import parse_mode
 from paraflex.results.dataset import part_of
@@ -28,6 +29,7 @@ from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
 from paraflex.studies.sweeps.samples import Varied, check_varied, designs
 from paraflex.studies.sweeps.schema import SweepTable, VaryTable
 from paraflex.studies.sweeps.table import FIXED_COLUMNS
+from paraflex.validity import doubtful_numbers
 
 # Attempted steps before a run is given up, unless the study says: a design that flails about must not hold up the rest.
 MOST_STEPS = 200_000
@@ -121,6 +123,12 @@ class Setting:
             path = model.path(name)
             found[name] = part_of(path, model.duration(name, path) if self.duration is None else self.duration)
         return {name: part for name, part in found.items() if part is not None}
+
+    def verdict(self) -> Verdict:
+        """What is doubtful about the design that the file describes, and which paths runs are too short for."""
+        model = model_from(dict(self.data), self.source)
+        parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
+        return Verdict([*doubtful_numbers(model.mechanism), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
         """How the runs of a design are integrated: as the design chooses, then as the study says, else as its file.

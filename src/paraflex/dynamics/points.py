@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import Marker, System, end_markers
+from paraflex.dynamics.coordinates import Marker, end_markers
+from paraflex.dynamics.system import System
 from paraflex.mechanism import PointRef
 
 
