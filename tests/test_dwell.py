@@ -316,7 +316,7 @@ def test_the_model_file_and_the_command_line_say_so(tmp_path):
     done = paraflex("run", "-m", "raparm_i", "--ked", "--after", "hold", cwd=tmp_path)
     assert "--after: means nothing with --ked" in done.stderr
     done = paraflex("run", "-m", "pendulum", "--after", "hold", cwd=tmp_path)
-    assert "--after: the model has no path to be held after" in done.stderr
+    assert "--after: the model has no path after which motors could be held" in done.stderr
 
 
 def test_a_study_keeps_what_its_task_says():

@@ -105,7 +105,10 @@ def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float
         return State(at, motion.q[-1], np.zeros(rigid.n))
     if rigid.n != rigid.n_constraints:
         raise InputError(
-            "the model has no path, and prescribed angles leave it free", field="--at", value=at, remedy="leave it out"
+            "the model has no path, and its prescribed angles do not give its pose at later times",
+            field="--at",
+            value=at,
+            remedy="leave it out",
         )
     q = start.q
     for time in np.linspace(0.0, at, _POSES_BETWEEN + 1)[1:]:

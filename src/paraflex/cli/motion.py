@@ -54,16 +54,22 @@ def run_motion(
     duration = model.study.duration if request.duration is None else request.duration
     if duration is None:
         raise InputError(
-            "the model has no path: how long is it to run?", field="--duration", remedy="give it in seconds"
+            "the model has no path, and nothing says how long it is to run",
+            field="--duration",
+            remedy="give it in seconds",
         )
     if request.modes:
         raise InputError(
-            "the model has no path, torques are constant", field="--mode", value=request.modes[0],
+            "a model without a path has no actuation modes, its torques are constant",
+            field="--mode", value=request.modes[0],
             remedy="add a [path.NAME] table, or give torques in [study]",
         )  # fmt: skip
     if request.after is not None:
         raise InputError(
-            "the model has no path to be held after", field="--after", value=request.after, remedy="leave it out"
+            "the model has no path after which motors could be held",
+            field="--after",
+            value=request.after,
+            remedy="leave it out",
         )
     samples = model.study.samples if request.samples is None else request.samples
     folder = results_folder(request.out)
@@ -138,7 +144,7 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     """The state the file describes, balanced if asked for; None for an assembly undeformed, moving with its drives."""
     if balanced and model.start is not None and model.start.places:
         raise InputError(
-            "the file gives the coordinates of the start", field="--balanced",
+            "the file's [start] gives coordinates, which a balanced start would change", field="--balanced",
             remedy="leave it out, or give [start.velocity] only",
         )  # fmt: skip
     if not balanced and model.start is None:

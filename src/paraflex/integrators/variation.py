@@ -109,16 +109,20 @@ def check_differentiable(options: IntegrationOptions) -> None:
     if options.description.family != Family.ESDIRK:
         able = [name for name, method in METHODS.items() if method.family == Family.ESDIRK]
         raise InputError(
-            "has no derivatives", field="method", value=options.method, remedy=f"choose from {', '.join(able)}"
+            "derivatives need another method",
+            field="method",
+            value=options.method,
+            remedy=f"choose from {', '.join(able)}",
         )
     if options.treatment != Treatment.BAUMGARTE:
         raise InputError(
-            "has no derivatives", field="constraints", value=options.treatment.value, remedy='choose "baumgarte"'
+            "derivatives need Baumgarte's treatment of the constraints",
+            field="constraints",
+            value=options.treatment.value,
+            remedy='choose "baumgarte"',
         )
     if options.events:
-        raise InputError(
-            "an event ends a run at a time of its own: no derivatives", field="events", remedy="leave them out"
-        )
+        raise InputError("a run that an event ends has no derivatives", field="events", remedy="leave them out")
 
 
 def run_derivatives(problem: Problem, options: IntegrationOptions, directions: Sequence[Direction]) -> RunDerivatives:
