@@ -178,7 +178,7 @@ FIELDS = [
     ('modes = ["both"]', 'modes = ["m1,m1"]', "study.modes: a motor is named twice (got 'm1,m1')", "once"),
     ("ground.Q", "ground.P", "linear_spring.coil.points: unknown point (got 'ground.P')", "Q"),
     ('point = "right.A"', 'point = "ground.Q"', "load.twist.point", "body"),
-    ('"left_arm.C"\n[assembly', '"ground.Q"\n[assembly', "end_effector.point: the end-effector does not", "body's"),
+    ('"left_arm.C"\n[assembly', '"ground.Q"\n[assembly', "end_effector.point: the end-effector is a", "body's"),
     ('["left.B", "left_arm.B"]', '["left.B", "left.A"]', "joint.B1: a joint needs two different bodies", "other"),
     ('["left.B", "left_arm.B"]', '["left.B", "left_arm"]', "joint.B1: not a point (got 'left_arm')", "body.point"),
     ("[body.right_arm]", "[body.right]", "file: not valid TOML: cannot declare ('body', 'right') twice", "only once"),

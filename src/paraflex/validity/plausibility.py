@@ -150,7 +150,7 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
 
 def _large_efforts(where: _Where, system: System, driven: Driven) -> Iterator[Finding]:
     mechanism = where.mechanism
-    size = mechanism_size(mechanism)
+    size = mechanism_size(mechanism) or system.size
     force, turning = _expected(system, mechanism, driven.acceleration)
     for motor, peak in driven.efforts.items():
         unit = driven.units[motor]
