@@ -23,7 +23,7 @@ from paraflex.studies import VerificationOptions, agreement, run_study, verify
 MODES = ("++++", "+-+-", "-+-+")
 STOPPED = "-+-+"
 SQUARE = Polygon(((0.05, 0.314), (-0.05, 0.314), (-0.05, 0.214), (0.05, 0.214)), 40.0)
-FAILED = {"+---": 'mode "+---" cannot drive the mechanism: 1 active motor(s) for 2 degrees of freedom'}
+FAILED = {"+---": 'mode "+---" cannot drive the mechanism: 1 active motor for 2 degrees of freedom'}
 
 
 @cache
@@ -48,7 +48,7 @@ def tracked() -> xr.Dataset:
     data["tracking_rms"][2] = data["tracking_rms_motion"][2] = np.nan
     data["status"] = data["status"].astype(object)
     data["message"] = data["message"].astype(object)
-    data["status"][2], data["message"][2] = "failed", "no end after 20 steps at t = 0.05 s"
+    data["status"][2], data["message"][2] = "failed", "the run has not ended after 20 steps, at t = 0.05 s"
     return data
 
 

@@ -309,9 +309,9 @@ def test_what_is_interrupted_leaves_nothing(data, tmp_path, name):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("film.avi", {}, "no kind of film"),
+        ("film.avi", {}, "unknown kind of film"),
         ("film.gif", {"fps": 0.0}, "fps: must be positive"),
-        ("film.gif", {"fps": 1000.0}, "more than a screen shows"),
+        ("film.gif", {"fps": 1000.0}, "more pictures a second than a screen shows"),
         ("film.gif", {"speed": np.inf}, "speed: must be positive"),
         ("film.gif", {"speed": 1e-6}, "choose a higher speed"),
         ("film.gif", {"size": (10, 10)}, "pixels"),

@@ -152,7 +152,10 @@ def test_points_from_a_file(tmp_path):
         ('points = { "crank" = [0, 0] }', "assembly.open.points: not a point (got 'crank')"),
         ('points = { "crank.A" = [0] }', "assembly.open.points.crank.A: list should have at least 2 items"),
         ('points = { "crank.A" = [0, inf] }', "assembly.open.points.crank.A.1: should be a finite number"),
-        ('points = { "ground.O" = [0, 0] }', "assembly.open.points: ground points are known (got 'ground.O')"),
+        (
+            'points = { "ground.O" = [0, 0] }',
+            "assembly.open.points: the places of ground points are given in [ground] (got 'ground.O')",
+        ),
         ("points = 3", "assembly.open.points: should be a table (got 3)"),
         ('crank = "up"', "assembly.open.crank: unknown parameter \"up\" (got 'up')"),
         ("crank = [1.0]", "assembly.open.crank: should be a valid number (got [1.0])"),

@@ -178,7 +178,7 @@ FIELDS = [
     ('modes = ["both"]', 'modes = ["m1,m1"]', "study.modes: a motor is named twice (got 'm1,m1')", "once"),
     ("ground.Q", "ground.P", "linear_spring.coil.points: unknown point (got 'ground.P')", "Q"),
     ('point = "right.A"', 'point = "ground.Q"', "load.twist.point", "body"),
-    ('"left_arm.C"\n[assembly', '"ground.Q"\n[assembly', "end_effector.point: the end-effector does not", "body's"),
+    ('"left_arm.C"\n[assembly', '"ground.Q"\n[assembly', "end_effector.point: the end-effector is a", "body's"),
     ('["left.B", "left_arm.B"]', '["left.B", "left.A"]', "joint.B1: a joint needs two different bodies", "other"),
     ('["left.B", "left_arm.B"]', '["left.B", "left_arm"]', "joint.B1: not a point (got 'left_arm')", "body.point"),
     ("[body.right_arm]", "[body.right]", "file: not valid TOML: cannot declare ('body', 'right') twice", "only once"),
@@ -320,7 +320,7 @@ def test_a_link_too_short_to_assemble_tells_the_gap_and_where(tmp_path):
     done = paraflex("run", "-m", str(short), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
     assert re.search(r"broken\.toml: assembly: the loops do not close: a gap of 0\.\d+ m remains in \w+ ", done.stderr)
-    assert "correct its angles or the lengths" in done.stderr
+    assert "; correct angles of the assembly, lengths or places of points" in done.stderr
     # The motors at these joints come to nothing, and the arm is as short as it is thick.
     *warned, error = done.stderr.splitlines()
     assert error.startswith("error: ")

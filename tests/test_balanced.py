@@ -296,7 +296,7 @@ duration = 0.1
     assert "there is none nearby" in out
     done = paraflex("run", "-m", str(file), "--balanced", "--out", str(tmp_path / "out"))
     assert done.returncode == 2
-    assert "--balanced: no static equilibrium near the start" in done.stderr
+    assert "--balanced: no static equilibrium is found near the start" in done.stderr
 
 
 def test_a_four_bar_runs_balanced_to_its_end(tmp_path):

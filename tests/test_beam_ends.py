@@ -115,7 +115,8 @@ def test_the_error_names_the_joint_its_place_and_time():
     steps = caught.value.partial.solution.steps
     assert str(caught.value) == (
         "joint pin came to the end of its beam lever, 0.25 m from its first end "
-        f'(at_end = "error"), at t = {LEAVES:.6g} s (step {steps})'
+        f'(at_end = "error"), at t = {LEAVES:.6g} s (step {steps}); '
+        'lengthen the beam, or let the run go on with at_end = "warn"'
     )
 
 

@@ -159,7 +159,7 @@ def test_unreachable_path_names_file_time_and_place(tmp_path):
 def test_mode_that_cannot_drive_is_reported_and_the_others_go_on(tmp_path):
     done = paraflex("run", "--mode", "tau1", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
     assert done.returncode == 1
-    assert 'mode "+---" cannot drive the mechanism: 1 active motor(s) for 2 degrees of freedom' in done.stderr
+    assert 'mode "+---" cannot drive the mechanism: 1 active motor for 2 degrees of freedom' in done.stderr
     modes = json.loads(done.stdout)["modes"]
     assert modes["+---"]["status"] == "failed"
     assert modes["++++"]["status"] == "complete"
@@ -168,7 +168,7 @@ def test_mode_that_cannot_drive_is_reported_and_the_others_go_on(tmp_path):
 def test_too_many_steps_keep_what_there_is(tmp_path):
     done = paraflex("run", "--mode", "++++", *FAST, "--max-steps", "20", "--out", str(tmp_path), "--json")
     assert done.returncode == 1
-    assert 'mode "++++": no end after 20 steps at t = ' in done.stderr
+    assert 'mode "++++": the run has not ended after 20 steps, at t = ' in done.stderr
     data = load_results(tmp_path / "results.nc")
     assert data["status"].item() == "failed"
     assert data["end_effector"].notnull().any()

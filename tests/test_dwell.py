@@ -262,7 +262,7 @@ def test_runs_stop_and_fail_in_the_dwell_with_what_was_computed():
         task.simulate("+-++", options=IntegrationOptions(tolerance=1e-4, max_steps=whole.solution.steps - 3))
     partial = caught.value.partial
     # Of the whole run, not of its part with brakes.
-    assert caught.value.cause == f"no end after {whole.solution.steps - 3} steps"
+    assert caught.value.cause == f"the run has not ended after {whole.solution.steps - 3} steps,"
     assert caught.value.moment.step == partial.solution.steps > 100
     assert partial.solution.t[-1] <= caught.value.moment.time < 2.0 * SIDE.duration
     assert SIDE.duration < partial.solution.t[-1] < 2.0 * SIDE.duration
@@ -316,7 +316,7 @@ def test_the_model_file_and_the_command_line_say_so(tmp_path):
     done = paraflex("run", "-m", "raparm_i", "--ked", "--after", "hold", cwd=tmp_path)
     assert "--after: means nothing with --ked" in done.stderr
     done = paraflex("run", "-m", "pendulum", "--after", "hold", cwd=tmp_path)
-    assert "--after: the model has no path to be held after" in done.stderr
+    assert "--after: the model has no path after which motors could be held" in done.stderr
 
 
 def test_a_study_keeps_what_its_task_says():

@@ -137,7 +137,7 @@ def test_names_are_known_or_refused(case):
 
 def test_treatments_of_constraints_are_taken_as_members_too():
     assert IntegrationOptions(constraints=Treatment.GGL) == IntegrationOptions(constraints="ggl")
-    with pytest.raises(InputError, match="not with esdirk5"):
+    with pytest.raises(InputError, match="esdirk5 cannot keep the constraints in this way"):
         IntegrationOptions(constraints=Treatment.POSITION)
 
 

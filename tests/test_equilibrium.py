@@ -121,7 +121,7 @@ def test_the_library_pendulum_hangs_down():
 
 
 def test_what_nothing_holds_has_no_equilibrium():
-    with pytest.raises(AssemblyError, match="no static equilibrium near the start: hold more joints"):
+    with pytest.raises(AssemblyError, match=r"no static equilibrium is found near the start at .*; start nearer to it"):
         equilibrium(pendulum(loads=(AppliedTorque("twist", PointRef("arm", "A"), 0.6),)))
     equilibrium(pendulum(loads=(AppliedTorque("twist", PointRef("arm", "A"), 0.6),)), held=["pin"])
 

@@ -79,7 +79,12 @@ BROKEN = [
     ('tau1 = "A1"', 'tau1 = "A3"', "motor.tau1.joint: unknown joint (got 'A3')", "A1"),
     ('"+-+-" = ["tau1", "tau5"]', '"+-+-" = ["tau1", "tau7"]', "mode.+-+-: unknown motor (got 'tau7')", "tau"),
     ('point = "link4.C"', 'point = "link4.X"', "end_effector.point: unknown point (got 'link4.X')", "C"),
-    ('point = "link4.C"', 'point = "ground.A1"', "end_effector.point: the end-effector does not move", "body's point"),
+    (
+        'point = "link4.C"',
+        'point = "ground.A1"',
+        "end_effector.point: the end-effector is a point of the ground, which does not move",
+        "body's point",
+    ),
     ('["x", "y"]', '["x", "z"]', "end_effector.coordinates: not a set of task coordinates", "angle"),
     ("link1 = 2.164\n", "", "assembly.outward: no angle for a body (got 'link1')", "rad"),
     ("link1 = 2.164\n", "lnk1 = 2.164\n", "assembly.outward: unknown body (got 'lnk1')", 'did you mean "link1"?'),

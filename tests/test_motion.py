@@ -220,7 +220,10 @@ def test_a_path_may_start_from_equilibrium(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--mode", "++"], "--mode: the model has no path, torques are constant (got '++')"),
+        (
+            ["--mode", "++"],
+            "--mode: a model without a path has no actuation modes, its torques are constant (got '++')",
+        ),
         (["--ked"], "--ked: the model has no path to prescribe"),
         (["--path", "square"], "pendulum.toml: path: unknown path (got 'square'); there is none to choose from"),
         (["--duration", "-1"], "--duration: must be positive (got -1.0)"),
@@ -262,7 +265,7 @@ def test_torques_of_a_file_hold_an_arm_level(tmp_path):
     assert load(file).study.torques == {"drive": 4.905}
     done = paraflex("run", "-m", str(file), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
-    assert "--duration: the model has no path: how long is it to run?" in done.stderr
+    assert "--duration: the model has no path, and nothing says how long it is to run" in done.stderr
     done = paraflex("run", "-m", str(file), "--duration", "1", "--json", "--out", str(tmp_path / "out"))
     assert abs(json.loads(done.stdout)["final"]["angle"]["arm"]) < 1e-9
     file.write_text(SHORT.replace("drive = 4.905", "drvie = 4.905"))

@@ -244,7 +244,7 @@ def test_exact_gradients_that_cannot_be(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"no exact derivatives \(metrics: has no derivative.*say \"differences\""):
         optimise(study, tmp_path / "one", run=made_up(steps=bowl))
     study = study_of(tmp_path, OBJECTIVE, gradients="exact", method="optuna")
-    with pytest.raises(InputError, match="optuna uses none"):
+    with pytest.raises(InputError, match="optuna uses no gradients"):
         optimise(study, tmp_path / "four")
 
 
@@ -418,13 +418,17 @@ BAD = [
     ("{ tracking_rms = 1.0 }", "{}", "objective.minimise: nothing to minimise"),
     ("tracking_rms = 1.0", "tracking_rm = 1.0", 'did you mean "tracking_rms"?'),
     ("tracking_rms = 1.0", "tracking_rms = -1.0", "objective.minimise.tracking_rms: must be positive (got -1.0)"),
-    ("tracking_rms = 1.0", "peak_torque = 1.0", "objective.minimise.peak_torque: of which motor? (got 'peak_torque')"),
+    (
+        "tracking_rms = 1.0",
+        "peak_torque = 1.0",
+        "objective.minimise.peak_torque: this metric is one of each motor, and no motor is named (got 'peak_torque')",
+    ),
     ("tracking_rms = 1.0", '"tracking_rms.tau1" = 1.0', "not a metric per motor"),
     ("relative = false", 'over = "wurst"', 'did you mean "worst"?'),
     ("low = 0.002", "low = 0.006", "outside the bounds, 0.006 to 0.008 (got 0.005)"),
     ("low = 0.002", "low = 0.002\nstart = 0.001", "vary.x.start: outside the bounds, 0.002 to 0.008 (got 0.001)"),
     ("low = 0.002", "low = 0.008", "vary.x.high: low and high are equal"),
-    ("low = 0.002", "values = [1.0]", "vary.x.values: is for sweeps"),
+    ("low = 0.002", "values = [1.0]", "vary.x.values: only sweeps have it"),
     ("low = 0.1\n", "", "vary.y.low: is missing"),
     ('["section.bar.thickness"]', '["section.bar.thickness", "section.bar.width"]', "its fields differ"),
     ("[objective]", '[search]\nmethod = "newton"\n[objective]', 'give "slsqp", "trust-constr"'),
@@ -448,7 +452,9 @@ def test_what_a_method_cannot_do(tmp_path, monkeypatch):
     limit = '[[objective.at_most]]\nmetric = "total_mass"\nvalue = 2.0'
     study = study_of(tmp_path, OBJECTIVE, limit, method="l-bfgs-b")
     run = made_up(tracking_rms=bowl, total_mass=lambda mode, x, y: 1.0)
-    with pytest.raises(InputError, match=r"search.method: takes no limits .*\"slsqp\" or \"trust-constr\""):
+    with pytest.raises(
+        InputError, match=r"search.method: the method takes no limits \(at_most\) .*\"slsqp\" or \"trust-constr\""
+    ):
         optimise(study, tmp_path / "one", run=run)
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(InputError, match=r"Optuna is not installed.*pip install 'paraflex\[optuna\]'"):

@@ -57,7 +57,7 @@ def test_an_arm_reaches_an_annulus():
     np.testing.assert_allclose(found.distance, np.maximum(r - UPPER - LOWER, 0.0), **CLOSE)
     error = refused(arm(), path)
     np.testing.assert_allclose(error.shortfall, r[-1] - UPPER - LOWER, **CLOSE)
-    assert str(error).endswith("its furthest point, (0.9, 0.9) m, lies 0.504 m beyond reach")
+    assert error.problem.endswith("its furthest point, (0.9, 0.9) m, lies 0.504 m beyond reach")
     assert "the path goes out of reach at t = " in str(error)
 
 
@@ -86,12 +86,13 @@ def test_two_arms_reach_what_both_annuli_hold(name, end, nearest):
 
 def test_a_start_out_of_reach_says_how_far():
     error = refused(arm(), Line((0.9, 0.0), (0.5, 0.0), 2.0))
-    assert str(error) == (
+    assert str(error) == f"{error.problem}; move the path or the bases, or choose another assembly"
+    assert error.problem == (
         "the path's start is out of reach at t = 0 s (step 0), end-effector at (0.9, 0) m: 0.1 m beyond reach"
     )
     np.testing.assert_allclose(error.shortfall, 0.1, **CLOSE)
     further = refused(arm(), Line((0.9, 0.0), (1.2, 0.0), 2.0))
-    assert str(further).endswith(": 0.1 m beyond reach; its furthest point, (1.2, 0) m, lies 0.4 m beyond reach")
+    assert further.problem.endswith(": 0.1 m beyond reach; its furthest point, (1.2, 0) m, lies 0.4 m beyond reach")
 
 
 def test_prescribed_motions_move_what_can_be_reached():
@@ -157,7 +158,7 @@ def test_an_angle_out_of_reach_is_counted_in_radians():
     path = PointPath(((0.0, 0.0, 0.5 * (lowest + highest)), (1.0, 0.0, highest + 0.2)), 1.0)
     error = refused(rocker(1.9), path)
     np.testing.assert_allclose((error.shortfall, error.shortfall_angle), (0.0, 0.2), **CLOSE)
-    assert str(error).endswith("its furthest point, at t = 1 s, lies 0.2 rad beyond reach")
+    assert error.problem.endswith("its furthest point, at t = 1 s, lies 0.2 rad beyond reach")
 
 
 def test_what_another_assembly_reaches_is_no_matter_of_distance():

@@ -169,7 +169,7 @@ def test_the_table_has_the_numbers_of_the_dataset(tracking_html):
 def test_modes_that_failed_say_why(tracking_html):
     text = text_of(tracking_html)
     assert f" {STOPPED} failed " in text
-    assert f"Mode {STOPPED}: failed. no end after 20 steps at t = 0.05 s" in text
+    assert f"Mode {STOPPED}: failed. the run has not ended after 20 steps, at t = 0.05 s" in text
     assert " +--- failed " in text
     assert "Mode +--- could not be run: mode &quot;+---&quot; cannot drive the mechanism: 1 active" in text
 

@@ -166,7 +166,7 @@ def test_rigid_bodies_and_held_beams_stay_as_they_are():
     ("segments", "says"),
     [
         (0, "segments.link1: a beam needs at least one segment (got 0)"),
-        ({"link1": 8}, "segments: no number of segments (got 'link2')"),
+        ({"link1": 8}, "segments: the number of segments of this beam is missing (got 'link2')"),
         (PAPER | {"link9": 2}, "segments: no flexible beam (got 'link9')"),
     ],
 )

@@ -335,12 +335,15 @@ def test_systems_of_another_layout_are_told_apart():
 @pytest.mark.parametrize(
     ("replaced", "says"),
     [
-        ({'"tr-bdf2"': '"newmark"'}, "method: has no derivatives (got 'newmark'); choose from "),
-        ({"tolerance = 1e-7": 'tolerance = 1e-7\nconstraints = "projection"'}, "constraints: has no derivatives"),
+        ({'"tr-bdf2"': '"newmark"'}, "method: derivatives need another method (got 'newmark'); choose from "),
+        (
+            {"tolerance = 1e-7": 'tolerance = 1e-7\nconstraints = "projection"'},
+            "constraints: derivatives need another method",
+        ),
         ({"section.bar.thickness": "body.link1.elements"}, "body.link1.elements: should be a valid integer"),
         ({"section.bar.thickness": "integration.step"}, "vary.thickness: has no derivative"),
         ({"section.bar.thickness": "integration.gamma"}, "vary.thickness.fields: no such number of the integration"),
-        ({"section.bar.thickness": "ground.A1.1"}, "vary.thickness: is zero: how small are steps?"),
+        ({"section.bar.thickness": "ground.A1.1"}, "vary.thickness: is zero, which gives no size of steps"),
         ({'thickness"]': 'thickness", "section.bar.width"]'}, "vary.thickness.fields: its fields hold different"),
         ({"samples = 13": 'samples = 13\nmetrics = ["steps"]'}, "metrics: has no derivative (got 'steps')"),
         ({"samples = 13": 'samples = 13\nmetrics = ["work_done"]'}, "metrics: unknown metric (got 'work_done')"),
@@ -380,7 +383,7 @@ def test_unknown_point_and_a_run_that_fails(tmp_path):
     stopped = replace(
         study, setting=replace(study.setting, integration=dict(study.setting.integration) | {"max_steps": 3})
     )
-    with pytest.raises(NumericalError, match="no end after 3 steps"):
+    with pytest.raises(NumericalError, match="has not ended after 3 steps, at t = "):
         sensitivities(stopped)
 
 

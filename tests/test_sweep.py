@@ -208,7 +208,7 @@ def test_a_run_given_up_says_when(tmp_path):
     result = sweep(load_sweep(file), tmp_path / "out")
     data = pd.read_parquet(result.table)
     assert result.counts == {"failed": 8}
-    assert data["reason"].str.contains("no end after 3 steps at t = ").all()
+    assert data["reason"].str.contains("the run has not ended after 3 steps, at t = ").all()
     assert (data["time_reached"] > 0.0).all()
     assert (data["time_reached"] < 0.2).all()
 

@@ -155,8 +155,8 @@ def test_an_unreachable_cluster(study, tmp_path, monkeypatch):
     [
         ({"engine": "dusk"}, "--engine: unknown engine"),
         ({"workers": 0}, "--workers: must be positive"),
-        ({"cluster": "tcp://a:1"}, "--cluster: is for dask"),
-        ({"engine": "dask", "cluster": "tcp://a:1", "workers": 2}, "--workers: the cluster has its own"),
+        ({"cluster": "tcp://a:1"}, "--cluster: only the engine dask takes a cluster"),
+        ({"engine": "dask", "cluster": "tcp://a:1", "workers": 2}, "--workers: the cluster has workers of its own"),
         ({"limit": 0}, "--limit: must be positive"),
     ],
 )

@@ -111,7 +111,7 @@ def made_up(rows, seed=0, modes=("a", "b")):
         path=np.full(rows, "p"), mode=np.array([modes[k % len(modes)] for k in range(rows)]), complete=complete,
     )  # fmt: skip
     status = np.where(complete, "complete", "failed")
-    reason = np.where(complete, "", [f"no end after {k} steps" for k in range(rows)])
+    reason = np.where(complete, "", [f"the run has not ended after {k} steps, at t = 0.1 s" for k in range(rows)])
     number = np.arange(rows)
     return Studied(table, number, number // len(modes), status, reason)
 

@@ -182,7 +182,7 @@ def test_one_rigid_link_among_flexible_ones():
 def test_study_goes_on_when_a_mode_cannot_drive(task):
     result = run_study(task, ["+---", "++++"], options=IntegrationOptions(tolerance=1e-3))
     assert list(result.failed) == ["+---"]
-    assert "1 active motor(s) for 2 degrees of freedom" in result.failed["+---"]
+    assert "1 active motor for 2 degrees of freedom" in result.failed["+---"]
     assert list(result.data["mode"].values) == ["++++"]
     assert not result.complete
     with pytest.raises(ActuationError):

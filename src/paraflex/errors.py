@@ -1,7 +1,7 @@
 """Typed errors: what went wrong, where, and what to do about it.
 
 Two families. An `InputError` is the user's to mend: it names the field, the value and the remedy, and the
-command line turns it into one line and exit code 2. A `NumericalError` names time, step and cause, and
+command line turns it into one line and exit code 2. A `NumericalError` names time, step, cause and remedy, and
 carries what was computed until then.
 """
 
@@ -174,11 +174,21 @@ class NumericalError(ParaflexError, ArithmeticError):
         When and where.
     partial : object or None
         What was computed until then, of the type the function returns.
+    remedy : str
+        What to do about it; empty where nothing general can be said.
     """
 
-    def __init__(self, cause: str, moment: Moment | None = None, partial: Any = None) -> None:
-        self.cause, self.moment, self.partial = cause, moment, partial
-        super().__init__(cause if moment is None else f"{cause} at {moment}")
+    def __init__(self, cause: str, moment: Moment | None = None, partial: Any = None, remedy: str = "") -> None:
+        self.cause, self.moment, self.partial, self.remedy = cause, moment, partial, remedy
+        super().__init__(cause)
+
+    @property
+    def problem(self) -> str:
+        """Cause and moment, without the remedy."""
+        return self.cause if self.moment is None else f"{self.cause} at {self.moment}"
+
+    def __str__(self) -> str:
+        return f"{self.problem}; {self.remedy}" if self.remedy else self.problem
 
 
 class AssemblyError(NumericalError):
@@ -201,16 +211,19 @@ class UnreachablePathError(AssemblyError):
         cause: str,
         moment: Moment | None = None,
         partial: Any = None,
+        remedy: str = "",
         *,
         detail: str = "",
         shortfall: float = 0.0,
         shortfall_angle: float = 0.0,
     ) -> None:
-        super().__init__(cause, moment, partial)
+        super().__init__(cause, moment, partial, remedy)
         self.detail, self.shortfall, self.shortfall_angle = detail, shortfall, shortfall_angle
 
-    def __str__(self) -> str:
-        return f"{super().__str__()}: {self.detail}" if self.detail else super().__str__()
+    @property
+    def problem(self) -> str:
+        """Cause, moment, and how far the path is out of reach."""
+        return f"{super().problem}: {self.detail}" if self.detail else super().problem
 
 
 class InconsistentConstraintsError(NumericalError):

@@ -125,6 +125,8 @@ class Finding:
     def __post_init__(self) -> None:
         if self.code not in CODES:
             raise KeyError(f"no finding has the code {self.code!r}")
+        # A text taken from a numerical error may end with the same remedy.
+        object.__setattr__(self, "text", self.text.removesuffix(f"; {self.remedy}"))
 
     @property
     def level(self) -> Level:

@@ -25,7 +25,7 @@ from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start
-from paraflex.validity import Validity, assess, doubtful_results, warn
+from paraflex.validity import Validity, assess, doubtful_results, warn, with_blame
 
 
 @given_as("a run without a path", "the run that simulate_motion returns")
@@ -136,7 +136,7 @@ def simulate_motion(
             system, signals, state, times, knots=np.array(knots), options=options, on_progress=on_progress
         )
     except IntegrationError as error:
-        error.partial = _run(system, times, values, error.partial)
+        error.partial = _run(system, times, values, with_blame(error, mechanism).partial)
         raise
     run = _run(system, times, values, solution)
     if warning:

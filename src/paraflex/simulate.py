@@ -30,7 +30,7 @@ from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
 from paraflex.integrators.beam_ends import leave_beam
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
-from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn
+from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn, with_blame
 
 # Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
 _SAME_TIME = 1e-9
@@ -411,7 +411,11 @@ def _drive(
 ) -> Solution:
     signals, knots = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))
     stops = np.sort(np.concatenate([torques.knots, knots]))
-    return integrate(task.system, signals, task.start, times, knots=stops, options=options, on_progress=on_progress)
+    try:
+        return integrate(task.system, signals, task.start, times, knots=stops, options=options, on_progress=on_progress)
+    except IntegrationError as error:
+        with_blame(error, (task.whole or task).mechanism)
+        raise
 
 
 def _drive_and_hold(
@@ -452,7 +456,7 @@ def _drive_and_hold(
             begun=driven, on_progress=on_progress,
         )  # fmt: skip
     except IntegrationError as error:
-        error.partial = whole(error.partial)
+        error.partial = whole(with_blame(error, (task.whole or task).mechanism).partial)
         raise
     return whole(held)
 

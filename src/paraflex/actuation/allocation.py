@@ -82,6 +82,10 @@ def actuation_condition(effort: Effort, mode: ActuationMode) -> NDArray[np.float
         return np.where(values[:, -1] > 0.0, values[:, 0] / values[:, -1], np.inf)
 
 
+# What helps where a path comes too near a Type II singularity of a mode.
+PAST_SINGULAR = "move the path, or add motors to the mode"
+
+
 def allocate(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:
     """Torques (k, motors) of minimum norm over a mode's motors, zero for the passive ones [N m].
 
@@ -105,12 +109,18 @@ def check_mode(effort: Effort, mode: ActuationMode) -> None:
     tasks, count = effort.required.shape[1], int(effort.active(mode).sum())
     if count < tasks:
         raise ActuationError(
-            f'mode "{mode.name}" cannot drive the mechanism: {count} active motor(s) for {tasks} degrees of freedom',
+            f'mode "{mode.name}" cannot drive the mechanism: {count} active motor{"" if count == 1 else "s"} '
+            f"for {tasks} degrees of freedom",
+            remedy=f"let at least {tasks} motors act",
         )
     values = _singular_values(effort, mode)
     singular = values[:, -1] <= SINGULAR_RATIO * values[:, 0]
     if np.all(singular):
-        raise ActuationError(f'mode "{mode.name}" cannot drive the mechanism: its motors never reach every direction')
+        raise ActuationError(
+            f'mode "{mode.name}" cannot drive the mechanism: nowhere on the path do its motors control all {tasks} '
+            "degrees of freedom",
+            remedy="choose other motors, or add motors to the mode",
+        )
     # A square matrix that passes through a singularity between two instants shows it by the sign of its determinant.
     if count == tasks:
         sign = np.sign(np.linalg.det(effort.matrix[:, :, effort.active(mode)]))
@@ -119,8 +129,9 @@ def check_mode(effort: Effort, mode: ActuationMode) -> None:
         k = int(np.argmax(singular))
         position = effort.motion.desired.position[k]
         raise SingularActuationError(
-            f'mode "{mode.name}" meets a Type II singularity',
+            f'mode "{mode.name}" meets a Type II singularity, where its motors lose control of the end-effector,',
             Moment(float(effort.motion.t[k]), k, (float(position[0]), float(position[1]))),
+            remedy=PAST_SINGULAR,
         )
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from paraflex.actuation.allocation import Effort, allocate, required_effort
+from paraflex.actuation.allocation import PAST_SINGULAR, Effort, allocate, required_effort
 from paraflex.dynamics import InputSignals
-from paraflex.errors import NumericalError
+from paraflex.errors import Moment, NumericalError
 from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode
 
@@ -90,14 +90,21 @@ class TorquePlan:
         NumericalError
             Torques too steep for a spline: the path passes very close to a singularity of the mode.
         """
+        time, worst = 0.0, 0
         for refined in range(_REFINEMENTS):
             effort = self._effort(refined)
             t, torques = effort.motion.t, allocate(effort, mode)
             checked = FeedForward(mode, tuple(splines(t[::2], torques[::2], self.knots)), self.knots, t[::2])
-            error = np.max(np.abs(checked.evaluate(t) - torques))
-            if error <= _GAIN * _ACCURACY * max(np.max(np.abs(torques)), np.finfo(float).tiny):
+            error = np.max(np.abs(checked.evaluate(t) - torques), axis=1)
+            if np.max(error) <= _GAIN * _ACCURACY * max(np.max(np.abs(torques)), np.finfo(float).tiny):
                 return FeedForward(mode, tuple(splines(t, torques, self.knots)), self.knots, t)
-        raise NumericalError(f'the torques of mode "{mode.name}" are too steep to interpolate: near a singularity')
+            worst = int(np.argmax(error))
+            time = float(t[worst])
+        raise NumericalError(
+            f'the torques of mode "{mode.name}" rise too steeply to be interpolated, as near a Type II singularity,',
+            Moment(time, worst),
+            remedy=PAST_SINGULAR,
+        )
 
     def feed_forward_like(self, other: FeedForward) -> FeedForward:
         """Torques of the same mode through as many instants: those of another plan, where its knots are these.

@@ -22,6 +22,7 @@ from paraflex.cli.request import (
     at_fault,
     find_modes,
     find_path,
+    of_assembly,
     plan_study,
     results_folder,
     write_json,
@@ -100,7 +101,8 @@ def _modes(model: Model, request: CompareRequest) -> str | None:
         return max(find_modes(model, request.modes), key=lambda mode: len(mode.motors)).name
     if request.modes:
         raise InputError(
-            "the model has no path, torques are constant", field="--mode", value=request.modes[0],
+            "a model without a path has no actuation modes, its torques are constant",
+            field="--mode", value=request.modes[0],
             remedy="leave it out, or add a [path.NAME] table",
         )  # fmt: skip
     return None
@@ -115,7 +117,9 @@ def _motion(model: Model, request: CompareRequest) -> Case:
     duration = model.study.duration if request.duration is None else request.duration
     if duration is None:
         raise InputError(
-            "the model has no path: how long is it to run?", field="--duration", remedy="give it in seconds"
+            "the model has no path, and nothing says how long it is to run",
+            field="--duration",
+            remedy="give it in seconds",
         )
     assembly = request.assembly or model.study.assembly
     samples = model.study.samples if request.samples is None else request.samples
@@ -126,9 +130,7 @@ def _motion(model: Model, request: CompareRequest) -> Case:
             start = consistent_state(system, model.mechanism.assembly(assembly))
         return motion_case(model.mechanism, duration, samples=samples, torques=dict(model.study.torques), start=start)
     except AssemblyError as error:
-        raise InputError(
-            str(error), field="assembly", remedy="correct its angles or the lengths", source=model.source
-        ) from error
+        raise of_assembly(error, model) from error
     except InputError as error:
         raise at_fault(error, model) from None
 

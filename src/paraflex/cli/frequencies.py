@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.checks import BALANCED
+from paraflex.cli.request import UNBALANCED
 from paraflex.dynamics import (
     State,
     System,
@@ -83,7 +84,7 @@ def _balanced(system: System, state: State, held: list[str]) -> State:
     try:
         return static_equilibrium(system, state, held)
     except AssemblyError as error:
-        raise InputError(error.cause, field="--balanced", remedy="leave it out") from error
+        raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
 
 
 def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:
@@ -104,7 +105,10 @@ def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float
         return State(at, motion.q[-1], np.zeros(rigid.n))
     if rigid.n != rigid.n_constraints:
         raise InputError(
-            "the model has no path, and prescribed angles leave it free", field="--at", value=at, remedy="leave it out"
+            "the model has no path, and its prescribed angles do not give its pose at later times",
+            field="--at",
+            value=at,
+            remedy="leave it out",
         )
     q = start.q
     for time in np.linspace(0.0, at, _POSES_BETWEEN + 1)[1:]:

@@ -18,8 +18,10 @@ from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
     TROUBLE,
+    UNBALANCED,
     StudyRequest,
     at_fault,
+    of_assembly,
     report_too,
     results_folder,
     write_json,
@@ -52,16 +54,22 @@ def run_motion(
     duration = model.study.duration if request.duration is None else request.duration
     if duration is None:
         raise InputError(
-            "the model has no path: how long is it to run?", field="--duration", remedy="give it in seconds"
+            "the model has no path, and nothing says how long it is to run",
+            field="--duration",
+            remedy="give it in seconds",
         )
     if request.modes:
         raise InputError(
-            "the model has no path, torques are constant", field="--mode", value=request.modes[0],
+            "a model without a path has no actuation modes, its torques are constant",
+            field="--mode", value=request.modes[0],
             remedy="add a [path.NAME] table, or give torques in [study]",
         )  # fmt: skip
     if request.after is not None:
         raise InputError(
-            "the model has no path to be held after", field="--after", value=request.after, remedy="leave it out"
+            "the model has no path after which motors could be held",
+            field="--after",
+            value=request.after,
+            remedy="leave it out",
         )
     samples = model.study.samples if request.samples is None else request.samples
     folder = results_folder(request.out)
@@ -124,9 +132,7 @@ def _simulate(
     except IntegrationError as error:
         return error.partial
     except AssemblyError as error:
-        raise InputError(
-            str(error), field="assembly", remedy="correct its angles or the lengths", source=model.source
-        ) from error
+        raise of_assembly(error, model) from error
     except InputError as error:
         raise at_fault(error, model) from None
     finally:
@@ -138,7 +144,7 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     """The state the file describes, balanced if asked for; None for an assembly undeformed, moving with its drives."""
     if balanced and model.start is not None and model.start.places:
         raise InputError(
-            "the file gives the coordinates of the start", field="--balanced",
+            "the file's [start] gives coordinates, which a balanced start would change", field="--balanced",
             remedy="leave it out, or give [start.velocity] only",
         )  # fmt: skip
     if not balanced and model.start is None:
@@ -152,7 +158,7 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     try:
         found = balanced_state(system, undeformed, {motor.joint: JointMotion() for motor in mechanism.motors})
     except AssemblyError as error:
-        raise InputError(error.cause, field="--balanced", remedy="leave it out") from error
+        raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
     return found if model.start is None else start_state(system, model.start, q=found.q)
 
 

@@ -62,8 +62,8 @@ def _check(request: PlotRequest) -> None:
         remedy = suggestion(request.style, STYLES)
         raise InputError("unknown style", field="--style", value=request.style, remedy=remedy)
     if not (math.isfinite(request.dpi) and 0.0 < request.dpi <= _DENSEST):
-        remedy = f"say a number up to {_DENSEST:g}, such as 300"
-        raise InputError("not a density of dots", field="--dpi", value=request.dpi, remedy=remedy)
+        remedy = f"give a number up to {_DENSEST:g}, such as 300"
+        raise InputError("not a number of dots per inch", field="--dpi", value=request.dpi, remedy=remedy)
 
 
 def _list(source: Source, results: str) -> None:

@@ -74,5 +74,5 @@ def _beside(file: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise InputError("cannot be read", field=str(file), remedy="run the command again") from error
     if not isinstance(figures.get("modes") if isinstance(figures, dict) else None, dict):
-        raise InputError("is not ours", field=str(file), remedy="run the command again")
+        raise InputError("is not a summary that paraflex wrote", field=str(file), remedy="run the command again")
     return figures

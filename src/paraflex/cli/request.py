@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from paraflex.errors import AssemblyError, InputError, OutputError
+from paraflex.errors import AssemblyError, InputError, OutputError, UnreachablePathError
 from paraflex.files import Model, load_path
 from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
 from paraflex.simulate import TrackingTask, plan_tracking
+from paraflex.validity import to_blame
 
 COMPLETE, TROUBLE, INTERRUPTED = 0, 1, 130
 
@@ -89,12 +90,22 @@ def plan_study(
             warning=False,
         )
     except AssemblyError as error:
-        raise InputError(
-            str(error), field=f"path.{path_name}", remedy="move the path or the bases, or choose another assembly",
-            source=model.source,
-        ) from error  # fmt: skip
+        if not isinstance(error, UnreachablePathError):
+            raise of_assembly(error, model) from error
+        raise InputError(error.problem, field=f"path.{path_name}", remedy=error.remedy, source=model.source) from error
     except InputError as error:
         raise at_fault(error, model) from None
+
+
+# What to do about a start for which no equilibrium is found.
+UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
+
+
+def of_assembly(error: AssemblyError, model: Model) -> InputError:
+    """The error of a mechanism that cannot be put together, naming the model's file."""
+    # Links that are far too soft bend where the loops are to close, instead of moving.
+    remedy = to_blame(model.mechanism) or error.remedy
+    return InputError(error.problem, field="assembly", remedy=remedy, source=model.source)
 
 
 def at_fault(error: InputError, model: Model) -> InputError:

@@ -30,7 +30,7 @@ from paraflex.cli.request import (
     with_frames,
     write_json,
 )
-from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of_doubts
+from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of, warn_of_doubts
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -89,8 +89,10 @@ def run_command(request: RunRequest) -> int:
     try:
         result = _simulate(console, task, modes, options, parameters, method, model.study.error, doubts)
     except InputError as error:
+        warn_of(console, collected(doubts))
         raise at_fault(error, model) from None
     if result.data is None:
+        warn_of(console, collected(doubts))
         failures(console, result)
         return INTERRUPTED if result.interrupted else TROUBLE
     keep_findings(result.data, collected(verdict_of(result.data)))

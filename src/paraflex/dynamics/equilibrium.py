@@ -30,11 +30,13 @@ _DIFFERENCE = 1e-6
 _LONGEST_STEP = 0.3
 # Up to so many unknowns a dense Jacobian, whose dependent columns least squares can tell, is fast enough.
 _DENSE = 400
-_NO_EQUILIBRIUM = "no static equilibrium near the start: hold more joints"
+_NO_EQUILIBRIUM = "no static equilibrium is found near the start"
+_HOLD = "start nearer to it, keep the angles of more joints, or make links and springs stiffer"
 _NO_MOVING_EQUILIBRIUM = (
-    "no equilibrium of links with weight, loads and the inertia of the motion near the start: the drives are too fast "
-    "for links this soft"
+    "no equilibrium of links with weight, loads and the inertia of the motion is found near the start: the drives are "
+    "too fast for links this soft"
 )
+_SLOWER = "let the drives start more slowly, or make the links stiffer"
 
 # Velocities and accelerations (n,) at coordinates (n,).
 Motion = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
@@ -94,7 +96,7 @@ def _find(system: System, start: State, held: Sequence[str], motion: Motion | No
     except AssemblyError as error:
         if motion is None:
             raise
-        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial) from None
+        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial, _SLOWER) from None
 
 
 def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> NDArray[np.float64]:
@@ -120,7 +122,7 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
         z += change * min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
         if reach <= _SMALLEST_MOVE and effort * np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_torque:
             return z[:n]
-    raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), partial=z[:n])
+    raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), z[:n], _HOLD)
 
 
 def _sparse_equilibrium(
@@ -156,7 +158,7 @@ def _sparse_equilibrium(
         largest = max(np.max(np.abs(system.row_units * lam), initial=0.0), np.max(np.abs(mu), initial=0.0))
         if reach <= _SMALLEST_MOVE and np.max(np.abs(system.units * f)) <= _BALANCED * largest:
             return q
-    raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), partial=q)
+    raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), q, _HOLD)
 
 
 def _solve(

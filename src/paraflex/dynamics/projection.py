@@ -15,6 +15,9 @@ from paraflex.errors import InconsistentConstraintsError, Moment
 
 # Joints named in an error.
 NAMED = 6
+_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
+# What helps where constraints contradict one another.
+AGREE = "leave one of these joints or prescribed motions out, or choose places and laws that agree"
 # What constraints may leave of each other's rates (sizes of the mechanism, rad; s), as a fraction of what they ask for.
 _CONFLICT = 1e-6
 
@@ -93,7 +96,8 @@ def refuse_conflict(
     """
     if not system.gap(left) > _CONFLICT * max(1.0, system.gap(wanted)):
         return
-    raise InconsistentConstraintsError(contradiction(system, wanted, dependence(system, q), what), Moment(t, 0))
+    cause = contradiction(system, wanted, dependence(system, q), what)
+    raise InconsistentConstraintsError(cause, Moment(t, 0), remedy=AGREE)
 
 
 def contradiction(system: System, wanted: NDArray[np.float64], found: Dependence, what: str) -> str:
@@ -106,4 +110,7 @@ def contradiction(system: System, wanted: NDArray[np.float64], found: Dependence
         gaps = joint_gaps(system, wanted)
         names, size = list(gaps), max(gaps.values())
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return f"the {what} of constraints contradict one another, by {size:.3g}: {', '.join(names[:NAMED])}{more}"
+    return (
+        f"the {what} of constraints contradict one another, by {size:.3g} {_UNITS[what]}: "
+        f"{', '.join(names[:NAMED])}{more},"
+    )

@@ -103,7 +103,8 @@ def static_shape(system: System, name: str, points: Mapping[str, Deflection]) ->
     worst = int(np.argmax(np.abs(left)))
     if abs(left[worst]) > _SAME * np.max(np.abs(d), initial=0.0):
         raise InputError(
-            f"the other deflections or the shapes of the body do not allow it: {abs(left[worst]):.3g} is left",
+            f"the shapes of the body, or its other deflections, do not allow it: "
+            f"{abs(left[worst]):.3g} (m or rad) is missing",
             field=f"start.deflection.{name}.{fields[worst]}", value=values[worst],
             remedy="a beam's deflections count from the tangent at its first end, others from the body frame",
         )  # fmt: skip
@@ -132,7 +133,8 @@ def _coordinates(
     elif assembly is None:
         missing = next(name for name in system.index if name not in start.coordinates)
         raise InputError(
-            "no coordinates of a body, and no assembly to take them from", field="start.coordinates", value=missing,
+            "the coordinates of this body are not given, and there is no assembly to take them from",
+            field="start.coordinates", value=missing,
             remedy="give them, or an [assembly.NAME] table",
         )  # fmt: skip
     else:
@@ -266,7 +268,8 @@ def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> NDArra
     missed = np.max(np.abs(basis @ eta - own), initial=0.0)
     if missed > _GAP * np.max(np.abs(own), initial=0.0):
         raise InputError(
-            f"the modes kept of the body miss them by {missed:.3g}", field=f"{field}.flexible",
+            f"the modes kept of the body do not contain this shape: the nearest is {missed:.3g} off",
+            field=f"{field}.flexible",
             remedy="keep all modes, or give a shape of those kept",
         )  # fmt: skip
     return np.concatenate([frame, eta])

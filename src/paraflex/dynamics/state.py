@@ -131,7 +131,8 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     phi = system.constraints(signals, t, closest, zero)[0]
     gaps = joint_gaps(system, phi)
     gap, where = f"{max(gaps.values()):.3g} {gap_unit(system, phi)}", " and ".join(list(gaps)[:NAMED])
-    raise AssemblyError(f"the loops do not close: a gap of {gap} remains in {where}", Moment(t, 0), partial=closest)
+    cause = f"the loops do not close: a gap of {gap} remains in {where}"
+    raise AssemblyError(cause, Moment(t, 0), closest, "correct angles of the assembly, lengths or places of points")
 
 
 def closed(system: System, q: NDArray[np.float64], phi: NDArray[np.float64]) -> bool:

@@ -88,7 +88,9 @@ def refuse(engine: str, what: str, field: str) -> NoReturn:
     InputError
         Always.
     """
-    raise InputError(f"{engine} cannot express {what}", field=field, remedy="leave out this engine or that part")
+    raise InputError(
+        f"{engine} cannot express {what}", field=field, remedy="leave out this engine, or that part of the model"
+    )
 
 
 def steps_between(times: NDArray[np.float64], step: float) -> int:

@@ -115,7 +115,8 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     figures["wall_time"] = time.perf_counter() - begin
     record = _record(model, task, torques, history, substeps, options.method, figures)
     if record.figures["message"]:
-        raise IntegrationError(f"Exudyn: {record.figures['message']}", _last_moment(record, history), record)
+        cause = f"Exudyn: {record.figures['message']}"
+        raise IntegrationError(cause, _last_moment(record, history), record, "give it a shorter step")
     return record
 
 

@@ -99,7 +99,7 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
     if motion.trouble:
         reached = task.motion.t[motion.samples - 1]
         moment = Moment(float(reached), (motion.samples - 1) * count)
-        raise IntegrationError(motion.trouble, moment, record(run))
+        raise IntegrationError(motion.trouble, moment, record(run), "give it a shorter step")
     return record(run)
 
 

@@ -61,7 +61,9 @@ def eigen_derivatives(values: NDArray, vectors: NDArray, dK: NDArray, dM: NDArra
     reference = np.max(np.abs(np.diag(coupling)), initial=0.0)
     if np.any(one & (np.abs(coupling) > _COUPLED * reference)):
         raise InputError(
-            "two modes of one frequency part as it changes: no derivative", field="modes", remedy="move it a little"
+            "two modes of one frequency separate as the parameter changes, and have no derivative",
+            field="modes",
+            remedy="choose a slightly different value",
         )
     np.fill_diagonal(one, True)
     mixing = np.where(one, -0.5 * moved_mass, coupling / np.where(one, 1.0, gaps))

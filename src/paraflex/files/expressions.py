@@ -192,7 +192,7 @@ def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
             return _call(name, [_value(argument, value_of) for argument in arguments])
     raise ExpressionError(
         "only numbers, parameters, + - * / ** and brackets may stand in an expression, and functions like sin(...)",
-        "work out the rest elsewhere",
+        "compute the value elsewhere and write the number",
     )
 
 

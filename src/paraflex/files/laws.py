@@ -62,12 +62,15 @@ def read_law(entry: PrescribedTable, parameters: Mapping[str, float], duration: 
     given = [name for name in ("angle", "displacement", "pieces", "table") if getattr(entry, name) is not None]
     if len(given) > 1:
         raise InputError(
-            "a law is given in one way", field=given[-1], value=", ".join(given), remedy=f"drop all but {given[0]}"
+            "a law is given in two ways", field=given[-1], value=", ".join(given), remedy=f"drop all but {given[0]}"
         )
     law = _law(entry, parameters)
     if entry.speed is not None and not isinstance(law, ConstantSpeed):
         raise InputError(
-            "a speed goes with a constant start only", field="speed", value=entry.speed, remedy="write it into the law"
+            "a speed can only be added to an angle or displacement that is a number",
+            field="speed",
+            value=entry.speed,
+            remedy="write it into the law",
         )
     # A duration that makes no sense is refused with the study.
     law.evaluate(np.linspace(0.0, duration, _TRIALS) if duration is not None and duration > 0.0 else np.zeros(1))
@@ -97,11 +100,13 @@ def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> Piecew
         field = f"pieces.{number}"
         if (piece.angle is None) == (piece.displacement is None):
             raise InputError(
-                "a piece has one law", field=field, remedy="give its angle, or its displacement where the joint slides"
+                "a piece needs one law, an angle or a displacement",
+                field=field,
+                remedy="give its angle, or its displacement where the joint slides",
             )
         if (piece.until is None) != (number == len(pieces) - 1):
             raise InputError(
-                "every piece but the last has an end", field=f"{field}.until", value=piece.until,
+                "every piece but the last has an end, and the last has none", field=f"{field}.until", value=piece.until,
                 remedy="give the time in s at which the next one takes over; the last goes on",
             )  # fmt: skip
         name = "angle" if piece.displacement is None else "displacement"

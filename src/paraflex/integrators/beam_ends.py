@@ -69,6 +69,10 @@ class BeamEnds:
         return tuple(_finding(one, one.gauge.value(q)) for one in self._left)
 
 
+# What helps where a point comes to the end of its beam and its joint asks for an error.
+STAY_ON_BEAM = 'lengthen the beam, or let the run go on with at_end = "warn"'
+
+
 def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
     """Findings of points that a motion at samples t, q, v takes off their beams, by cubics between samples.
 
@@ -86,7 +90,7 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
         assert isinstance(end, BeamEnd)
         time = float(t[0]) if k == 0 else _first_outside(gauge, t, q, v, k)
         if end.at_end is AtEnd.ERROR:
-            raise UnreachablePathError(_planned(end, gauge.value(q)), Moment(time, k))
+            raise UnreachablePathError(_planned(end, gauge.value(q)), Moment(time, k), remedy=STAY_ON_BEAM)
         if end.at_end is AtEnd.WARN:
             found.append(_finding(_Leaving(gauge, time), gauge.value(q)))
     return tuple(found)

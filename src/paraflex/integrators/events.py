@@ -31,7 +31,7 @@ class JointLimit(CheckedFields):
         super().__post_init__()
         if not self.low < self.high or (math.isinf(self.low) and math.isinf(self.high)):
             raise InputError(
-                "no limits that a joint can be between", field=f"limit of joint {self.joint}",
+                "the lower limit is not below the upper one, or both are missing", field=f"limit of joint {self.joint}",
                 value=(self.low, self.high), remedy="give a lower limit, a higher upper one, or one of them",
             )  # fmt: skip
 

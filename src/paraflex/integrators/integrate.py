@@ -19,7 +19,7 @@ from paraflex.errors import (
     SliderOffBeamError,
 )
 from paraflex.integrators import native, outside
-from paraflex.integrators.beam_ends import BeamEnds
+from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
 from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.events import BeamEnd
 from paraflex.integrators.gauges import make_gauges
@@ -28,7 +28,7 @@ from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
-from paraflex.integrators.watch import bent_too_far, come_apart, least_norm
+from paraflex.integrators.watch import Breakdown, bent_too_far, come_apart, least_norm
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import ERROR_TEST, FINISHED, NO_CONVERGENCE, NOT_FINITE, PAUSED
 from paraflex.mechanism import AtEnd
@@ -40,14 +40,24 @@ _WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
 _NATIVE = (Family.ESDIRK, Family.NEWMARK)
-_NOT_IN_PARTS = (
-    "Newton's iteration does not converge in a fixed step, nor in parts of it; "
-    "take a shorter step, or leave it out and choose a tolerance"
-)
-_CAUSES = {
-    NO_CONVERGENCE: "Newton's iteration does not converge, however small the step",
-    NOT_FINITE: "the solution is no longer finite",
-    ERROR_TEST: "the error test asks for steps below the smallest one",
+_PASSES = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
+_SHORTER = "take a shorter step, or leave it out and choose a tolerance"
+_NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
+_UNITS = "look for masses, stiffnesses, loads and laws in a wrong unit"
+# By the code with which the kernel ends a run.
+CAUSES = {
+    NO_CONVERGENCE: Breakdown(
+        "Newton's iteration does not converge, however small the step,",
+        f"{_UNITS}, or choose another method or a coarser tolerance",
+    ),
+    NOT_FINITE: Breakdown(
+        "positions, velocities or accelerations are no longer finite numbers",
+        f"{_UNITS}, or choose an implicit method or a shorter step",
+    ),
+    ERROR_TEST: Breakdown(
+        "the error test asks for steps below the smallest one",
+        f"{_UNITS}, for loads and laws that jump, or choose a coarser tolerance",
+    ),
 }
 
 
@@ -109,12 +119,12 @@ def integrate(
     ends, crossing = BeamEnds(system, initial), None
     gauges = (*make_gauges(system, initial.q, options.events), *ends.gauges)
     run = prepare(problem, options)
-    status, message, bent, drift, slow = "complete", "", "", "", ""
+    status, message, bent, drift, slow = "complete", "", None, None, None
     native_method = options.description.family in _NATIVE
     pace = Pace(
         initial.time, float(problem.times[-1]), options.max_steps, _WINDOW if native_method else _WINDOW_OUTSIDE
     )
-    code, limits = PAUSED, (run.dependent_rows, options.tolerance)
+    code, limits = PAUSED, (run.dependent_rows, options.tolerance, options.treatment)
     most = pace.most - (0 if begun is None else begun.steps + begun.rejected)
     try:
         run.start()
@@ -143,17 +153,25 @@ def integrate(
     _refuse_beam_end(solution, crossing)
     if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution
-    cause = bent or drift or slow or _cause(code, options, pace)
+    cause, remedy = bent or drift or slow or _breakdown(code, options, pace.most)
     now = run.now()
     # Near a singular position it may be Newton or the error test that gives up first.
     lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and not (bent or drift) else []
     error = ConstraintDriftError if drift and not bent else IntegrationError
     if len(lost) > run.dependent_rows:
-        error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)})"
+        error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)}),"
+        remedy = f"prescribe motions within the mechanism's reach, or {_PASSES}"
     elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
         error, cause = SingularPositionError, _before_singular(options.method, run.singular_ahead)
+        remedy = _PASSES
     moment = Moment(now.t, solution.steps + (0 if begun is None else begun.steps))
-    raise error(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
+    raise _failed(error(cause, moment, solution, remedy))
+
+
+def _failed(error: IntegrationError) -> IntegrationError:
+    """An error whose partial solution says what it says."""
+    error.partial = replace(error.partial, status="failed", message=str(error))
+    return error
 
 
 def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
@@ -163,8 +181,7 @@ def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
     ):
         return
     moment = Moment(crossing.t, solution.steps)
-    cause = crossing.reached
-    raise SliderOffBeamError(cause, moment, replace(solution, status="failed", message=f"{cause} at {moment}"))
+    raise _failed(SliderOffBeamError(crossing.reached, moment, solution, STAY_ON_BEAM))
 
 
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
@@ -175,16 +192,18 @@ def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     return outside.prepare(problem, options)
 
 
-def _cause(code: int, options: IntegrationOptions, pace: Pace) -> str:
+def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:
+    """Why a run ended with a code of the kernel, or has not ended after the most steps, and what to do."""
     if code == PAUSED:
-        return f"no end after {pace.most} steps"
-    return _NOT_IN_PARTS if code == NO_CONVERGENCE and options.step is not None else _CAUSES[code]
+        remedy = "allow more steps (max_steps), or choose a coarser tolerance or a shorter duration"
+        return Breakdown(f"the run has not ended after {most} steps,", remedy)
+    return _NOT_IN_PARTS if code == NO_CONVERGENCE and options.step is not None else CAUSES[code]
 
 
 def _before_singular(method: str, time: float) -> str:
     return (
         f"a singular position lies ahead, at about t = {time:.4g} s, which {method} on index-3 equations cannot be "
-        "relied on to pass: choose an ESDIRK method, say tr-bdf2 or esdirk4"
+        "relied on to pass; stopped"
     )
 
 

@@ -88,8 +88,9 @@ def march(
         here = _condense(blocks, inverses, *outside(slice(chunk, chunk + _CHUNK)))
         for k in range(len(here.rank)):
             if here.rank[k] != rank:
-                cause = f"the constraints change rank from {rank} to {here.rank[k]}, a singular position"
-                raise IntegrationError(cause, Moment(float(times[chunk + k]), chunk + k))
+                cause = f"{abs(rank - here.rank[k])} of the constraints depend on others at a singular position,"
+                remedy = "keep the path clear of it, or compute without kineto-elastodynamics"
+                raise IntegrationError(cause, Moment(float(times[chunk + k]), chunk + k), remedy=remedy)
             carried = (alpha_f * ddx - alpha_m * a) / (1.0 - alpha_m)
             predicted = x + h * dx + h**2 * ((0.5 - beta) * a + beta * carried)
             free = here.load[k] - soften @ predicted

@@ -127,12 +127,12 @@ class IntegrationOptions(CheckedFields):
         known = [treatment.value for treatment in self.description.treatments]
         if self.constraints is not None and self.constraints not in known:
             raise InputError(
-                f"not with {self.method}", field="constraints", value=self.constraints,
+                f"{self.method} cannot keep the constraints in this way", field="constraints", value=self.constraints,
                 remedy=f"choose from {', '.join(known)}, or another method",
             )  # fmt: skip
         if self.automatic_gains and self.treatment != Treatment.BAUMGARTE:
             raise InputError(
-                f"{self.treatment.value} has no coefficients", field="automatic_gains", value=True,
+                f"{self.treatment.value} has no Baumgarte coefficients", field="automatic_gains", value=True,
                 remedy="choose constraints = baumgarte",
             )  # fmt: skip
 

@@ -168,7 +168,8 @@ def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
     """
     if options.automatic_gains:
         raise InputError(
-            f"{options.method} does not show its steps", field="automatic_gains", value=True,
+            f"automatic gains follow the steps, which {options.method} does not show",
+            field="automatic_gains", value=True,
             remedy="give alpha and beta, or choose another method",
         )  # fmt: skip
     return OutsideRun(problem, options, _stepper(problem, options))

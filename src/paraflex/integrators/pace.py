@@ -10,6 +10,7 @@ import numpy as np
 from paraflex.dynamics import System
 from paraflex.dynamics.singularity import SingularityMeasure
 from paraflex.integrators.run import Instant
+from paraflex.integrators.watch import Breakdown
 
 # Steps of a run where nobody says how many.
 MOST_STEPS = 10_000_000
@@ -74,13 +75,13 @@ class Pace:
         return self._most is None and self.expected > _MANY and self.step * self._usual * _SLOWER < 1.0
 
 
-def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace) -> str:
+def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace) -> Breakdown:
     """Why a run is given up early: how small its steps are, what moves fastest, and what to do."""
     needed = f"about {pace.expected:.2g}" if math.isfinite(pace.expected) else "infinitely many"
-    return (
+    return Breakdown(
         f"steps are down to {pace.step:.2g} s, and at this pace the run would need {needed} of them: "
-        f"{_fastest(system, now)}{_singular(system, now, start)}; choose a motion that turns links less fast, a "
-        "coarser tolerance, or allow more steps (max_steps): given up"
+        f"{_fastest(system, now)}{_singular(system, now, start)}; given up",
+        "choose a motion that turns links less fast, a coarser tolerance, or allow more steps (max_steps)",
     )
 
 

@@ -91,7 +91,9 @@ def spectrum(
     """
     wanted = np.asarray(frequency, dtype=float).reshape(-1)
     if not (wanted.size and np.all(np.isfinite(wanted)) and wanted[0] > 0.0 and np.all(np.diff(wanted) > 0.0)):
-        raise InputError("must ascend from above zero", field="frequency", remedy="say numpy.geomspace(0.01, 100, 200)")
+        raise InputError(
+            "frequencies must be positive and ascend", field="frequency", remedy="say numpy.geomspace(0.01, 100, 200)"
+        )
     roots = _roots(method, order, parameters or {})
     first = min(_START, wanted[0])
     steps = int(np.log(wanted[-1] / first) / np.log(_DENSE)) + 2
@@ -149,7 +151,9 @@ def tableau_of(method: str) -> tuple[Array, Array]:
         return _collocation((4.0 - np.sqrt(6.0)) / 10.0, (4.0 + np.sqrt(6.0)) / 10.0, 1.0)
     if method in TABLEAUX:
         return TABLEAUX[method].A, TABLEAUX[method].A[-1]
-    raise InputError("no tableau", field="method", value=method, remedy="take a Runge-Kutta method")
+    raise InputError(
+        "the method has no Butcher tableau", field="method", value=method, remedy="take a Runge-Kutta method"
+    )
 
 
 def stability(A: Array, b: Array, z: complex) -> complex:

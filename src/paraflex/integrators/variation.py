@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import numbers_of, with_numbers
 from paraflex.errors import InputError, IntegrationError, Moment, SliderOffBeamError
-from paraflex.integrators.beam_ends import BeamEnds
+from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
+from paraflex.integrators.integrate import CAUSES
 from paraflex.integrators.methods import METHODS, Family, Treatment
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.integrators.options import IntegrationOptions
@@ -108,16 +109,20 @@ def check_differentiable(options: IntegrationOptions) -> None:
     if options.description.family != Family.ESDIRK:
         able = [name for name, method in METHODS.items() if method.family == Family.ESDIRK]
         raise InputError(
-            "has no derivatives", field="method", value=options.method, remedy=f"choose from {', '.join(able)}"
+            "derivatives need another method",
+            field="method",
+            value=options.method,
+            remedy=f"choose from {', '.join(able)}",
         )
     if options.treatment != Treatment.BAUMGARTE:
         raise InputError(
-            "has no derivatives", field="constraints", value=options.treatment.value, remedy='choose "baumgarte"'
+            "derivatives need Baumgarte's treatment of the constraints",
+            field="constraints",
+            value=options.treatment.value,
+            remedy='choose "baumgarte"',
         )
     if options.events:
-        raise InputError(
-            "an event ends a run at a time of its own: no derivatives", field="events", remedy="leave them out"
-        )
+        raise InputError("a run that an event ends has no derivatives", field="events", remedy="leave them out")
 
 
 def run_derivatives(problem: Problem, options: IntegrationOptions, directions: Sequence[Direction]) -> RunDerivatives:
@@ -167,7 +172,8 @@ def _check_on_beams(problem: Problem, motion: Motion) -> None:
         outside = np.nonzero(gauge.inside(motion.q) <= 0.0)[0]
         if outside.size and gauge.ends_run:
             first = int(outside[0])
-            raise SliderOffBeamError(gauge.reached(motion.q[first]), Moment(float(problem.times[first]), first))
+            moment = Moment(float(problem.times[first]), first)
+            raise SliderOffBeamError(gauge.reached(motion.q[first]), moment, remedy=STAY_ON_BEAM)
 
 
 def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Array:
@@ -203,7 +209,8 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
         if code == FINISHED:
             break
         if code != PAUSED:
-            raise IntegrationError("the run cannot go on", Moment(before, int(accepted)))
+            cause, remedy = CAUSES[code]
+            raise IntegrationError(cause, Moment(before, int(accepted)), remedy=remedy)
         if state.counts[STEPS] == accepted:
             # The first stage is solved anew for the second shorter step.
             restart |= bool(state.counts[FAILURES] == 2)
@@ -292,7 +299,9 @@ class _Varied:
         if not self.unsettled <= _UNSETTLED:
             worst = int(np.argmax(~(left <= _UNSETTLED)))
             raise IntegrationError(
-                "the equations of a stage cannot be solved to rounding", Moment(float(chunk.history.t[worst]), worst)
+                "the equations of a step cannot be solved to rounding, as derivatives need,",
+                Moment(float(chunk.history.t[worst]), worst),
+                remedy="choose a finer tolerance, or take derivatives by differences",
             )
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import System, dependence
-from paraflex.dynamics.projection import NAMED, contradiction, joint_gaps
+from paraflex.dynamics.projection import AGREE, NAMED, contradiction, gap_unit, joint_gaps
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.sparse import sparse_jacobian
+from paraflex.integrators.methods import Treatment
 from paraflex.kernel.packed import Signals
 
 # Slopes of a beam this large are beyond any theory of small slopes [rad]: what computes them diverges.
@@ -20,20 +23,36 @@ _APART, _CONTRADICTION = 7e-3, 7e-4
 _SAME_FORCES = 1e-9
 
 
-def bent_too_far(system: System, q: NDArray[np.float64]) -> str:
-    """Which beam is bent beyond what the theory can describe, and how far; empty for none."""
+class Breakdown(NamedTuple):
+    """Why a run cannot go on, and what to do about it."""
+
+    cause: str
+    remedy: str
+
+
+def bent_too_far(system: System, q: NDArray[np.float64]) -> Breakdown | None:
+    """Which beam is bent beyond what the theory can describe, and how far; None for none."""
     for body in system.bodies:
         slope = float(np.max(np.abs(body.slopes(q)), initial=0.0))
         if slope > _LARGEST_SLOPE:
-            geometry = system.mechanism.geometry.value
-            return f"{body.name} bends by {slope:.1f} rad, too far for {geometry} geometry: the motion diverges"
-    return ""
+            return Breakdown(
+                f"{body.name} bends to a slope of {slope:.1f} rad, beyond theories of small slopes: the motion "
+                "diverges",
+                f"look at Young's modulus (Pa), section and length (m) of {body.name}, and at what loads it",
+            )
+    return None
 
 
 def come_apart(
-    system: System, signals: Signals, t: float, q: NDArray[np.float64], dependent: int, tolerance: float
-) -> str:
-    """Which constraints are left beyond what errors of integration explain, and how far; empty for none.
+    system: System,
+    signals: Signals,
+    t: float,
+    q: NDArray[np.float64],
+    dependent: int,
+    tolerance: float,
+    treatment: Treatment,
+) -> Breakdown | None:
+    """Which constraints are left beyond what errors of integration explain, and how far; None for none.
 
     Parameters
     ----------
@@ -46,15 +65,21 @@ def come_apart(
         Constraint rows that follow from others: nothing but their consistency holds them.
     tolerance : float
         Of the run [m]; what it allows is no fault.
+    treatment : Treatment
+        What keeps the constraints in the run.
     """
     phi, _ = system.constraints(signals, t, q, np.zeros(system.n))
     if not system.gap(phi) > max(_CONTRADICTION if dependent else _APART, tolerance / system.size):
-        return ""
+        return None
     if dependent:
-        return contradiction(system, phi, dependence(system, q, count=dependent), "positions")
+        return Breakdown(contradiction(system, phi, dependence(system, q, count=dependent), "positions"), AGREE)
     gaps = joint_gaps(system, phi)
     gap, where = max(gaps.values()), " and ".join(list(gaps)[:NAMED])
-    return f"joints come apart, by {gap:.3g} in {where}: choose larger Baumgarte coefficients or a finer tolerance"
+    finer = "choose a finer tolerance, or a shorter step where it is fixed"
+    return Breakdown(
+        f"joints come apart, by {gap:.3g} {gap_unit(system, phi)} in {where},",
+        f"{finer}, or larger Baumgarte coefficients" if treatment is Treatment.BAUMGARTE else finer,
+    )
 
 
 def least_norm(

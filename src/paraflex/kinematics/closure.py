@@ -41,7 +41,8 @@ _LOOKS, _MORE_LOOKS = 41, 9
 # A path that leaves what can be reached within this part of what is left of it does so where closure stopped.
 _SOON = 0.05
 # A path that passes within a thousandth of a link of such a position cannot be told from one through it.
-_ALMOST = "or so near to one that the assembly beyond it cannot be told"
+_ALMOST = "or comes so near to one that the assembly beyond it is not certain"
+_MOVE = "move the path or the bases, or choose another assembly"
 _OTHER = "it can be reached, but only past a Type I singularity or in another assembly"
 
 
@@ -378,7 +379,7 @@ class PathClosure:
             detail = f"{detail}; {furthest}" if detail else furthest
         place = tuple(found.desired[0, lengths].tolist()) or None
         return UnreachablePathError(
-            cause, Moment(at, step, place), partial, detail=detail,
+            cause, Moment(at, step, place), partial, _MOVE, detail=detail,
             shortfall=float(np.max(found.distance)), shortfall_angle=float(np.max(found.turn)),
         )  # fmt: skip
 

@@ -129,7 +129,12 @@ def check_references(mechanism: Mechanism) -> None:
             _known_point(mechanism, ref, field)
             finite(place, f"{field}.{ref}")
             if ref.on_ground:
-                raise InputError("ground points are known", field=field, value=str(ref), remedy="name a body's point")
+                raise InputError(
+                    "the places of ground points are given in [ground]",
+                    field=field,
+                    value=str(ref),
+                    remedy="name a body's point",
+                )
         # It names the body that neither angles nor points place.
         approximate_poses(mechanism, assembly)
 
@@ -164,7 +169,10 @@ def check_task(mechanism: Mechanism) -> None:
     _known_point(mechanism, point, "end_effector.point")
     if point.on_ground:
         raise InputError(
-            "the end-effector does not move", field="end_effector.point", value=str(point), remedy="name a body's point"
+            "the end-effector is a point of the ground, which does not move",
+            field="end_effector.point",
+            value=str(point),
+            remedy="name a body's point",
         )
 
 

@@ -199,7 +199,9 @@ def _symmetric(matrix: np.ndarray, field: str, sign: float = 1.0) -> np.ndarray:
     """The symmetric part of a matrix that is so to within lost digits; with sign -1 the skew part."""
     other = sign * matrix.T
     if np.max(np.abs(matrix - other)) > _ASYMMETRY * np.max(np.abs(matrix)):
-        raise InputError("is not symmetric" if sign > 0.0 else "is not skew", field=field, remedy="check its entries")
+        raise InputError(
+            "is not symmetric" if sign > 0.0 else "is not skew-symmetric", field=field, remedy="check its entries"
+        )
     return 0.5 * (matrix + other)
 
 
@@ -212,7 +214,9 @@ def _array(values: Any, shape: tuple[int, ...], field: str) -> np.ndarray:
         raise InputError("is not a table of numbers", field=field, remedy=f"give {size} of them") from None
     if array.shape != shape:
         found = " x ".join(map(str, array.shape)) or "one"
-        raise InputError("not of the size of the stiffness", field=field, value=found, remedy=f"give {size} numbers")
+        raise InputError(
+            "not of the size of the stiffness matrix", field=field, value=found, remedy=f"give {size} numbers"
+        )
     if not np.all(np.isfinite(array)):
         raise InputError("not all finite numbers", field=field, remedy=f"give {size} of them")
     return array

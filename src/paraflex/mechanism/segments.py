@@ -168,7 +168,12 @@ def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, in
             raise InputError("a beam needs at least one segment", field=f"segments.{name}", value=count, remedy="say 8")
     for name in names:
         if name not in counts:
-            raise InputError("no number of segments", field="segments", value=name, remedy="give one for every beam")
+            raise InputError(
+                "the number of segments of this beam is missing",
+                field="segments",
+                value=name,
+                remedy="give one for every beam",
+            )
     return counts
 
 

@@ -111,4 +111,6 @@ def check_start(mechanism: Mechanism, start: Start) -> None:
         known(ref.body, bodies, "start.velocity.point", "body")
         known(ref.point, bodies[ref.body].points, "start.velocity.point", "point")
     if start.rates and (start.angular or start.point):
-        raise InputError("given beside velocities", field="start.rates", remedy="give one of rates and velocity")
+        raise InputError(
+            "rates and velocity are both given", field="start.rates", remedy="give one of rates and velocity"
+        )

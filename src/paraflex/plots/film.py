@@ -126,7 +126,7 @@ def plan_film(
         count = round(duration / speed * fps) + 1
         if count > _MOST_FRAMES:
             raise InputError(
-                f"a film of {count} pictures", field="speed", value=speed,
+                f"the film would have {count} pictures, more than {_MOST_FRAMES}", field="speed", value=speed,
                 remedy=f"choose a higher speed: the run takes {duration:g} s",
             )  # fmt: skip
         times = np.linspace(first, last, max(count, 2))
@@ -207,7 +207,7 @@ def film_kind(file: Path) -> str:
     if kind in FORMATS or kind == "":
         return kind
     raise InputError(
-        "no kind of film", field="output", value=str(file),
+        "unknown kind of film", field="output", value=str(file),
         remedy="end it in .mp4, .gif, .svg or .png (one picture), or name a folder for a sequence of PNG",
     )  # fmt: skip
 
@@ -240,7 +240,9 @@ def _check(options: FilmOptions) -> None:
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise InputError("must be positive", field=name, value=value, remedy="leave it out for the default")
     if options.fps > 240.0:
-        raise InputError("more than a screen shows", field="fps", value=options.fps, remedy="30 is smooth")
+        raise InputError(
+            "more pictures a second than a screen shows", field="fps", value=options.fps, remedy="30 is smooth"
+        )
     for side in options.size or ():
         if not _SMALLEST <= side <= _LARGEST:
             raise InputError(

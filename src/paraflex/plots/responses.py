@@ -117,7 +117,7 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
     chosen = table.judged_by(metrics, 2) if metrics else in_conflict(table, table.judged_by(None, len(table.metrics)))
     if len(chosen) != 2:
         raise InputError(
-            "a front is of two metrics", field="metric", value=", ".join(chosen), remedy="name two that vary"
+            "a Pareto front is of two metrics", field="metric", value=", ".join(chosen), remedy="name two that vary"
         )
     figure, axes = panels(1, 1, width=ONE_COLUMN)
     panel = axes[0, 0]

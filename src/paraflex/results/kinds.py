@@ -47,4 +47,4 @@ def wrong_kind(kind: str, kinds: Iterable[str], field: str = "data") -> InputErr
     makers = [_MADE_BY[each] for each in wanted if each in _MADE_BY]
     remedy = "give those of the kind " + " or ".join(f'"{each}"' for each in wanted)
     remedy += f", as {' or '.join(makers)} makes them" if len(makers) == len(wanted) else ""
-    return InputError(f'results of the kind "{kind}"', field=field, remedy=remedy)
+    return InputError(f'these are results of the kind "{kind}"', field=field, remedy=remedy)

@@ -276,7 +276,10 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
         if len(runs) == 2:
             break
     if len(runs) < 2:
-        raise IntegrationError(f"no converged run to compare with ({'; '.join(reasons)})")
+        raise IntegrationError(
+            f"no two runs came to their end to compare the others with ({'; '.join(reasons)})",
+            remedy="choose coarser tolerances, a shorter duration, or a longer limit of time for each run",
+        )
     (method, own, solution), (other, loose, check) = runs
     places = case.places(solution)
     uncertainty = _distance(places, case.places(check))

@@ -13,6 +13,7 @@ from paraflex.errors import ValidityWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import Solution
 from paraflex.validity.bending import bending_of
+from paraflex.validity.blame import to_blame, with_blame
 from paraflex.validity.indicators import (
     AXIAL_LIMIT,
     DRIVEN_AXIAL_LIMIT,
@@ -43,7 +44,9 @@ __all__ = [
     "doubtful_results",
     "fourth_order",
     "mechanism_size",
+    "to_blame",
     "warn",
+    "with_blame",
 ]
 
 

@@ -150,7 +150,7 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
 
 def _large_efforts(where: _Where, system: System, driven: Driven) -> Iterator[Finding]:
     mechanism = where.mechanism
-    size = mechanism_size(mechanism)
+    size = mechanism_size(mechanism) or system.size
     force, turning = _expected(system, mechanism, driven.acceleration)
     for motor, peak in driven.efforts.items():
         unit = driven.units[motor]
@@ -176,7 +176,8 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
     """Forces of joints and of prescribed motions; drives of a path have motors."""
     if not solution.multipliers.size:
         return
-    size = mechanism_size(where.mechanism)
+    # A mechanism of one point has no size of its own.
+    size = mechanism_size(where.mechanism) or system.size
     accelerations = np.stack([np.linalg.norm(solution.a[:, body.position], axis=1) for body in system.bodies])
     expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))))
     # NaN at singular positions, and of rows that a method has no multipliers of.

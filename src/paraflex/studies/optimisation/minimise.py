@@ -43,7 +43,10 @@ def minimise(problem: Problem, method: str | None, start: Array) -> str:
     name = method or DEFAULT_METHOD
     if name == LBFGSB and problem.objective.limits:
         raise InputError(
-            "takes no limits", field="search.method", value=name, remedy=f'say "{SLSQP}" or "{TRUST}", or drop at_most'
+            "the method takes no limits (at_most)",
+            field="search.method",
+            value=name,
+            remedy=f'say "{SLSQP}" or "{TRUST}", or drop at_most',
         )
     with warnings.catch_warnings():
         # SciPy says so of quasi-Newton updates whose slopes do not change, as at bounds and beside failures.

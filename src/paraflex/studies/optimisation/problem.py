@@ -113,7 +113,8 @@ def start_scales(study: DesignStudy, evaluate: Evaluate) -> Mapping[str, float]:
     for column, scale in scales.items():
         if scale == 0.0:
             raise InputError(
-                "zero at the start: nothing is relative to it", field=f"objective.minimise.{column}",
+                "the metric is zero at the start, and nothing can be relative to it",
+                field=f"objective.minimise.{column}",
                 remedy="say relative = false",
             )  # fmt: skip
     return scales

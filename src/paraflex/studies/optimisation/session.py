@@ -178,7 +178,7 @@ def _slopes_run(study: DesignStudy, workers: Workers) -> RunTask | None:
     method = study.search.method or DEFAULT_METHOD
     if study.objective is not None and method not in WITH_SLOPES:
         raise InputError(
-            f"{method} uses none", field="search.gradients", value=EXACT,
+            f"{method} uses no gradients", field="search.gradients", value=EXACT,
             remedy=f"leave it out, or choose from {', '.join(WITH_SLOPES)}",
         )  # fmt: skip
     reason = no_exact_slopes(study)

@@ -239,7 +239,10 @@ def _check_range(field: str, entry: ParameterTable) -> None:
     for key in ("values", "number", "whole"):
         if getattr(entry, key):
             raise InputError(
-                "is for sweeps", field=f"{field}.{key}", value=getattr(entry, key), remedy="give low and high alone"
+                "only sweeps have it",
+                field=f"{field}.{key}",
+                value=getattr(entry, key),
+                remedy="give low and high alone",
             )
     if entry.low is not None and entry.low == entry.high:
         raise InputError("low and high are equal", field=f"{field}.high", value=entry.high, remedy="leave it out")
@@ -254,7 +257,12 @@ def _check_column(field: str, column: str, motors: tuple[str, ...]) -> None:
     name, _, motor = column.partition(".")
     known = [f"{name}.{each}" for each in motors]
     if METRICS[name].per_motor and column not in known:
-        raise InputError("of which motor?", field=field, value=column, remedy=suggestion(column, known))
+        raise InputError(
+            "this metric is one of each motor, and no motor is named",
+            field=field,
+            value=column,
+            remedy=suggestion(column, known),
+        )
     if motor and not METRICS[name].per_motor:
         raise InputError("not a metric per motor", field=field, value=column, remedy=f'say "{name}"')
 
@@ -265,7 +273,12 @@ def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given
     found = {number_at(setting.data, place) for place in places} if given is None else {given}
     if len(found) > 1:
         told = sorted(found)
-        raise InputError("its fields differ in the mechanism's file", field=field, value=told, remedy="give a start")
+        raise InputError(
+            "its fields have different values in the mechanism's file, so that there is no start",
+            field=field,
+            value=told,
+            remedy="give a start",
+        )
     (start,) = found
     assert parameter.low is not None
     assert parameter.high is not None
@@ -322,9 +335,11 @@ def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:
     if name is None and len(known) == 1:
         return known[0]
     if name is None:
-        raise InputError("the study has several", field=field, remedy=f"choose from {', '.join(known)}")
+        raise InputError(
+            "the study has several, and none is named", field=field, remedy=f"choose from {', '.join(known)}"
+        )
     if name not in known:
-        raise InputError("not one of the study's", field=field, value=name, remedy=suggestion(name, known))
+        raise InputError("the study has none of that name", field=field, value=name, remedy=suggestion(name, known))
     return name
 
 

@@ -151,7 +151,9 @@ class Change:
     def _check_layout(self) -> None:
         if not all(same_layout(each.packed, self.planned.system.packed) for each in self.beside):
             raise InputError(
-                "more than numbers changes with it: no derivative", field="vary", remedy="move it a little with --at"
+                "the number of pieces or elements changes with it: no derivative",
+                field="vary",
+                remedy="choose a slightly different value with --at",
             )
 
     @cached_property
@@ -181,8 +183,9 @@ class Change:
         knots = path_knots(self.there.path, self.there.end)
         if knots.size != self.planned.plan.knots.size:
             raise InputError(
-                "more than numbers changes with it: no derivative", field=f"vary.{self.name}",
-                remedy="move it a little with --at",
+                "the number of pieces or elements changes with it: no derivative",
+                field=f"vary.{self.name}",
+                remedy="choose a slightly different value with --at",
             )  # fmt: skip
         return knots
 
@@ -303,8 +306,9 @@ class Change:
             at = make_problem(problem.system, signals, problem.initial, times, inner).stops
             if at.size != problem.stops.size or not same_layout(signals, problem.signals):
                 raise InputError(
-                    "more than numbers changes with it: no derivative", field=f"vary.{self.name}",
-                    remedy="move it a little with --at",
+                    "the number of pieces or elements changes with it: no derivative",
+                    field=f"vary.{self.name}",
+                    remedy="choose a slightly different value with --at",
                 )  # fmt: skip
             found.append(numbers_of(signals))
             stops.append(at)

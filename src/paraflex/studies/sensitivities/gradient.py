@@ -104,8 +104,9 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Chan
     if run.solution.singular_positions:
         time = run.solution.singular_positions[0]
         raise NumericalError(
-            "the run passes a singular position, where constraint forces have a pole: no derivatives",
+            "the run passes a singular position, where joint forces grow without bound and nothing has derivatives,",
             Moment(time, run.solution.steps),
+            remedy="shorten the run, or change lengths or the path so that it passes none",
         )
     of_mode = [change.of_mode(nominal) for change in changes]
     found = run_derivatives(nominal.problem, nominal.options, [each.direction for each in of_mode])

@@ -82,7 +82,7 @@ def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> 
     size = abs(value) if size is None else abs(size)
     if not size > 0.0:
         raise InputError(
-            "is zero: how small are steps?", field=where, value=value,
+            "is zero, which gives no size of steps", field=where, value=value,
             remedy="give low and high, whose distance is taken for its size",
         )  # fmt: skip
     return size
@@ -129,7 +129,8 @@ def _nominal(setting: Setting, name: str, places: tuple[Place, ...]) -> float:
     values = [_value(setting, place) for place in places]
     if any(value != values[0] for value in values):
         raise InputError(
-            "its fields hold different numbers: which is the nominal one?", field=f"vary.{name}.fields",
+            "its fields have different values in the mechanism's file, so that there is no nominal one",
+            field=f"vary.{name}.fields",
             value=values, remedy=f"say --at {name}=VALUE, or give each a parameter of its own",
         )  # fmt: skip
     return values[0]

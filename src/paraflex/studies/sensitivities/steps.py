@@ -82,7 +82,9 @@ class _Walk:
             return self.number(here, near)
         if any(type(each) is not type(here) for each in near):
             raise InputError(
-                "more than numbers changes with it: no derivative", field="vary", remedy="move it a little with --at"
+                "the number of pieces or elements changes with it: no derivative",
+                field="vary",
+                remedy="choose a slightly different value with --at",
             )
         if isinstance(here, np.ndarray):
             return self.array(here, near)
@@ -111,7 +113,9 @@ class _Walk:
     def sequence(self, here: Any, near: list[Any]) -> Any:
         if any(len(each) != len(here) for each in near):
             raise InputError(
-                "more than numbers changes with it: no derivative", field="vary", remedy="move it a little with --at"
+                "the number of pieces or elements changes with it: no derivative",
+                field="vary",
+                remedy="choose a slightly different value with --at",
             )
         new = [self.step(value, list(others)) for value, *others in zip(here, *near, strict=True)]
         if all(a is b for a, b in zip(new, here, strict=True)):

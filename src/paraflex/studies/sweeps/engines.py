@@ -190,10 +190,15 @@ def open_engine(name: str, workers: int | None = None, cluster: str | None = Non
     if name not in ENGINES:
         raise InputError("unknown engine", field="--engine", value=name, remedy=suggestion(name, ENGINES))
     if cluster is not None and name != DASK:
-        raise InputError("is for dask", field="--cluster", value=cluster, remedy="say --engine dask, or leave it out")
+        raise InputError(
+            "only the engine dask takes a cluster",
+            field="--cluster",
+            value=cluster,
+            remedy="say --engine dask, or leave it out",
+        )
     if cluster is not None and workers is not None:
         raise InputError(
-            "the cluster has its own", field="--workers", value=workers, remedy="leave it out with --cluster"
+            "the cluster has workers of its own", field="--workers", value=workers, remedy="leave it out with --cluster"
         )
     if workers is not None and workers < 1:
         raise InputError("must be positive", field="--workers", value=workers, remedy="say 2")

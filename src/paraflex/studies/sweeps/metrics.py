@@ -78,8 +78,9 @@ def measure(run: TrackingRun, names: tuple[str, ...]) -> dict[str, float | int]:
     """
     solution = run.solution
     if solution.event:
-        cause = f"stopped before its end, at {solution.event}: no metrics"
-        raise IntegrationError(cause, Moment(solution.event_time, solution.steps), run)
+        cause = f"the run stopped before its end, at {solution.event}, so that it has no metrics,"
+        remedy = 'lengthen the beam, or let runs go on with at_end = "warn"'
+        raise IntegrationError(cause, Moment(solution.event_time, solution.steps), run, remedy)
     traces = make_traces(run)
     motors = [motor.name for motor in run.task.mechanism.motors]
     out: dict[str, float | int] = {}

@@ -98,11 +98,17 @@ def check_varied(parameter: Varied, kind: str) -> None:
     _check_range(parameter, where)
     if kind == GRID and not (parameter.number is not None and parameter.number >= 1):
         raise InputError(
-            "how many values?", field=f"{where}.number", value=parameter.number, remedy="give number, or values"
+            "a grid needs the number of values in this range",
+            field=f"{where}.number",
+            value=parameter.number,
+            remedy="give number, or values",
         )
     if kind != GRID and parameter.number is not None:
         raise InputError(
-            "is for grids", field=f"{where}.number", value=parameter.number, remedy="give number in [sampling]"
+            "only grids have a number of values for each parameter",
+            field=f"{where}.number",
+            value=parameter.number,
+            remedy="give number in [sampling]",
         )
 
 
@@ -180,7 +186,7 @@ def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, s
         raise InputError("must not be negative", field="sampling.seed", value=seed, remedy="say 0")
     if kind in (RANDOM, SOBOL):
         if not parameters:
-            raise InputError("nothing varies", field="vary", remedy="add a [vary.NAME] table")
+            raise InputError("no parameter varies", field="vary", remedy="add a [vary.NAME] table")
         if number is None or number < 1:
             raise InputError(
                 "must be positive" if number is not None else "is missing", field="sampling.number", value=number,
