@@ -225,7 +225,7 @@ def test_studies_shorter_than_a_path_say_so(tmp_path):
     (tmp_path / "study.toml").write_text(SHORT_STUDY, encoding="utf-8")
     done = paraflex("sweep", "study.toml", "--output", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    words = 'path.square: only a part of the path was run: 0.3 of 0.532 s, 53.5 % of its length'
+    words = "path.square: only a part of the path was run: 0.3 of 0.532 s, 53.5 % of its length"
     assert f"warning: {words}" in done.stdout
     # The line takes 0.1 s.
     assert "line" not in done.stdout
