@@ -34,14 +34,17 @@ def loose_points(rigid: System, q: NDArray[np.float64]) -> Iterator[Finding]:
     sliding = {end.body for joint in mechanism.joints if isinstance(joint, AxisJoint) for end in (joint.a, joint.b)}
     sliding.discard(GROUND)
     reported: set[PointRef] = set()
+    size = mechanism_size(mechanism)
+    pairs: list[tuple[bool, float, PointRef, PointRef]] = []
     for one, other in product(unused, known):
         apart = one.body != other.body and frozenset((one.body, other.body)) not in direct
-        alike = one.point == other.point or (other in unused and _stem(one) == _stem(other))
-        if not (apart and alike) or reported & {one, other}:
-            continue
-        gap = float(np.linalg.norm(_place(rigid, one, q) - _place(rigid, other, q)))
-        near = 1.0 if {one.body, other.body} & sliding else NEAR
-        if gap < near * mechanism_size(mechanism):
+        if apart and (one.point == other.point or (other in unused and _stem(one) == _stem(other))):
+            gap = float(np.linalg.norm(_place(rigid, one, q) - _place(rigid, other, q)))
+            if gap < size * (1.0 if {one.body, other.body} & sliding else NEAR):
+                pairs.append((other not in unused, gap, one, other))
+    # First those that are both unused, then the nearest.
+    for _, gap, one, other in sorted(pairs, key=lambda pair: pair[:2]):
+        if not reported & {one, other}:
             reported |= {one, other}
             yield Finding(
                 "joint-missing", "joint", f"nothing holds {one} and {other}, which lie {gap:.3g} m apart",

@@ -17,6 +17,7 @@ from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
 from paraflex.simulate import TrackingTask, plan_tracking
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import GRAVITY, mechanism_mass, mechanism_size
+from paraflex.validity.plausibility import Driven, doubtful_efforts
 
 # Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
 ILL_CONDITIONED = 1e3
@@ -194,7 +195,32 @@ def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> It
             "mode-missing", "mode", f"there is a path and {what} to drive the mechanism along it",
             "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
         )  # fmt: skip
-    yield from task_findings(task, list(dict.fromkeys(parse_mode(mechanism, name) for name in wanted)))
+    asked = list(dict.fromkeys(parse_mode(mechanism, name) for name in wanted))
+    yield from task_findings(task, asked)
+    for mode in asked:
+        yield from _efforts(task, mode)
+
+
+def _efforts(task: TrackingTask, mode: ActuationMode) -> Iterator[Finding]:
+    """Torques and forces of a plan that are far from plausible; a run says so of those it applied."""
+    try:
+        torques = task.torques(mode).evaluate(task.motion.t)
+    except (ActuationError, NumericalError):
+        return
+    mechanism, desired = task.mechanism, task.motion.desired
+    names = [motor.name for motor in mechanism.motors]
+    yield from doubtful_efforts(
+        task.system,
+        Driven(
+            mode=mode.name,
+            desired=desired.position,
+            actual=desired.position,
+            acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
+            efforts=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
+            units=dict(zip(names, mechanism.motor_units(), strict=True)),
+            condition=float(np.max(actuation_condition(task.effort, mode))),
+        ),
+    )
 
 
 def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:

@@ -110,6 +110,13 @@ def doubtful_results(
     return found
 
 
+def doubtful_efforts(system: System, driven: Driven) -> list[Finding]:
+    """Findings about the torques and forces of a plan, before anything runs."""
+    mechanism = system.mechanism
+    where = _Where(f"mode {driven.mode}", mechanism, doubtful_numbers(mechanism))
+    return list(_large_efforts(where, system, driven))
+
+
 def _bent(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
     slopes = {body.name: bending_of(system, body.name, solution).slope for body in system.bodies if body.nf}
     if not slopes:
