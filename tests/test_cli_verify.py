@@ -22,7 +22,7 @@ def test_verify_prints_and_saves_how_models_agree(tmp_path):
     done = paraflex("verify", "--model", "linear", "--model", "second-order", "--engine", "mujoco", *SHORT,
                     "--out", str(out))  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("warning: only a part of the path was run: 0.02 of 0.532 s")
+    assert done.stdout.startswith("warning: study.duration: only a part of the path was run: 0.02 of 0.532 s")
     assert "mode ++++: tracking error" in done.stdout
     assert "Largest distance between the paths of two models [m]" in done.stdout
     assert "RMS difference of each link's angular velocity [rad/s] from 2nd-ord." in done.stdout

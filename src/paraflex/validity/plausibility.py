@@ -193,9 +193,9 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
     size = mechanism_size(where.mechanism)
     accelerations = np.stack([np.linalg.norm(solution.a[:, body.position], axis=1) for body in system.bodies])
     expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))))
-    lasting = np.nanquantile(np.abs(solution.multipliers), 1.0 - _LASTING, axis=0)
-    constraints = system.packed.rows["kind"] == CONSTRAINT
-    lasting = np.where(constraints, np.nan_to_num(lasting), 0.0)
+    # NaN at singular positions, and of rows that a method has no multipliers of.
+    lasting = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _LASTING, axis=0)
+    lasting[system.packed.rows["kind"] != CONSTRAINT] = 0.0
     arms = np.array([size if row.endswith(" angle") else 1.0 for row in system.rows])
     forces = lasting / arms
     k = int(np.argmax(forces))
