@@ -2,6 +2,7 @@
 
 import pickle
 import warnings
+from collections.abc import Iterable
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,6 +18,7 @@ import paraflex.studies
 from paraflex.arguments import checked_arguments
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError, ValidityWarning
+from paraflex.findings import Finding, Verdict
 from paraflex.mechanism import EndEffector, Mechanism, Motor, PointRef, RevoluteJoint, RigidBody, Start, WeldJoint
 from paraflex.motion import simulate_motion
 from paraflex.results.export import export_results, result_tables
@@ -447,6 +449,16 @@ def test_numbers_of_arrays_and_of_a_complex_step_are_numbers():
     for mass in (np.float32(2.0), np.int64(2), np.array(2.0), 2.0 + 1e-20j):
         assert RigidBody("rod", mass, 0.1).mass == mass
     assert WeldJoint("O", "a.b", "c.d", np.pi).angle == np.pi
+
+
+def test_a_dataclass_that_is_a_sequence_is_many_and_not_one():
+    # Every study along a path hands its verdict on as findings.
+    @checked_arguments()
+    def count(findings: Iterable[Finding]) -> int:
+        return len(list(findings))
+
+    one = Finding("size", "body", "large", "look")
+    assert [count(given) for given in (one, Verdict(), Verdict([one]), [one], ())] == [1, 0, 1, 1, 0]
 
 
 def test_annotations_that_only_type_checkers_know_are_not_checked():

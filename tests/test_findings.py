@@ -46,7 +46,9 @@ def checked(file):
         return pf.check(file)
 
 
-@pytest.mark.parametrize("name", ["gantry", "lift", "linkage", *pf.library_names(), "chain:4", "four_bars:3"])
+@pytest.mark.parametrize(
+    "name", ["gantry", "lift", "linkage", "scissor", "tripod", "walker", *pf.library_names(), "chain:4", "four_bars:3"]
+)
 def test_what_is_meant_is_sound(name):
     file = MODELS / f"{name}.toml"
     verdict = pf.check(file if file.exists() else name)

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path as FilePath
 
 from paraflex.checks.pose import Examination, examine, pose_findings
+from paraflex.checks.start import start_findings
 from paraflex.checks.study import path_findings, study_findings, task_findings
+from paraflex.checks.unused import file_findings
 from paraflex.files import Model, load
 from paraflex.findings import Finding, Verdict
 from paraflex.mechanism import ActuationMode, Mechanism
@@ -55,6 +57,8 @@ def check(
     seen = seen or examine(mechanism, assembly)
     at_rest = not isinstance(model, Model) or model.start is None
     found: list[Finding] = [*doubtful_numbers(mechanism), *pose_findings(seen, at_rest=at_rest)]
+    if isinstance(model, Model):
+        found += [*file_findings(model), *start_findings(model, seen, assembly)]
     # Without an assembly there is no pose to run from.
     if isinstance(model, Model) and seen.starts:
         short = {one.place for one in found if one.code == "mode-short"}
@@ -71,5 +75,6 @@ def check_planned(
     """
     seen = examine(model.mechanism, assembly or model.study.assembly)
     found = [*doubtful_numbers(model.mechanism), *pose_findings(seen), *task_findings(task, modes)]
+    found += file_findings(model)
     found += path_findings(model, task.path, path, float(task.motion.t[-1]))
     return Verdict(one for one in found if one.code not in ("path-singular", "mode-short"))

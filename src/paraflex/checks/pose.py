@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paraflex.checks.loose import loose_points
 from paraflex.dynamics import (
     Closure,
     Mobility,
@@ -97,6 +98,8 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
             yield from _elbow(seen.rigid, start)
     if seen.mobility is not None and seen.reach is not None:
         yield from _mobility(seen.mobility, seen.reach)
+        if seen.reach.all_motors < seen.mobility.freedoms and seen.chosen is not None and seen.chosen.state is not None:
+            yield from loose_points(seen.rigid, seen.chosen.state.q)
     yield from _reduced(seen.system)
     yield from _vibration(seen, at_rest)
 

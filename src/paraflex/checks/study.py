@@ -12,9 +12,12 @@ from paraflex.errors import ActuationError, AssemblyError, InputError, Numerical
 from paraflex.files import Model
 from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
-from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
+from paraflex.mechanism import ActuationMode, AxisJoint, Mechanism, parse_mode
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
 from paraflex.simulate import TrackingTask, plan_tracking
+from paraflex.validity.actions import LOADED_AT_REST
+from paraflex.validity.numbers import GRAVITY, mechanism_mass, mechanism_size
+from paraflex.validity.plausibility import Driven, doubtful_efforts
 
 # Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
 ILL_CONDITIONED = 1e3
@@ -22,9 +25,15 @@ ILL_CONDITIONED = 1e3
 FASTEST, SHARPEST = 50.0, 2000.0
 # Turns that a path along a circle may take.
 _TURNS = 8.0
+# Duration of a run over that of its path beyond which nearly all of it is rest, and with which it is planned here.
+DWELL, _REST = 100.0, 2.0
+# Samples a turn below which the motion of a drive does not show.
+SAMPLES_A_TURN = 6.0
 # Samples at which a plan is looked at.
 _SAMPLES = 201
 _SAME_TIME = 1e-9
+# Part of a path's extent that counts as none.
+_STILL = 1e-6
 
 
 def study_findings(
@@ -35,6 +44,7 @@ def study_findings(
         if model.study.duration is None:
             yield Finding("duration-missing", "study.duration", "no path and no duration", "give one, in s")
         yield from laws_cut_short(model.mechanism, model.study.duration)
+        yield from _few_samples(model)
         yield from _constant_torques(model)
         return
     if model.mechanism.end_effector is None:
@@ -55,7 +65,8 @@ def study_findings(
             yield part.finding()
     yield from path_findings(model, chosen, name, duration)
     try:
-        task = _planned(model, chosen, duration, assembly)
+        # What comes after the path is rest.
+        task = _planned(model, chosen, min(duration, _REST * chosen.duration), assembly)
     except UnreachablePathError as error:
         yield Finding(
             "path-unreachable", f"path.{name}", str(error), "move the path or the bases, or choose another assembly"
@@ -94,6 +105,12 @@ def path_findings(model: Model, path: Path, name: str, duration: float) -> Itera
     """What can be seen of a path before it is planned."""
     yield from laws_cut_short(model.mechanism, duration)
     yield from _too_fast(name, path, duration)
+    yield from _idle(model.mechanism, name, path)
+    if duration > DWELL * path.duration > 0.0:
+        yield Finding(
+            "duration-long", "study.duration", f"{duration:.4g} s, where the path takes {path.duration:.4g} s",
+            "it is in s: is it in ms?",
+        )  # fmt: skip
     yield from _turns(f"path.{name}", path, model.study.orientation)
 
 
@@ -107,6 +124,40 @@ def _too_fast(name: str, path: Path, duration: float) -> Iterator[Finding]:
             "path-fast", f"path.{name}", f"it asks for {speed:.3g} m/s and {acceleration:.3g} m/s^2",
             "max_acceleration is in m/s^2, times are in s, places in m",
         )  # fmt: skip
+
+
+def _idle(mechanism: Mechanism, name: str, path: Path) -> Iterator[Finding]:
+    """A path that moves, and not along what the end-effector is to follow."""
+    if mechanism.end_effector is None:
+        return
+    task = mechanism.end_effector.coordinates
+    ways = np.ptp(path.evaluate(np.linspace(0.0, path.duration, _SAMPLES)).position, axis=0)
+    moves = {axis: float(way) for axis, way in zip(("x", "y"), ways, strict=False)}
+    still, moving = [axis for axis in moves if axis in task], [axis for axis in moves if axis not in task]
+    if still and "angle" not in task and moving and max(moves[axis] for axis in still) < _STILL * moves[moving[0]]:
+        yield Finding(
+            "path-idle", f"path.{name}",
+            f"it goes {moves[moving[0]]:.3g} m along {moving[0]} and none along {still[0]}, which alone the "
+            "end-effector follows",
+            "are its coordinates [x, y] swapped, or those of [end_effector]?",
+        )  # fmt: skip
+
+
+def _few_samples(model: Model) -> Iterator[Finding]:
+    """A drive that turns between two samples so far that its motion is not to be seen."""
+    duration, count = model.study.duration, model.study.samples
+    for one in model.mechanism.prescribed:
+        if duration is None or isinstance(model.mechanism.joint(one.joint), AxisJoint):
+            continue
+        angle, _, _ = one.law.evaluate(np.array([0.0, duration]))
+        turns = abs(float(angle[1] - angle[0])) / (2.0 * math.pi)
+        if turns > 1.0 and (count - 1) < SAMPLES_A_TURN * turns:
+            yield Finding(
+                "samples-few", "study.samples",
+                f"{count} samples of {turns:.3g} turns of prescribed.{one.name} in {duration:.3g} s: "
+                f"{(count - 1) / turns:.2g} a turn do not show its motion",
+                "are speeds in rad/s, and the duration in s? If so, keep more samples",
+            )  # fmt: skip
 
 
 def _turns(place: str, path: Path, orientation: float) -> Iterator[Finding]:
@@ -144,7 +195,32 @@ def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> It
             "mode-missing", "mode", f"there is a path and {what} to drive the mechanism along it",
             "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
         )  # fmt: skip
-    yield from task_findings(task, list(dict.fromkeys(parse_mode(mechanism, name) for name in wanted)))
+    asked = list(dict.fromkeys(parse_mode(mechanism, name) for name in wanted))
+    yield from task_findings(task, asked)
+    for mode in asked:
+        yield from _efforts(task, mode)
+
+
+def _efforts(task: TrackingTask, mode: ActuationMode) -> Iterator[Finding]:
+    """Torques and forces of a plan that are far from plausible; a run says so of those it applied."""
+    try:
+        torques = task.torques(mode).evaluate(task.motion.t)
+    except (ActuationError, NumericalError):
+        return
+    mechanism, desired = task.mechanism, task.motion.desired
+    names = [motor.name for motor in mechanism.motors]
+    yield from doubtful_efforts(
+        task.system,
+        Driven(
+            mode=mode.name,
+            desired=desired.position,
+            actual=desired.position,
+            acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
+            efforts=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
+            units=dict(zip(names, mechanism.motor_units(), strict=True)),
+            condition=float(np.max(actuation_condition(task.effort, mode))),
+        ),
+    )
 
 
 def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:
@@ -163,10 +239,17 @@ def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> I
 
 
 def _constant_torques(model: Model) -> Iterator[Finding]:
-    """Friction that a constant torque does not overcome."""
+    """Constant torques beyond what turns all bodies, and friction that they do not overcome."""
     mechanism = model.mechanism
+    size, weight = mechanism_size(mechanism), GRAVITY * mechanism_mass(mechanism)
     for motor, unit in zip(mechanism.motors, mechanism.motor_units(), strict=True):
         torque = abs(model.study.torques.get(motor.name, 0.0))
+        if torque > LOADED_AT_REST * weight * (size if unit == "N m" else 1.0) > 0.0:
+            yield Finding(
+                "load-large", f"study.torques.{motor.name}",
+                f"{torque:.3g} {unit}, where all bodies weigh {weight:.3g} N, in a mechanism of {size:.3g} m",
+                f"it is in {unit}",
+            )  # fmt: skip
         for one in mechanism.frictions:
             if one.joint == motor.joint and 0.0 < torque <= one.limit:
                 yield Finding(

@@ -46,9 +46,19 @@ def approximate_poses(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pos
         poses |= _from_points(mechanism, assembly)
     for body in mechanism.bodies:
         if body.name not in poses:
-            remedy = "give its approximate angle in rad, or the places of two of its points"
+            remedy = "give its approximate angle in rad, or the places of two of its points" + _joined(
+                mechanism, body.name
+            )
             raise InputError("no angle for a body", field=f"assembly.{assembly.name}", value=body.name, remedy=remedy)
     return poses
+
+
+def _joined(mechanism: Mechanism, body: str) -> str:
+    """Of a body that fewer than two joints hold, which: one may be missing."""
+    names = [joint.name for joint in mechanism.joints if body in (joint.a.body, joint.b.body)]
+    if not names:
+        return "; no joint holds it: is one missing?"
+    return f"; {names[0]} alone holds it: is a joint missing?" if len(names) == 1 else ""
 
 
 def _from_points(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:

@@ -15,6 +15,7 @@ from paraflex.findings import Finding
 from paraflex.mechanism import AssumedModesBeam, AxisJoint, FlexibleBeam, Mechanism, ModalBody, RigidBody, Section
 from paraflex.mechanism.bodies import Body, Material
 from paraflex.mechanism.joints import AngleLaw
+from paraflex.validity.actions import doubtful_actions
 
 Place = tuple[float, float]
 Beam = FlexibleBeam | AssumedModesBeam
@@ -39,6 +40,10 @@ GYRATION = 5.0
 MASSIVE = 5000.0
 # A body's mass over that of all others together, without which the others would hardly matter.
 HEAVIEST = 200.0
+# Masses of one kind that sit on several bodies over the rest of all bodies: hinges weigh less than what they join.
+HINGES = 20.0
+# Distance of a centre of mass from its body's points over the mechanism's size.
+OFF_CENTRE = 5.0
 # Standard gravity and how far places on Earth differ from it [m/s^2].
 GRAVITY, ON_EARTH = 9.81, 0.05
 # Points nearer one another than this part of the mechanism are at one place.
@@ -68,10 +73,11 @@ def doubtful_numbers(mechanism: Mechanism) -> list[Finding]:
     found += _laws(mechanism, size)
     for body in mechanism.bodies:
         if isinstance(body, Beam):
-            found += _beam(body)
+            found += _beam(body, size)
         elif isinstance(body, RigidBody):
             found += _rigid(body, size)
-    return _shared([*found, *_masses(mechanism, size), *_one_place(mechanism, size)])
+    found += [*_masses(mechanism, size), *_hinges(mechanism), *_one_place(mechanism, size)]
+    return _shared([*found, *doubtful_actions(mechanism, size, mechanism_mass(mechanism))])
 
 
 def _shared(found: Iterable[Finding]) -> list[Finding]:
@@ -90,13 +96,22 @@ def mechanism_size(mechanism: Mechanism) -> float:
     return max([*map(body_length, mechanism.bodies), _extent(mechanism.ground.values())], default=0.0)
 
 
+def mechanism_mass(mechanism: Mechanism) -> float:
+    """Of all bodies [kg]."""
+    return sum(body.mass if isinstance(body, ModalBody) else _mass(body) for body in mechanism.bodies)
+
+
 def body_length(body: Body) -> float:
-    """Length of a beam, or the largest distance between a body's named points and its centre of mass [m]."""
+    """Length of a beam, or the largest distance between a body's named points [m].
+
+    With one point, its distance from the centre of mass.
+    """
     if isinstance(body, Beam):
         return body.length
     if isinstance(body, ModalBody):
         return _extent([point.position for point in body.points.values()])
-    return _extent([*body.points.values(), body.centre_of_mass])
+    places = list(body.points.values())
+    return _extent(places if len(places) > 1 else [*places, body.centre_of_mass])
 
 
 def _extent(places: Iterable[Sequence[float]]) -> float:
@@ -207,7 +222,7 @@ def _drives(mechanism: Mechanism) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _beam(body: Beam) -> Iterator[Finding]:
+def _beam(body: Beam, size: float) -> Iterator[Finding]:
     place = f"body.{body.name}"
     sections: tuple[Section, ...] = body.section if isinstance(body.section, tuple) else (body.section,)
     materials: tuple[Material, ...] = body.material if isinstance(body.material, tuple) else (body.material,)
@@ -215,6 +230,14 @@ def _beam(body: Beam) -> Iterator[Finding]:
         yield from _section(f"{place}.section", body.length, section)
     for material in dict.fromkeys(materials):
         yield from _material(f"{place}.material", material)
+    for lump in body.lumps:
+        if lump.mass > 0.0 and lump.inertia > lump.mass * (GYRATION * size) ** 2 > 0.0:
+            yield Finding(
+                "mass", f"{place}.lumps.{lump.point}",
+                f"{lump.inertia:.3g} kg m^2 at {lump.mass:.3g} kg is a radius of gyration of "
+                f"{math.sqrt(lump.inertia / lump.mass):.3g} m, in a mechanism of {size:.3g} m",
+                "inertia is in kg m^2, about the centre of mass",
+            )  # fmt: skip
     places = list(body.points.values())
     if len(places) > 1 and max(places) - min(places) < OVERHANG * body.length:
         yield Finding(
@@ -267,6 +290,13 @@ def _material(place: str, material: Material) -> Iterator[Finding]:
 
 
 def _rigid(body: RigidBody, size: float) -> Iterator[Finding]:
+    away = min((math.dist(body.centre_of_mass, at) for at in body.points.values()), default=0.0)
+    if size and away > OFF_CENTRE * size:
+        yield Finding(
+            "size", f"body.{body.name}.centre_of_mass",
+            f"{away:.3g} m from the nearest of its points, in a mechanism of {size:.3g} m",
+            "it is in m, in the body's own frame: is it in mm?",
+        )  # fmt: skip
     if size and body.mass > 0.0:
         gyration = math.sqrt(max(body.inertia, 0.0) / body.mass)
         if gyration > GYRATION * size:
@@ -294,6 +324,24 @@ def _masses(mechanism: Mechanism, size: float) -> Iterator[Finding]:
             yield Finding(
                 "mass", f"body.{name}", f"its {mass:.3g} kg are {mass / (total - mass):.3g} times all others together",
                 "mass is in kg, density in kg/m^3: are all of them?",
+            )  # fmt: skip
+
+
+def _hinges(mechanism: Mechanism) -> Iterator[Finding]:
+    """One lumped mass on several bodies, that of joints or motors, against all the rest."""
+    beams = [body for body in mechanism.bodies if isinstance(body, Beam)]
+    total = sum(_mass(body) for body in mechanism.bodies if not isinstance(body, ModalBody))
+    carriers: dict[float, list[str]] = {}
+    for body in beams:
+        for lump in body.lumps:
+            carriers.setdefault(lump.mass, []).append(body.name)
+    for mass, names in carriers.items():
+        rest = total - mass * len(names)
+        if len(set(names)) > 1 and mass * len(names) > HINGES * rest > 0.0:
+            yield Finding(
+                "mass", f"body.{names[0]}.lumps",
+                f"{len(names)} lumps of {mass:.3g} kg, {mass * len(names) / rest:.3g} times all the rest together",
+                "mass is in kg: is it in g?",
             )  # fmt: skip
 
 

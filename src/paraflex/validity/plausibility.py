@@ -15,7 +15,7 @@ from paraflex.dynamics.rank import joint_of_row
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import CONSTRAINT
-from paraflex.mechanism import Mechanism, PointForce
+from paraflex.mechanism import AxisJoint, Mechanism, PointForce
 from paraflex.validity.bending import bending_of
 from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
 
@@ -110,6 +110,13 @@ def doubtful_results(
     return found
 
 
+def doubtful_efforts(system: System, driven: Driven) -> list[Finding]:
+    """Findings about the torques and forces of a plan, before anything runs."""
+    mechanism = system.mechanism
+    where = _Where(f"mode {driven.mode}", mechanism, doubtful_numbers(mechanism))
+    return list(_large_efforts(where, system, driven))
+
+
 def _bent(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
     slopes = {body.name: bending_of(system, body.name, solution).slope for body in system.bodies if body.nf}
     if not slopes:
@@ -117,7 +124,10 @@ def _bent(where: _Where, system: System, solution: Solution) -> Iterator[Finding
     worst = max(slopes, key=lambda name: np.max(slopes[name]))
     k = int(np.argmax(slopes[worst]))
     if slopes[worst][k] > BENT:
-        blame = _blame(where, worst) or f"look at section and Young's modulus of {worst}, and at what loads it"
+        blame = _blame(where, worst) or (
+            f"look at section and Young's modulus of {worst}, and at what moves and loads it"
+            + _moving(where.mechanism, solution)
+        )
         yield Finding(
             "deflection-large", where.place,
             f"{worst} bends by {slopes[worst][k]:.2g} rad at t = {solution.t[k]:.4g} s: more a spring than a link",
@@ -140,11 +150,15 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
     extent = float(np.linalg.norm(np.ptp(driven.desired, axis=0)))
     error = driven.deviation
     if error > LOST * extent > 0.0:
+        soft = (
+            "torques are planned for rigid links and not corrected: are links much too soft for the path's "
+            "acceleration, in their sections and moduli?"
+        )
+        others = _resisting(where.mechanism)
         yield Finding(
             "error-large", where.place,
             f"the tracking error is {error:.3g} m on a path that is {extent:.3g} m large: it is not followed",
-            _blame(where) or "torques are planned for rigid links and not corrected: are links much too soft for "
-            "the path's acceleration, in their sections and moduli?",
+            _blame(where) or (f"{others}; {soft}" if others else soft),
         )  # fmt: skip
 
 
@@ -202,6 +216,20 @@ def _resisting(mechanism: Mechanism) -> str:
     groups["linear_spring"] = mechanism.linear_springs
     named = [f"{kind}.{one.name}" for kind, members in groups.items() for one in members]
     return f"look at {', '.join(named)}, and their units" if named else ""
+
+
+def _moving(mechanism: Mechanism, solution: Solution) -> str:
+    """Prescribed motions with their largest rates, and loads with their sizes."""
+    named: list[str] = []
+    for one in mechanism.prescribed:
+        rate = float(np.max(np.abs(one.law.evaluate(solution.t)[1])))
+        unit = "m/s" if isinstance(mechanism.joint(one.joint), AxisJoint) else "rad/s"
+        named.append(f"prescribed.{one.name} (up to {rate:.3g} {unit})")
+    for load in mechanism.loads:
+        force = isinstance(load, PointForce)
+        amount = f"{math.hypot(*load.force):.3g} N" if force else f"{abs(load.torque):.3g} N m"
+        named.append(f"load.{load.name} ({amount})")
+    return f": {', '.join(named)}" if named else ""
 
 
 def _singular(driven: Driven) -> str:

@@ -1,0 +1,73 @@
+"""Points that were to be joined and are not: of one name, at about one place, where more is free than is driven."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System
+from paraflex.dynamics.points import point_motion
+from paraflex.findings import Finding
+from paraflex.mechanism import AxisJoint, Mechanism
+from paraflex.mechanism.joints import GROUND, PointRef
+from paraflex.validity.numbers import mechanism_size
+
+# Distance of two such points over the mechanism's size: what was to be joined closes only roughly without its joint.
+NEAR = 0.2
+
+
+def loose_points(rigid: System, q: NDArray[np.float64]) -> Iterator[Finding]:
+    """A point that nothing uses beside one of the same name on another body, at coordinates q of the rigid mechanism.
+
+    B and B3 count as one name where both are unused.
+    """
+    mechanism = rigid.mechanism
+    unused = _unused(mechanism)
+    ground = [PointRef(GROUND, name) for name in mechanism.ground]
+    known = [*ground, *(PointRef(body.name, name) for body in mechanism.bodies for name in body.points)]
+    direct = {frozenset((one.a.body, one.b.body)) for one in mechanism.joints}
+    # An assembly by angles leaves their travels open.
+    sliding = {end.body for joint in mechanism.joints if isinstance(joint, AxisJoint) for end in (joint.a, joint.b)}
+    sliding.discard(GROUND)
+    reported: set[PointRef] = set()
+    size = mechanism_size(mechanism)
+    pairs: list[tuple[bool, float, PointRef, PointRef]] = []
+    for one, other in product(unused, known):
+        apart = one.body != other.body and frozenset((one.body, other.body)) not in direct
+        if apart and (one.point == other.point or (other in unused and _stem(one) == _stem(other))):
+            gap = float(np.linalg.norm(_place(rigid, one, q) - _place(rigid, other, q)))
+            if gap < size * (1.0 if {one.body, other.body} & sliding else NEAR):
+                pairs.append((other not in unused, gap, one, other))
+    # First those that are both unused, then the nearest.
+    for _, gap, one, other in sorted(pairs, key=lambda pair: pair[:2]):
+        if not reported & {one, other}:
+            reported |= {one, other}
+            yield Finding(
+                "joint-missing", "joint", f"nothing holds {one} and {other}, which lie {gap:.3g} m apart",
+                "is a joint of the two missing?",
+            )  # fmt: skip
+
+
+def _unused(mechanism: Mechanism) -> list[PointRef]:
+    """Points of bodies that no joint, spring, load, lump or end-effector names."""
+    used = {point for one in (*mechanism.joints, *mechanism.linear_springs) for point in (one.a, one.b)}
+    used |= {load.point for load in mechanism.loads}
+    if mechanism.end_effector is not None:
+        used.add(mechanism.end_effector.point)
+    named = [PointRef(body.name, name) for body in mechanism.bodies for name in body.points]
+    return [point for point in named if point not in used]
+
+
+def _stem(ref: PointRef) -> str:
+    return re.sub(r"\d+$", "", ref.point)
+
+
+def _place(rigid: System, ref: PointRef, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    if ref.body == GROUND:
+        return np.array(rigid.mechanism.ground[ref.point], dtype=float)
+    rows = q[None]
+    return point_motion(rigid, ref, rows, np.zeros_like(rows), np.zeros_like(rows)).position[0]

@@ -1,0 +1,39 @@
+"""The start of a run without a path: can the mechanism start as the file says?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from paraflex.checks.pose import Examination
+from paraflex.dynamics import start_state
+from paraflex.errors import InputError, NumericalError
+from paraflex.files import Model
+from paraflex.findings import Finding
+from paraflex.validity.numbers import FAST, mechanism_size
+
+
+def start_findings(model: Model, seen: Examination, assembly: str | None) -> Iterator[Finding]:
+    """Deflections and velocities of [start] that joints, prescribed motions or one another do not allow."""
+    if model.start is None or (seen.starts and (seen.chosen is None or seen.chosen.state is None)):
+        return
+    chosen = model.mechanism.assembly(assembly) if seen.starts else None
+    try:
+        start_state(seen.system, model.start, chosen)
+        yield from _fast(model)
+    except InputError as error:
+        yield Finding("start-refused", error.field, error.problem, error.remedy)
+    except NumericalError as error:
+        yield Finding("start-refused", "start", str(error), "give a start that the joints allow")
+
+
+def _fast(model: Model) -> Iterator[Finding]:
+    """Rates that no body turns at."""
+    size = mechanism_size(model.mechanism)
+    given = {} if model.start is None else model.start.angular
+    for body, rate in given.items():
+        if abs(rate) * size > FAST:
+            yield Finding(
+                "speed-large", f"start.velocity.angular.{body}",
+                f"{rate:.4g} rad/s, in a mechanism of {size:.3g} m",
+                "speeds are in rad/s: one turn a minute is 0.105 of them, a degree a second 0.0175",
+            )  # fmt: skip

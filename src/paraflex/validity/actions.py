@@ -1,0 +1,173 @@
+"""Is what joins and moves a mechanism plausible? Joints given twice, springs, friction, damping and loads.
+
+As in `numbers`, each bound is wide, and what lies beyond it is hardly ever meant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from paraflex.findings import Finding
+from paraflex.mechanism import AssumedModesBeam, AxisJoint, FlexibleBeam, Mechanism, ModalBody, PointForce
+from paraflex.mechanism.bodies import Body
+from paraflex.mechanism.damping import LossFactor, ModalDamping
+from paraflex.mechanism.joints import PointRef, RevoluteJoint, WeldJoint
+
+# All forces applied over the weight of all bodies: of a machine that carries its weight, and of one in no gravity.
+LOADED, LOADED_AT_REST = 100.0, 1000.0
+# Dry friction over what the weight of all bodies would do at the joint: where it turns, at the mechanism's size.
+RUBBING_TURN, RUBBING_SLIDE = 30.0, 100.0
+# Speed of a friction law [rad/s or m/s] below which steps have nothing to hold on to.
+SHARP = 1e-5
+# A ratio of structural damping beyond this is no structure's, not even of rubber.
+DAMPED = 0.5
+# Free length of a spring over the mechanism's size.
+LONG = 5.0
+_G = 9.81
+
+
+def doubtful_actions(mechanism: Mechanism, size: float, mass: float) -> Iterator[Finding]:
+    """Findings about joints, springs, friction, damping and loads, from the description alone.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    size : float
+        The largest of its lengths [m].
+    mass : float
+        Of all its bodies [kg].
+    """
+    yield from _twice(mechanism)
+    yield from _beside(mechanism)
+    yield from _springs(mechanism, size)
+    yield from _damped(mechanism)
+    yield from _sharp(mechanism)
+    if mass > 0.0 and size > 0.0:
+        yield from _rubbing(mechanism, size, mass * _G)
+        yield from _loaded(mechanism, size, mass * _G)
+
+
+def _twice(mechanism: Mechanism) -> Iterator[Finding]:
+    first: dict[frozenset[PointRef], str] = {}
+    for joint in mechanism.joints:
+        held = frozenset((joint.a, joint.b))
+        if held in first:
+            yield Finding(
+                "joint-twice", f"joint.{joint.name}",
+                f"it joins {joint.a} and {joint.b}, as {first[held]} does",
+                "leave one of them out, or name other points",
+            )  # fmt: skip
+        first.setdefault(held, joint.name)
+
+
+def _beside(mechanism: Mechanism) -> Iterator[Finding]:
+    """Two joints at one numbered point of a body, and none at another: B2 and B3 both at B3."""
+    held: dict[PointRef, list[str]] = {}
+    for joint in mechanism.joints:
+        for point in (joint.a, joint.b):
+            held.setdefault(point, []).append(joint.name)
+    springs = [point for one in mechanism.linear_springs for point in (one.a, one.b)]
+    used = {*held, *springs, *(load.point for load in mechanism.loads)}
+    if mechanism.end_effector is not None:
+        used.add(mechanism.end_effector.point)
+    for body in mechanism.bodies:
+        points = [PointRef(body.name, name) for name in body.points]
+        for free in (point for point in points if point not in used and point.point[-1:].isdigit()):
+            for point in points:
+                if len(held.get(point, ())) > 1 and free.point in held[point] and _numbered_alike(free, point):
+                    yield Finding(
+                        "point-unused", f"joint.{free.point}",
+                        f"it and another joint hold {point}, and nothing holds {free}",
+                        f"is it to hold {free}?",
+                    )  # fmt: skip
+
+
+def _numbered_alike(one: PointRef, other: PointRef) -> bool:
+    return one.point.rstrip("0123456789") == other.point.rstrip("0123456789")
+
+
+def _springs(mechanism: Mechanism, size: float) -> Iterator[Finding]:
+    place = _places(mechanism)
+    for spring in mechanism.linear_springs:
+        if place.get(spring.a, spring.a) == place.get(spring.b, spring.b):
+            yield Finding(
+                "spring-idle", f"linear_spring.{spring.name}.points",
+                f"joints hold {spring.a} and {spring.b} together: it pulls at nothing",
+                "name the points that it stretches between",
+            )  # fmt: skip
+        if size and spring.length > LONG * size:
+            yield Finding(
+                "size", f"linear_spring.{spring.name}.length",
+                f"a free length of {spring.length:.3g} m, in a mechanism of {size:.3g} m",
+                "lengths are in m: is it in mm?",
+            )  # fmt: skip
+
+
+def _places(mechanism: Mechanism) -> dict[PointRef, PointRef]:
+    """For each point of a pin or weld, one that stands for all points there."""
+    place: dict[PointRef, PointRef] = {}
+    for joint in mechanism.joints:
+        if isinstance(joint, RevoluteJoint | WeldJoint):
+            one, other = place.setdefault(joint.a, joint.a), place.setdefault(joint.b, joint.b)
+            place = {point: one if at == other else at for point, at in place.items()}
+    return place
+
+
+def _damped(mechanism: Mechanism) -> Iterator[Finding]:
+    for body in mechanism.bodies:
+        ratio, field = _damping_ratio(body)
+        if ratio > DAMPED:
+            yield Finding(
+                "damping-large", f"body.{body.name}.damping",
+                f"a damping ratio of {ratio:.3g}: no structure is damped like that, nearly without vibration",
+                f"{field} a part of one, not percent: 1 % is 0.01",
+            )  # fmt: skip
+
+
+def _damping_ratio(body: Body) -> tuple[float, str]:
+    """The largest damping ratio of a body's structure, and which field gives it."""
+    damping = body.damping if isinstance(body, FlexibleBeam | AssumedModesBeam | ModalBody) else None
+    if isinstance(damping, ModalDamping):
+        return max(damping.ratios, default=0.0), "ratios are each"
+    if isinstance(damping, LossFactor):
+        return 0.5 * damping.loss_factor, "loss_factor, twice the ratio, is"
+    return 0.0, ""
+
+
+def _sharp(mechanism: Mechanism) -> Iterator[Finding]:
+    for one in mechanism.frictions:
+        if 0.0 < one.speed < SHARP:
+            unit = "m/s" if isinstance(mechanism.joint(one.joint), AxisJoint) else "rad/s"
+            yield Finding(
+                "friction-sharp", f"friction.{one.name}.speed",
+                f"its force turns over within {one.speed:.3g} {unit}: each change of direction takes very small steps",
+                "give the speed below which creeping does not matter, a hundredth of the joint's largest, say",
+            )  # fmt: skip
+
+
+def _rubbing(mechanism: Mechanism, size: float, weight: float) -> Iterator[Finding]:
+    for one in mechanism.frictions:
+        slides = isinstance(mechanism.joint(one.joint), AxisJoint)
+        bound, unit = (RUBBING_SLIDE * weight, "N") if slides else (RUBBING_TURN * weight * size, "N m")
+        if one.limit > bound:
+            yield Finding(
+                "friction-large", f"friction.{one.name}.limit",
+                f"{one.limit:.3g} {unit}, where all bodies weigh {weight:.3g} N"
+                + ("" if slides else f", in a mechanism of {size:.3g} m"),
+                f"it is in {unit}",
+            )  # fmt: skip
+
+
+def _loaded(mechanism: Mechanism, size: float, weight: float) -> Iterator[Finding]:
+    most = (LOADED if any(mechanism.gravity) else LOADED_AT_REST) * weight
+    for load in mechanism.loads:
+        force = isinstance(load, PointForce)
+        amount = math.hypot(*load.force) if force else abs(load.torque)
+        if amount > (most if force else most * size):
+            yield Finding(
+                "load-large", f"load.{load.name}.{'force' if force else 'torque'}",
+                f"{amount:.3g} {'N' if force else 'N m'}, where all bodies weigh {weight:.3g} N"
+                + ("" if force else f", in a mechanism of {size:.3g} m"),
+                f"it is in {'N' if force else 'N m'}: is it in another unit, or are masses?",
+            )  # fmt: skip
