@@ -18,7 +18,7 @@ from paraflex.dynamics import (
     projection,
     static_equilibrium,
 )
-from paraflex.errors import AssemblyError
+from paraflex.errors import AssemblyError, ModelWarning
 from paraflex.fem import ReferenceCondition
 from paraflex.fem.element import AXIAL
 from paraflex.files import library_file, library_names, load
@@ -208,8 +208,10 @@ def test_drives_too_fast_for_soft_links_are_refused(tmp_path):
     source = library_file("four_bar").read_text(encoding="utf-8").replace("speed = 20.0", "speed = 3000.0")
     file = tmp_path / "fast.toml"
     file.write_text(source)
+    with pytest.warns(ModelWarning, match=r"prescribed\.drive: it turns at 3000 rad/s"):
+        model = load(file)
     with pytest.raises(AssemblyError, match="the drives are too fast for links this soft"):
-        start_of(load(file).mechanism)
+        start_of(model.mechanism)
     done = paraflex("run", "-m", str(file), "--balanced", "--out", str(tmp_path / "out"))
     assert done.returncode == 2
     assert "--balanced: no equilibrium of links" in done.stderr

@@ -83,7 +83,8 @@ def with_lines(tmp_path, *changes):
 def test_frequencies_of_a_cantilever_from_a_file_are_the_textbook_roots(tmp_path, lumps, roots):
     file = with_lines(tmp_path, ("elements = 8", f"elements = 8\n{lumps}"))
     done = paraflex("info", str(file), "--json")
-    assert done.returncode == 0, done.stderr
+    # Nothing holds it: such a mechanism is wrong, but its beam can be looked at.
+    assert done.returncode == 1, done.stderr
     found = 2 * np.pi * np.array(json.loads(done.stdout)["links"][0]["frequencies_hz"][:3])
     # omega = (beta L)^2 sqrt(E I / (rho A L^4)), with I / A = h^2 / 12.
     scale = np.sqrt(210e9 * 0.005**2 / 12 / 7850.0) / 0.8**2

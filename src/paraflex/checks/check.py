@@ -56,7 +56,8 @@ def check(
         assembly = assembly or model.study.assembly
     seen = seen or examine(mechanism, assembly)
     at_rest = not isinstance(model, Model) or model.start is None
-    found: list[Finding] = [*doubtful_numbers(mechanism), *pose_findings(seen, at_rest=at_rest)]
+    duration = model.study.duration if isinstance(model, Model) else None
+    found: list[Finding] = [*doubtful_numbers(mechanism, duration), *pose_findings(seen, at_rest=at_rest)]
     if isinstance(model, Model):
         found += [*file_findings(model), *start_findings(model, seen, assembly)]
     # Without an assembly there is no pose to run from.

@@ -217,7 +217,7 @@ def load(name_or_file: str | FilePath) -> Model:
         Unknown name, unreadable file, or anything in it that does not fit: it names file, field, value and remedy.
     """
     model = model_from(*load_data(name_or_file))
-    warn_of(doubtful_numbers(model.mechanism))
+    warn_of(doubtful_numbers(model.mechanism, model.study.duration))
     return model
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from paraflex.dynamics import State, System
 from paraflex.errors import InputError, Moment, UnreachablePathError
@@ -98,7 +97,7 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
 
 def _first_outside(gauge: Gauge, t: Array, q: Array, v: Array, k: int) -> float:
     """When a motion comes to a bound between its samples k - 1 and k."""
-    path = CubicHermiteSpline(t[k - 1 : k + 1], q[k - 1 : k + 1], v[k - 1 : k + 1])
+    path = scipy.interpolate.CubicHermiteSpline(t[k - 1 : k + 1], q[k - 1 : k + 1], v[k - 1 : k + 1])
 
     def inside(time: float) -> float:
         return float(gauge.inside(path(time)[None])[0])

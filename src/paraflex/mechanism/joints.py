@@ -176,6 +176,7 @@ class SlidingJoint(CheckedFields):
     direction: ClassVar[float] = 0.0  # along the beam
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "at_end", as_enum(AtEnd, self.at_end, f"joint.{self.name}.at_end"))
 
 

@@ -11,10 +11,11 @@ from itertools import combinations
 
 import numpy as np
 
+from paraflex.errors import InputError
 from paraflex.findings import Finding
 from paraflex.mechanism import AssumedModesBeam, AxisJoint, FlexibleBeam, Mechanism, ModalBody, RigidBody, Section
 from paraflex.mechanism.bodies import Body, Material
-from paraflex.mechanism.joints import AngleLaw
+from paraflex.mechanism.poses import local_points
 from paraflex.validity.actions import doubtful_actions
 
 Place = tuple[float, float]
@@ -38,6 +39,8 @@ SPREAD = 500.0
 GYRATION = 5.0
 # All masses over the cube of the mechanism's size, were it a massive block of light metal or more [kg/m^3].
 MASSIVE = 5000.0
+# How much shorter than all its bodies in a row a mechanism is at least.
+_FOLDED = 4.0
 # A body's mass over that of all others together, without which the others would hardly matter.
 HEAVIEST = 200.0
 # Masses of one kind that sit on several bodies over the rest of all bodies: hinges weigh less than what they join.
@@ -57,12 +60,14 @@ _TURN = 2.0 * math.pi
 _LOOKS = 201
 
 
-def doubtful_numbers(mechanism: Mechanism) -> list[Finding]:
+def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> list[Finding]:
     """Findings about a mechanism's own numbers, from its description alone.
 
     Parameters
     ----------
     mechanism : Mechanism
+    duration : float, optional
+        Until when laws in time are looked at [s]; at the start alone by default.
 
     Returns
     -------
@@ -70,7 +75,7 @@ def doubtful_numbers(mechanism: Mechanism) -> list[Finding]:
     """
     size = mechanism_size(mechanism)
     found = [*_lengths(mechanism, size), *_gravity(mechanism.gravity), *_angles(mechanism), *_drives(mechanism)]
-    found += _laws(mechanism, size)
+    found += _laws(mechanism, size, duration or 0.0)
     for body in mechanism.bodies:
         if isinstance(body, Beam):
             found += _beam(body, size)
@@ -176,13 +181,16 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _laws(mechanism: Mechanism, size: float) -> Iterator[Finding]:
+def _laws(mechanism: Mechanism, size: float, duration: float) -> Iterator[Finding]:
     """Angles in time: degrees show in where they start, and how far they swing to and fro."""
     for one in mechanism.prescribed:
         if isinstance(mechanism.joint(one.joint), AxisJoint):
             continue
-        end = _end_of(one.law)
-        angle, rate, _ = one.law.evaluate(np.linspace(0.0, end, _LOOKS))
+        try:
+            angle, rate, _ = one.law.evaluate(np.linspace(0.0, duration, _LOOKS))
+        except InputError:
+            # A run that ends earlier may be asked for; one that does not says what is wrong with the law.
+            continue
         place = f"prescribed.{one.name}"
         swing = float(np.ptp(angle)) if np.any(rate > 0.0) and np.any(rate < 0.0) else 0.0
         if abs(angle[0]) > _TURN or swing > 2.0 * _TURN:
@@ -194,12 +202,6 @@ def _laws(mechanism: Mechanism, size: float) -> Iterator[Finding]:
                 "speed-large", place, f"it turns at {fastest:.4g} rad/s, in a mechanism of {size:.3g} m",
                 "speeds are in rad/s: one turn a minute is 0.105 of them, a degree a second 0.0175",
             )  # fmt: skip
-
-
-def _end_of(law: AngleLaw) -> float:
-    """A time until which a law is looked at: its last knot or row, or a second."""
-    rows = getattr(law, "times", ())
-    return float(max([*law.knots, *rows], default=0.0)) or 1.0
 
 
 def _drives(mechanism: Mechanism) -> Iterator[Finding]:
@@ -311,7 +313,9 @@ def _rigid(body: RigidBody, size: float) -> Iterator[Finding]:
 def _masses(mechanism: Mechanism, size: float) -> Iterator[Finding]:
     masses = {body.name: _mass(body) for body in mechanism.bodies if not isinstance(body, ModalBody)}
     total = sum(masses.values())
-    if size and total > MASSIVE * size**3:
+    # A chain of many short links is larger than any of them.
+    reach = max(size, sum(map(body_length, mechanism.bodies)) / _FOLDED)
+    if size and total > MASSIVE * reach**3:
         heaviest = max(masses, key=masses.__getitem__)
         yield Finding(
             "mass", f"body.{heaviest}",
@@ -356,10 +360,9 @@ def _mass(body: RigidBody | Beam) -> float:
 
 
 def _one_place(mechanism: Mechanism, size: float) -> Iterator[Finding]:
-    points: dict[str, Mapping[str, object]] = {"ground": mechanism.ground}
-    points |= {f"body.{body.name}.points": body.points for body in mechanism.bodies}
-    for table, named in points.items():
-        places = {name: tuple(at) if isinstance(at, Sequence) else (float(at), 0.0) for name, at in named.items()}  # pyright: ignore[reportArgumentType]
+    points: dict[str, Mapping[str, Place]] = {"ground": mechanism.ground}
+    points |= {f"body.{body.name}.points": local_points(body) for body in mechanism.bodies}
+    for table, places in points.items():
         for (one, a), (other, b) in combinations(places.items(), 2):
             if math.dist(a, b) <= APART * size:
                 where = ", ".join(f"{x:g}" for x in a)
