@@ -28,6 +28,7 @@ from paraflex.kernel.packed import CONSTRAINT
 from paraflex.kernel.stage import equations
 from paraflex.mechanism import (
     Assembly,
+    AtEnd,
     Curvature,
     FlexibleBeam,
     Geometry,
@@ -102,8 +103,9 @@ def make_sliders(geometry=Geometry.LINEAR):
             WeldJoint("weld", ref("rod.W"), ref("plate.W"), angle=0.3),
             SlotJoint("rail", ref("ground.G"), ref("plate.T"), direction=1.1),
             SlotJoint("pin", ref("plate.W"), ref("ground.G"), direction=0.3),
-            SlidingJoint("bead", ref("rod.R"), ref("bob.C"), at_end="ignore"),
-            SlidingJoint("trolley", ref("crank.P"), ref("ground.G")),
+            # Equations that hold together are asked for, not whether the beams are long enough.
+            SlidingJoint("bead", ref("rod.R"), ref("bob.C"), at_end=AtEnd.IGNORE),
+            SlidingJoint("trolley", ref("crank.P"), ref("ground.G"), at_end=AtEnd.IGNORE),
         ),
         motors=(Motor("screw", "guide"), Motor("turn", "O"), Motor("push", "pin"), Motor("pull", "bead")),
         prescribed=(PrescribedAngle("drive", "slot", swing),),
