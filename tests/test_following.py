@@ -1,6 +1,7 @@
 """How a motion is followed: errors during it and after it, drift and vibration, deflections from the chord."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -312,3 +313,20 @@ def test_stations_follow_a_length_with_a_complex_step():
     moved = outline(longer).places[:, 0]
     np.testing.assert_allclose(moved.real, places, atol=1e-15)
     np.testing.assert_allclose(moved.imag / 1e-30, places / 0.6, atol=1e-12)
+
+
+def test_a_coordinate_that_is_no_task_is_compared_with_the_plan():
+    """A lambda linkage led by x alone: y follows from it, and is no deviation. The path gives another y."""
+    model = load(Path(__file__).parent / "data" / "slips" / "linkage.toml")
+    task = plan_tracking(model.mechanism.rigid(), model.path("stroke"), samples=51)
+    desired, planned = task.motion.desired, model.path("stroke").evaluate(task.motion.t)
+    np.testing.assert_array_equal(desired.position[:, 0], planned.position[:, 0])
+    assert np.max(np.abs(desired.position[:, 1] - planned.position[:, 1])) > 1e-4
+    # Its rates are those of its place.
+    t = task.motion.t
+    middle = slice(5, -5)
+    for lower, upper in ((desired.position, desired.velocity), (desired.velocity, desired.acceleration)):
+        slope = np.gradient(lower[:, 1], t)
+        np.testing.assert_allclose(slope[middle], upper[middle, 1], atol=0.02 * np.max(np.abs(upper[:, 1])))
+    data = tracking_dataset([task.simulate("one", options=IntegrationOptions(tolerance=1e-8))])
+    assert data["tracking_rms_motion"].item() < 1e-6
