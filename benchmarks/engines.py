@@ -233,8 +233,8 @@ def _hinge_torques(problem: Problem, tree: Any, order: NDArray[np.int64], times:
 
 def _path(problem: Problem, tree: Any, angles: Array, rates: Array) -> Array:
     """Of the point, from angles and rates of the hinges (k, hinges)."""
-    from paraflex.engines.tree import body_motion
     from paraflex.dynamics.points import point_motion
+    from paraflex.engines.tree import body_motion
 
     motion = body_motion(problem.system, tree, (angles, rates, np.zeros_like(rates)))
     return point_motion(problem.system, problem.point, *motion).position

@@ -25,6 +25,7 @@ from peers import Choice, Converged, Result, Tolerance, choose, timed
 
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import build_system, constant_signals, pack_signals, start_state
+from paraflex.dynamics.points import point_motion
 from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.mechanism import (
     FlexibleBeam,
@@ -36,7 +37,6 @@ from paraflex.mechanism import (
     Start,
     four_bars_in_a_row,
 )
-from paraflex.dynamics.points import point_motion
 
 NUMBERS, TARGET, LIMIT, REPEATS = (1, 2, 5, 10, 20, 50), 1e-5, 20.0, 3
 DURATION, SAMPLES = 0.3, 31

@@ -23,10 +23,10 @@ import numpy as np
 from common import command_line, write_json
 
 from paraflex.compilation import compile_kernels
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import IntegrationError
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.dynamics.points import point_motion
 from paraflex.simulate import TrackingTask, plan_tracking
 from paraflex.studies import load_sweep, sweep
 
