@@ -100,7 +100,10 @@ def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
     across = run["tip_transverse"].transpose("time", "body").values
     sizes = np.array([peak(values) for values in across.T])
     if not sizes.any():
-        raise InputError("no body of these results bends", field="figure", value="link_deflections")
+        raise InputError(
+            "no body of these results bends", field="figure", value="link_deflections",
+            remedy="choose another figure, or run the mechanism with flexible links",
+        )  # fmt: skip
     largest = [k for k in np.argsort(-sizes, kind="stable")[:_MOST] if sizes[k] > 0.0]
     unit = display_unit("m", across)
     names = [str(name) for name in run["body"].values]
