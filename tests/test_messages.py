@@ -12,7 +12,7 @@ import xarray as xr
 from paraflex.cli.app import main
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError, IntegrationError, Moment, NumericalError, UnreachablePathError
-from paraflex.files import load
+from paraflex.files import library_file, load
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.findings import Finding
 from paraflex.integrators import METHODS, IntegrationOptions
@@ -32,7 +32,7 @@ from paraflex.mechanism import (
 from paraflex.motion import simulate_motion
 from paraflex.results import open_results
 from paraflex.simulate import plan_tracking
-from paraflex.studies import ComparisonOptions, load_sensitivities, load_sweep, sensitivities
+from paraflex.studies import ComparisonOptions, load_optimisation, load_sensitivities, load_sweep, sensitivities, sweep
 from paraflex.validity import to_blame
 from test_bad_input import broken
 
@@ -280,7 +280,20 @@ SWEEPS = [
         '[vary.L]\nfields = ["body.beam.length"]\nlow = 0.5\nhigh = 1.0\nnumber = 2\nwhole = true',
         "vary.L.whole: whole numbers have a linear range between two of them",
     ),
-    ('[vary.L]\nfields = ["body.beam.lengthh"]\nvalues = [1.0]', "vary.L.fields"),
+    ('[vary.L]\nfields = ["body.beam.lengthh"]\nvalues = [1.0]', "no such number in the mechanism's file"),
+    (
+        '[sampling]\nkind = "list"\nnumber = 3\n[vary.L]\nfields = ["body.beam.length"]\nvalues = [1.0]',
+        "sampling.number: a list has as many designs as its values make",
+    ),
+    (
+        '[sampling]\nkind = "random"\nnumber = 1000000000\n'
+        '[vary.L]\nfields = ["body.beam.length"]\nlow = 0.5\nhigh = 1.0',
+        "sampling.number: too many designs (got 1000000000); at most",
+    ),
+    (
+        '[vary.L]\nfields = ["body.beam.length"]\nvalues = [1.5]\nwhole = true',
+        "vary.L.values: not all of them whole (got [1.5]); leave out whole = true",
+    ),
     ('[vary.L]\nfields = ["body..length"]\nvalues = [1.0]', "not the name of a field"),
 ]
 
@@ -297,3 +310,27 @@ def test_fields_of_one_parameter_with_two_values_have_no_nominal_one(tmp_path):
     file.write_text('mechanism = "five_bar"\n[vary.L]\nfields = ["ground.A1.0", "ground.A2.0"]\n')
     text = message(lambda: sensitivities(load_sensitivities(file)))
     assert "so that there is no nominal one" in text
+
+
+def test_a_sweep_needs_modes_and_its_own_folder(tmp_path):
+    source = library_file("five_bar").read_text(encoding="utf-8")
+    bare = source.replace('[mode]\n"++" = ["left", "right"]\n', "").replace('modes = ["++"]\n', "")
+    (tmp_path / "bare.toml").write_text(bare, encoding="utf-8")
+    file = tmp_path / "sweep.toml"
+    varied = '[vary.L]\nfields = ["parameters.l1"]\nvalues = [0.25]\n'
+    file.write_text('mechanism = "bare.toml"\n' + varied)
+    assert "no actuation mode to run" in message(lambda: load_sweep(file))
+    file.write_text('mechanism = "five_bar"\n' + varied)
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "study.json").write_text("[]")
+    assert "not the study of a sweep; name a new folder" in message(lambda: sweep(file, folder))
+
+
+def test_a_search_needs_a_start(tmp_path):
+    file = tmp_path / "search.toml"
+    file.write_text(
+        'mechanism = "five_bar"\n[vary.L]\nfields = ["ground.A1.0", "ground.A2.0"]\nlow = -0.2\nhigh = 0.2\n'
+        "[objective]\ntracking_rms = 1.0\n"
+    )
+    assert "so that there is no start" in message(lambda: load_optimisation(file))
