@@ -331,6 +331,6 @@ def test_a_search_needs_a_start(tmp_path):
     file = tmp_path / "search.toml"
     file.write_text(
         'mechanism = "five_bar"\n[vary.L]\nfields = ["ground.A1.0", "ground.A2.0"]\nlow = -0.2\nhigh = 0.2\n'
-        "[objective]\ntracking_rms = 1.0\n"
+        "[objective]\nminimise = { tracking_rms = 1.0 }\n"
     )
     assert "so that there is no start" in message(lambda: load_optimisation(file))

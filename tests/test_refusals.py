@@ -12,6 +12,7 @@ import pytest
 import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.fem import mesh_beam
+from paraflex.integrators.outside import _max_order
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.spectra import spectrum
 from paraflex.integrators.variation import check_differentiable
@@ -20,6 +21,7 @@ from paraflex.plots.agreement import select_model
 from paraflex.plots.catalogue import drawings, find_figure
 from paraflex.plots.designs import read_designs
 from paraflex.plots.driving import mode_conditions
+from paraflex.plots.film import FilmOptions, plan_film
 from paraflex.plots.runs import one_run
 from paraflex.plots.scene import check_shapes, scene, select
 from paraflex.plots.sources import open_source
@@ -147,3 +149,18 @@ def test_modules_name_what_they_do_not_have(module):
 
     with pytest.raises(AttributeError, match=f"module '{module}' has no attribute 'animals'"):
         _ = import_module(module).animals
+
+
+def test_films_of_too_many_pictures(motion):
+    with pytest.raises(InputError, match="the film would have .* pictures, more than") as caught:
+        plan_film(motion, options=FilmOptions(speed=1e-6))
+    assert caught.value.remedy.startswith("choose a higher speed")
+
+
+def test_numbers_that_no_file_needs(tmp_path):
+    file = tmp_path / "digits.toml"
+    file.write_text("a = " + "9" * 5000, encoding="utf-8")
+    digits = "not valid TOML: a number of too many digits, or too many brackets in one another"
+    refused(lambda: pf.load(file), "file", digits, "name a model file")
+    order = pf.IntegrationOptions(method="bdf", parameters={"max_order": 2.5})
+    refused(lambda: _max_order(order), "parameters.max_order", "must be a whole number", "say 2")
