@@ -152,7 +152,7 @@ def test_modules_name_what_they_do_not_have(module):
 
 
 def test_films_of_too_many_pictures(motion):
-    with pytest.raises(InputError, match="the film would have .* pictures, more than") as caught:
+    with pytest.raises(InputError, match=r"the film would have .* pictures, more than") as caught:
         plan_film(motion, options=FilmOptions(speed=1e-6))
     assert caught.value.remedy.startswith("choose a higher speed")
 
