@@ -102,6 +102,7 @@ def test_info_judges_in_three_levels_and_ends_with_1_where_it_is_wrong(tmp_path)
     doubtful = paraflex("info", str(steel))
     assert doubtful.returncode == 0
     assert "doubtful: body.rod1.material.youngs_modulus: 210 Pa is that of no solid" in doubtful.stdout
+    assert doubtful.stderr == ""
     assert "210e9, aluminium 70e9 [modulus]" in doubtful.stdout
     assert "verdict: doubtful, for" in doubtful.stdout
     wrong = slipped(tmp_path, "gantry", 'coordinates = ["x", "y"]', 'coordinates = ["x"]')
@@ -232,6 +233,11 @@ def test_every_code_is_used_and_every_code_used_is_listed():
 def test_an_unknown_code_is_refused():
     with pytest.raises(KeyError, match="no finding has the code"):
         Finding("no-such", "body", "odd", "look")
+
+
+def test_what_is_no_model_is_refused():
+    with pytest.raises(pf.InputError, match="model: not a model"):
+        pf.check(5)
 
 
 def test_a_verdict_is_that_of_its_gravest_finding_and_says_each_once():

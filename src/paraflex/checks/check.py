@@ -9,6 +9,7 @@ from paraflex.checks.pose import Examination, examine, pose_findings
 from paraflex.checks.start import start_findings
 from paraflex.checks.study import path_findings, study_findings, task_findings
 from paraflex.checks.unused import file_findings
+from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.findings import Finding, Verdict
 from paraflex.mechanism import ActuationMode, Mechanism
@@ -47,10 +48,14 @@ def check(
     Raises
     ------
     InputError
-        A file that cannot be read, or an unknown path, assembly or mode.
+        A file that cannot be read, an unknown path, assembly or mode, or nothing to check.
     """
     if isinstance(model, str | FilePath):
         model = load(model)
+    if not isinstance(model, Model | Mechanism):
+        raise InputError(
+            "not a model", field="model", value=model, remedy="give a model, a mechanism, or a file's name"
+        )
     mechanism = model if isinstance(model, Mechanism) else model.mechanism
     if isinstance(model, Model):
         assembly = assembly or model.study.assembly

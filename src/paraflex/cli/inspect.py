@@ -7,11 +7,12 @@ import math
 from typing import Any
 
 from paraflex.checks import check, examine
+from paraflex.cli.collected import printed
 from paraflex.cli.frequencies import InfoRequest, frequencies, hertz
 from paraflex.cli.inspect_tables import print_facts, print_library
 from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, closure_of, mobility
 from paraflex.files import Model, library_names, load
-from paraflex.findings import Level
+from paraflex.findings import Finding, Level
 from paraflex.mechanism import Mechanism, loops
 
 # Loops and sets of motors listed at most.
@@ -26,6 +27,8 @@ def info_command(request: InfoRequest) -> int:
     else:
         facts = describe(load(request.source), request)
         verdict = facts["verdict"]["level"]
+        # They are part of what is printed.
+        printed(map(Finding.from_dict, facts["verdict"]["findings"]))
     if request.json:
         print(json.dumps(facts, indent=2))
     elif verdict is None:
