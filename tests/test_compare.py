@@ -250,7 +250,7 @@ def test_numerical_damping_shows_what_spectra_say():
         (["--step", "0"], "--step: must be positive (got 0.0)"),
         (["--limit", "0"], "--limit: must be positive (got 0.0)"),
         (["--mode", "+-+"], "--mode: not an actuation mode"),
-        (["--mechanism", "pendulum", "--mode", "+"], "--mode: the model has no path"),
+        (["--mechanism", "pendulum", "--mode", "+"], "--mode: a model without a path has no actuation modes"),
         (["--mechanism", "pendulum", "--duration", "-1"], "--duration: must be positive"),
     ],
 )

@@ -468,7 +468,7 @@ def test_a_pose_in_which_the_constraints_lose_rank_is_an_error(raparm):
     slow = PointPath(((0.0, 0.264), (0.02, 0.264)), float(down.motion.t[-1]))
     task = plan_tracking(rigid, slow, samples=11)
     task = replace(task, plan=replace(task.plan, follow=down.plan.follow))
-    with pytest.raises(IntegrationError, match="rank from 24 to 23") as caught:
+    with pytest.raises(IntegrationError, match="1 of the constraints depend on others") as caught:
         simulate_ked(task, "+-+-", step=1e-3)
     moment, partial = caught.value.moment, caught.value.partial
     assert moment.time == pytest.approx(down.motion.t[-1], rel=0.01)

@@ -172,7 +172,7 @@ def test_a_start_that_does_not_run(tmp_path):
     with pytest.raises(InputError, match=r"the start cannot be run \(line, .* out of reach\).*x = 0.005, y = 0.225"):
         optimise(study, tmp_path / "out", run=made_up(tracking_rms=out))
     study = study_of(tmp_path, OBJECTIVE.replace("false", "true"))
-    with pytest.raises(InputError, match=r"objective.minimise.tracking_rms: zero at the start.*relative = false"):
+    with pytest.raises(InputError, match=r"objective.minimise.tracking_rms: the metric is zero.*relative = false"):
         optimise(study, tmp_path / "zero", run=made_up(tracking_rms=lambda mode, x, y: 0.0))
 
 
@@ -430,7 +430,7 @@ BAD = [
     ("low = 0.002", "low = 0.008", "vary.x.high: low and high are equal"),
     ("low = 0.002", "values = [1.0]", "vary.x.values: only sweeps have it"),
     ("low = 0.1\n", "", "vary.y.low: is missing"),
-    ('["section.bar.thickness"]', '["section.bar.thickness", "section.bar.width"]', "its fields differ"),
+    ('["section.bar.thickness"]', '["section.bar.thickness", "section.bar.width"]', "its fields have different values"),
     ("[objective]", '[search]\nmethod = "newton"\n[objective]', 'give "slsqp", "trust-constr"'),
     ("[objective]", "[search]\nevaluations = 0\n[objective]", "search.evaluations: must be positive"),
     ("[objective]", "[search]\nseed = -1\n[objective]", "search.seed: must not be negative"),
