@@ -24,7 +24,6 @@ from paraflex.fem import ReferenceCondition
 from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Curvature, FlexibleBeam, Geometry, JointFriction, Mechanism, PiecewiseLaw
-from paraflex.simulate import plan_tracking
 from paraflex.studies import Case, ComparisonOptions, compare_methods, motion_case, tracking_case
 
 METHODS = ("tr-bdf2", "esdirk3", "esdirk4", "esdirk5")
@@ -45,13 +44,7 @@ def right(mechanism: Mechanism) -> Mechanism:
 
 def tracked(model: Model, mechanism: Mechanism, mode: str) -> Case:
     """A mode of the model's own study."""
-    path = model.path()
-    name = model.study.path or next(iter(model.paths))
-    task = plan_tracking(
-        mechanism, path, duration=model.duration(name, path), samples=model.study.samples,
-        assembly=model.study.assembly, orientation=model.study.orientation,
-    )  # fmt: skip
-    return tracking_case(task, mode)
+    return tracking_case(model.plan(mechanism=mechanism, after="free"), mode)
 
 
 def free(model: Model, mechanism: Mechanism) -> Case:

@@ -13,7 +13,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure, drawings, figures_of
+from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure
+from paraflex.plots.planned import drawings, figures_of
 from paraflex.plots.save import write_figures
 from paraflex.plots.sources import Source, open_source
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from paraflex.designs.run import FAILED, lost
 from paraflex.studies.sweeps import Outcome
-from paraflex.studies.sweeps.run import FAILED, lost
 
 STUDY = """
 mechanism = "raparm_i"

@@ -106,9 +106,10 @@ def test_springs_hang_between_their_ends(slider):
     run = select(own_motion("andrews", 0.001), None)
     shown = scene(run, run["time"].values)
     assert len(shown.springs) == len(shown.anchors) == 1
-    line = zigzag(shown.springs[0], shown.limits)
-    np.testing.assert_allclose(line[:, [0, -1]], shown.springs[0], rtol=0, atol=1e-12)
-    assert any(np.allclose(shown.anchors[0], end) for end in shown.springs[0][0])
+    (ends,) = shown.springs.values()
+    line = zigzag(ends, shown.limits)
+    np.testing.assert_allclose(line[:, [0, -1]], ends, rtol=0, atol=1e-12)
+    assert any(np.allclose(shown.anchors[0], end) for end in ends[0])
 
 
 def test_a_plate_is_drawn_up_to_where_it_closes():

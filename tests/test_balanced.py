@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import paraflex.dynamics.equilibrium as equilibria
-from paraflex.cli.frequencies import InfoRequest
+from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.inspect import describe
 from paraflex.dynamics import (
     balanced_state,

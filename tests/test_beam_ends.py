@@ -10,6 +10,7 @@ import pandas
 import pytest
 import scipy.optimize
 
+from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError, ModelWarning, ResultWarning, SliderOffBeamError, UnreachablePathError
 from paraflex.files import library_names, load
 from paraflex.integrators import METHODS, IntegrationOptions, JointLimit
@@ -217,6 +218,32 @@ def test_a_run_along_a_path_stops_at_the_end_of_the_beam(rigid):
     (figures,) = data["modes"].values()
     assert figures["event"] == "joint pin at the end of lever"
     assert "slider-off-beam" not in [one["code"] for one in data["verdict"]["findings"]]
+
+
+def test_elastodynamics_stops_or_goes_on_where_the_joint_says():
+    stopped, gone_on = (
+        simulate_ked(plan_tracking(driven(at_end), path(), samples=51, warning=False), "tau", step=1e-3)
+        for at_end in ("stop", "warn")
+    )
+    solution = stopped.solution
+    assert solution.status == "stopped"
+    assert solution.event == "joint pin at the end of lever"
+    assert solution.t[-1] == pytest.approx(path_leaves(), abs=1e-5)
+    assert solution.message.startswith("joint pin came to the end of its beam lever, 0.25 m from its first end")
+    k = solution.t.size - 1
+    np.testing.assert_array_equal(solution.q[:k], gone_on.solution.q[:k])
+    # What the mechanism does at the end stands between its neighbours.
+    low, high = np.sort(gone_on.solution.q[k - 1 : k + 1], axis=0)
+    assert np.all((solution.q[k] >= low - 1e-6) & (solution.q[k] <= high + 1e-6))
+    assert stopped.doubts == ()
+    (figures,) = summary(tracking_dataset([stopped]))["modes"].values()
+    assert figures["event_time"] == solution.t[-1]
+    assert [one.code for one in gone_on.doubts] == ["slider-off-beam"]
+    with pytest.raises(InputError, match="its point is off the beam at the start"):
+        simulate_ked(
+            plan_tracking(driven("stop"), Line((0.25, 0.0), (BASE + CRANK * np.cos(START), 0.0), 10.0), samples=51),
+            "tau",
+        )
 
 
 def test_a_beam_that_carries_a_sliding_point_is_not_cut():

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from paraflex.cli.integration import IntegrationRequest, integration_options, parse_event
+from paraflex.cli.commands.runs import RunRequest
+from paraflex.cli.integration import integration_options, parse_event
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults, library_text, load
 from paraflex.integrators import METHODS, DeflectionLimit, JointLimit, SingularDistance
@@ -64,16 +65,16 @@ def test_events_are_read(text, event):
 )
 def test_what_makes_no_sense_names_the_flag(request_, says):
     with pytest.raises(InputError, match=f"^{says}"):
-        integration_options(IntegrationRequest(**request_), StudyDefaults())
+        integration_options(RunRequest(**request_), StudyDefaults())
 
 
 def test_flags_go_before_the_study_and_its_step_goes_with_its_method():
     study = StudyDefaults(method="esdirk3", tolerance=1e-5, step=1e-3)
-    kept = integration_options(IntegrationRequest(), study)
+    kept = integration_options(RunRequest(), study)
     assert (kept.method, kept.tolerance, kept.step) == ("esdirk3", 1e-5, 1e-3)
-    finer = integration_options(IntegrationRequest(step=1e-4, tolerance=1e-7), study)
+    finer = integration_options(RunRequest(step=1e-4, tolerance=1e-7), study)
     assert (finer.method, finer.tolerance, finer.step) == ("esdirk3", 1e-7, 1e-4)
-    other = integration_options(IntegrationRequest(method="radau"), study)
+    other = integration_options(RunRequest(method="radau"), study)
     assert (other.method, other.tolerance, other.step) == ("radau", 1e-5, None)
 
 

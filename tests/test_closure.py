@@ -16,6 +16,7 @@ from paraflex.mechanism import (
     Assembly,
     EndEffector,
     Mechanism,
+    Motor,
     PointRef,
     PrescribedAngle,
     RevoluteJoint,
@@ -352,3 +353,29 @@ def test_an_assembly_that_cannot_close_says_which_joint_is_open():
 
 def test_the_square_is_the_one_of_the_paper(square):
     np.testing.assert_array_equal(square.corners, SQUARE)
+
+
+@pytest.mark.parametrize(("coordinates", "says"), [(("x",), "holds itself twice"), (("x", "y"), "has 1 degrees of")])
+def test_what_is_held_twice_is_counted_once(coordinates, says):
+    """A parallelogram with a third crank between its two moves, though constraints are as many as coordinates."""
+    cranks = [RigidBody(f"crank{k}", 0.1, 1e-4, points={"A": (0.0, 0.0), "B": (0.1, 0.0)}) for k in range(3)]
+    rail = RigidBody("rail", 0.1, 1e-4, points={f"B{k}": (0.1 * k, 0.0) for k in range(3)})
+    joints = [
+        RevoluteJoint(f"{side}{k}", PointRef(*low), PointRef(*high))
+        for k in range(3)
+        for side, low, high in (
+            ("A", ("ground", f"A{k}"), (f"crank{k}", "A")), ("B", (f"crank{k}", "B"), ("rail", f"B{k}")),
+        )
+    ]  # fmt: skip
+    mechanism = Mechanism(
+        "parallelogram",
+        {f"A{k}": (0.1 * k, 0.0) for k in range(3)},
+        (*cranks, rail),
+        tuple(joints),
+        motors=(Motor("tau", "A0"),),
+        end_effector=EndEffector(PointRef("rail", "B0"), coordinates),
+        assemblies=(Assembly("up", {**{f"crank{k}": 1.0 for k in range(3)}, "rail": 0.0}),),
+    )
+    start = (0.1 * np.cos(1.0), 0.1 * np.sin(1.0))
+    with pytest.raises(InputError, match=says):
+        follow_path(mechanism, Line(start, (0.06, start[1]), 1.0), [0.0, 0.1])

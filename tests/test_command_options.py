@@ -34,7 +34,7 @@ def test_a_second_value_of_an_option_is_refused(name, parameter):
 
 def test_options_of_several_values_take_them():
     context = COMMANDS["run"].make_context("run", ["--mode", "++++", "--mode", "+-+-", "--stop-at", "singular=0.1"])
-    assert context.params["mode"] == ["++++", "+-+-"]
+    assert context.params["modes"] == ["++++", "+-+-"]
     assert context.params["stop_at"] == ["singular=0.1"]
 
 

@@ -9,6 +9,7 @@ import pytest
 import scipy.linalg
 
 from paraflex import load
+from paraflex.designs.derivatives.steps import with_fields
 from paraflex.dynamics import State, build_system, natural_frequencies
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
@@ -35,7 +36,6 @@ from paraflex.mechanism import (
     finite_segments,
 )
 from paraflex.motion import simulate_motion
-from paraflex.studies.sensitivities.steps import with_fields
 
 STEEL = Material(2.1e11, 7850.0)
 STILL = SampledAngle(lambda t: 0.0 * t, lambda t: 0.0 * t, lambda t: 0.0 * t)

@@ -6,7 +6,9 @@ from enum import Enum
 import numpy as np
 import pytest
 
+from paraflex.campaign import open_engine
 from paraflex.compilation import are_compiled
+from paraflex.designs.samples import designs
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition, mesh_beam
 from paraflex.fem.reference import reference_basis
@@ -28,8 +30,6 @@ from paraflex.simulate import plan_tracking, simulate
 from paraflex.studies import Refinement, VerificationOptions
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.study import Search
-from paraflex.studies.sweeps.engines import open_engine
-from paraflex.studies.sweeps.samples import designs
 from paraflex.studies.verification import ModelRuns
 
 

@@ -3,6 +3,11 @@
 import numpy as np
 import pytest
 
+from paraflex.designs.derivatives.changes import Change
+from paraflex.designs.derivatives.plans import given, nominal_values, size_of
+from paraflex.designs.derivatives.stencil import STENCILS
+from paraflex.designs.derivatives.steps import STEP, complex_step, part, with_fields
+from paraflex.designs.run import plan_task
 from paraflex.dynamics import blocks_of, build_system, numbers_of
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition, SpanProperties, beam_integrals, mesh_beam, modal_basis
@@ -11,12 +16,7 @@ from paraflex.fem.eigen import eigen_derivatives, eigenpairs
 from paraflex.kinematics import Circle, Line, Polygon
 from paraflex.mechanism import AssumedModesBeam, Material, Section, raparm_i
 from paraflex.studies import load_sensitivities, sensitivities
-from paraflex.studies.sensitivities.changes import Change
-from paraflex.studies.sensitivities.plans import given, nominal_values, size_of
-from paraflex.studies.sensitivities.stencil import STENCILS
-from paraflex.studies.sensitivities.steps import STEP, complex_step, part, with_fields
 from paraflex.studies.sweeps import Task
-from paraflex.studies.sweeps.run import plan_task
 
 STENCIL = STENCILS[0]
 SCALES = ("density", "modulus", "joint_mass", "joint_inertia", "end_mass", "end_inertia")

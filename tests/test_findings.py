@@ -201,7 +201,7 @@ def test_links_that_bend_like_springs_and_paths_that_are_not_followed_are_doubte
     assert codes == {one.message.finding.code for one in caught if one.category is pf.ResultWarning}
     desired = task.motion.desired.position
     extent = np.linalg.norm(np.ptp(desired, axis=0))
-    assert ("error-large" in codes) == (run._driven().deviation > 0.5 * extent)
+    assert ("error-large" in codes) == (run.driven.deviation > 0.5 * extent)
     assert codes
     for one in run.doubts:
         assert one.place == "mode both"

@@ -33,7 +33,8 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.results import load_results, save_results, summary, tracking_dataset
-from paraflex.results.metrics import drift_speed, part_run, vibration
+from paraflex.results.following import part_run
+from paraflex.results.formulas import drift_speed, vibration
 from paraflex.results.outlines import deflections, outlines
 from paraflex.simulate import plan_tracking
 from paraflex.studies import run_study
@@ -148,16 +149,16 @@ def test_figures_and_pages_are_ranked_by_the_headline(paper_run):
 def test_a_run_that_stops_after_the_motion_has_the_error_of_the_motion(paper_run):
     data = tracking_dataset(paper_run)
     data["end_effector"][0, 600:] = np.nan
-    from paraflex.results.metrics import tracking_variables
+    from paraflex.results.following import metric_variables
 
-    found = tracking_variables(data)
+    found = metric_variables(data)
     assert found["tracking_rms_motion"][0] == data["tracking_rms_motion"][0]
     assert np.isnan(found["tracking_rms"][0])
     assert np.isnan(found["residual_vibration"][0])
 
 
 def test_older_results_are_told_by_today_s_formulas_and_ranked_as_they_were(paper_run, tmp_path):
-    from paraflex.results.metrics import FOLLOWING, headline
+    from paraflex.results.following import FOLLOWING, headline
 
     data = tracking_dataset(paper_run)
     old = data.drop_vars([name for name in FOLLOWING if name != "tracking_rms"] + ["deflection", "brake_energy"])

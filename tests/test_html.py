@@ -15,10 +15,11 @@ from made_up import STUDY, made_up, write_study
 from paraflex.display import facts, table, written
 from paraflex.errors import IntegrationError
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism.html import freedoms, mechanism_html
-from paraflex.mechanism.sketch import places_of, sketch
 from paraflex.motion import simulate_motion
+from paraflex.plots.mechanism_html import freedoms, mechanism_html
+from paraflex.plots.svg import sketch
 from paraflex.results import tracking_dataset
+from paraflex.results.drawing import assembled_data
 from paraflex.studies import (
     Measurement,
     MethodComparison,
@@ -140,6 +141,16 @@ def test_names_are_escaped() -> None:
     assert "<b>" not in table(["<b>"], [["<b>", 1.0]], "<b>") + facts([("<b>", "<b>")])
 
 
+def places_of(mechanism) -> dict[str, dict[str, tuple[float, float]]]:
+    """Where the sketch has the named points of bodies [m]."""
+    data, places = assembled_data(mechanism), {body.name: {} for body in mechanism.bodies}
+    assert data is not None
+    for name, station in zip(data["point"].values, data["point_station"].values, strict=True):
+        body, _, point = str(name).partition(".")
+        places[body][point] = tuple(data["shape"].values[0, station].tolist())
+    return places
+
+
 def test_the_sketch_puts_links_end_to_end() -> None:
     mechanism = pf.load("raparm_i").mechanism
     places = places_of(mechanism)
@@ -152,11 +163,12 @@ def test_the_sketch_puts_links_end_to_end() -> None:
     assert places["link1"]["A1"] == mechanism.ground["A1"]
     assert places["link1"]["B1"] == pytest.approx(places["link4"]["B1"])
     drawn = sketch(mechanism)
-    assert drawn.count("<polyline") == 8
+    assert drawn.count('stroke-linecap="round"') == 8
     assert drawn.count("<circle") == 11
     assert sketch(replace(mechanism, assemblies=())) == ""
-    assert "<polygon" in sketch(pf.load("3rrr").mechanism)
-    assert sketch(pf.load("3prr").mechanism).count("<rect") == 3
+    assert 'fill-opacity="0.25"' in sketch(pf.load("3rrr").mechanism)
+    assert 'fill-opacity="0.25"' not in drawn
+    assert sketch(pf.load("3prr").mechanism).count('class="block"') == 3
 
 
 def test_a_slider_hangs_on_its_rod_not_on_its_axis() -> None:

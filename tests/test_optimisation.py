@@ -6,13 +6,16 @@ import subprocess
 import sys
 import time
 import tomllib
+from contextlib import ExitStack
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import paraflex as pf
+from journals import rows_in
 from made_up import STUDY, made_up, write_study
+from paraflex.campaign.journal import write_journal
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_names, load_data
 from paraflex.plots import convergence
@@ -20,7 +23,6 @@ from paraflex.studies import load_optimisation, optimise
 from paraflex.studies.optimisation.best import toml_text
 from paraflex.studies.optimisation.evaluate import Evaluate
 from paraflex.studies.optimisation.problem import Problem
-from paraflex.studies.optimisation.record import Record, record_schema
 from paraflex.studies.optimisation.slopes import differences, slopes_of
 from paraflex.studies.sweeps import open_engine, run_task
 
@@ -137,7 +139,7 @@ def test_designs_that_fail_do_not_end_it(tmp_path, method):
     assert (table[table["status"] == "failed"]["x"] < 0.0045).all()
 
 
-def test_where_nothing_runs_the_slope_leads_back(tmp_path):
+def test_where_nothing_runs_the_slope_leads_back(tmp_path, evaluate_of):
     """Value and slope beyond the designs that run fit each other and lie above the start."""
 
     def slope(mode, x, y):
@@ -176,12 +178,19 @@ def test_a_start_that_does_not_run(tmp_path):
         optimise(study, tmp_path / "zero", run=made_up(tracking_rms=lambda mode, x, y: 0.0))
 
 
-def evaluate_of(study, folder, run):
-    folder.mkdir()
-    return Evaluate(study, Record(folder, record_schema(study, slopes=False)), open_engine("threads", 1), run)
+@pytest.fixture
+def evaluate_of():
+    with ExitStack() as opened:
+
+        def make(study, folder, run):
+            folder.mkdir()
+            journal, engine = write_journal(folder), open_engine("threads", 1)
+            return Evaluate(study, opened.enter_context(journal), opened.enter_context(engine), run)
+
+        yield make
 
 
-def test_differences_are_slopes_of_the_unit_cube(tmp_path):
+def test_differences_are_slopes_of_the_unit_cube(tmp_path, evaluate_of):
     study = study_of(tmp_path, OBJECTIVE)
     evaluate = evaluate_of(study, tmp_path / "out", made_up(tracking_rms=bowl))
     (at,) = evaluate([study.start])
@@ -209,7 +218,7 @@ def test_unit_cube_and_back(tmp_path):
 
 
 def fake_sensitivities(monkeypatch, metric_gradients):
-    monkeypatch.setattr(sys.modules["paraflex.studies.sensitivities"], "metric_gradients", metric_gradients)
+    monkeypatch.setattr(sys.modules["paraflex.designs.derivatives.gradient"], "metric_gradients", metric_gradients)
 
 
 def test_exact_gradients_are_asked_for_where_slopes_are_used(tmp_path, monkeypatch):
@@ -289,7 +298,7 @@ def test_a_stopped_search_goes_on_as_if_it_had_not_been(tmp_path, method):
     assert stopped.interrupted
     assert stopped.stopped == "interrupted"
     assert stopped.evaluations == 14
-    assert stopped.table.name == "parts"
+    assert stopped.table.name == "unfinished.parquet"
     assert len(pd.read_parquet(stopped.table)) == 14
     assert json.loads((tmp_path / "parts" / "result.json").read_text())["values"] == stopped.values
     gone_on = optimise(study, tmp_path / "parts", run=parts_run, workers=1)
@@ -299,7 +308,7 @@ def test_a_stopped_search_goes_on_as_if_it_had_not_been(tmp_path, method):
         assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
     # The one that Ctrl-C met may have been begun twice, no other.
     assert len(parts_run.designs) <= len(whole_run.designs) + 2
-    assert not (tmp_path / "parts" / "parts").exists()
+    assert not (tmp_path / "parts" / "unfinished.parquet").exists()
 
 
 def test_interrupted_before_anything_is_known(tmp_path):
@@ -327,14 +336,24 @@ def test_more_evaluations_go_on_from_fewer(tmp_path):
 def test_a_damaged_table_is_named(tmp_path):
     study = study_of(tmp_path, OBJECTIVE, evaluations=5)
     result = optimise(study, tmp_path / "out", run=made_up(tracking_rms=bowl))
-    result.table.write_bytes(result.table.read_bytes()[:60])
+    whole = result.table.read_bytes()
+    result.table.write_bytes(whole[:60])
+    # A table is made of the journal again ...
+    assert optimise(study, tmp_path / "out", run=pytest.fail).table.read_bytes() == whole
+    journal = tmp_path / "out" / "journal.sqlite"
+    journal.write_bytes(journal.read_bytes()[:60])
+    with pytest.raises(OutputError, match=r"journal.sqlite: cannot be read .*delete this file"):
+        optimise(study, tmp_path / "out", run=made_up(tracking_rms=bowl))
+    # ... and a journal of the table.
+    journal.unlink()
+    result.table.write_bytes(whole[:60])
     with pytest.raises(OutputError, match=r"results.parquet: cannot be read .*delete this file"):
         optimise(study, tmp_path / "out", run=made_up(tracking_rms=bowl))
 
 
 def test_a_worker_that_died_is_a_design_that_failed(tmp_path, monkeypatch):
+    from paraflex.campaign import LostWorker
     from paraflex.studies.optimisation import evaluate as module
-    from paraflex.studies.sweeps.engines import LostWorker
 
     whole = module.outcomes
 
@@ -407,8 +426,9 @@ def test_modes_of_one_design_are_run_apart_with_the_same_rows(tmp_path):
     for workers in (1, 3):
         folder = tmp_path / str(workers)
         folder.mkdir()
-        evaluate = Evaluate(study, Record(folder, record_schema(study, slopes=False)), open_engine("threads", workers))
-        rows.append(evaluate([study.start])[0].rows)
+        with write_journal(folder) as journal, open_engine("threads", workers) as engine:
+            evaluate = Evaluate(study, journal, engine)
+            rows.append(evaluate([study.start])[0].rows)
     assert rows[0] == rows[1]
     assert run_task is evaluate.run
 
@@ -506,7 +526,7 @@ def test_control_c_keeps_what_is_done(tmp_path):
         command("optimise", file, "--output", out), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     until = time.monotonic() + 60.0
-    while not list(out.glob("parts/part-*.parquet")) and time.monotonic() < until:
+    while not rows_in(out) and time.monotonic() < until:
         time.sleep(0.1)
     running.send_signal(signal.SIGINT)
     said, complained = running.communicate(timeout=60)
@@ -514,5 +534,5 @@ def test_control_c_keeps_what_is_done(tmp_path):
     assert "interrupted" in said
     assert "objective" in said
     assert "the same command goes on from there" in complained
-    assert len(pd.read_parquet(out / "parts")) > 0
+    assert len(pd.read_parquet(out / "unfinished.parquet")) > 0
     assert json.loads((out / "result.json").read_text())["interrupted"]

@@ -19,10 +19,11 @@ from paraflex import plots
 from paraflex.cli.app import app
 from paraflex.errors import InputError
 from paraflex.motion import simulate_motion
-from paraflex.plots.catalogue import CATALOGUE, drawings, figures_of, find_figure, homes
+from paraflex.plots.catalogue import CATALOGUE, homes
 from paraflex.plots.designs import undominated
 from paraflex.plots.labels import axis_label, logarithmic_number, metric_name
 from paraflex.plots.layout import MM, column_width
+from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.save import write_figures
 from paraflex.plots.sources import Source, open_source
 from paraflex.results import motion_dataset, save_results, tracking_dataset

@@ -221,7 +221,7 @@ def test_desired_path_and_the_mechanism_at_its_start(data: xr.Dataset) -> None:
     same(curve(axes, "desired path"), 1e3 * data["end_effector_desired"].values[0])
     same(curve(axes, "start"), 1e3 * data["end_effector_desired"].values[0, :1])
     base, elbow, _, tip = 1e3 * data["point_position"].values[0, 0]
-    links = [points_of(line) for line in axes.lines if line.get_linewidth() > 2.0]
+    links = next(each for each in axes.collections if each.get_label() == "links").get_segments()
     # A link's ends, in either order.
     assert [sorted(map(tuple, link)) for link in links] == [
         sorted([tuple(base), tuple(elbow)]),
@@ -229,9 +229,9 @@ def test_desired_path_and_the_mechanism_at_its_start(data: xr.Dataset) -> None:
     ]
     same(curve(axes, "joints"), [base, elbow])
     same(curve(axes, "other points"), [tip])
-    supports = [points_of(line) for line in axes.lines if line.get_markersize() > 12.0]
+    supports = next(each for each in axes.collections if each.get_label() == "_ground").get_paths()
     assert len(supports) == 1
-    same(supports[0], [base])
+    same(supports[0].vertices[0], base)
     assert {text.get_text() for text in axes.texts} >= {"$A$", "$B$", "$P$"}
 
 
@@ -239,7 +239,7 @@ def test_a_link_with_points_off_a_line_is_a_closed_outline(data: xr.Dataset) -> 
     data = data.assign_coords(point=["plate.A", "plate.B", "plate.C", "rod.P"])
     data["point_position"][:, :, 2] = [0.3, 0.05]
     (axes,) = plots.desired_path(data).axes
-    outline = points_of(next(line for line in axes.lines if line.get_label() == "links"))
+    outline = next(each for each in axes.collections if each.get_label() == "links").get_segments()[0]
     same(outline[0], outline[-1])
     corners = 1e3 * data["point_position"].values[0, 0, :3]
     assert sorted(map(tuple, outline[:-1])) == sorted(map(tuple, corners))

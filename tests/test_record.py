@@ -6,8 +6,9 @@ import pytest
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import raparm_i
-from paraflex.results import tracking_dataset
+from paraflex.mechanism import Assembly, Mechanism, Motor, PointRef, PrismaticJoint, RigidBody, raparm_i
+from paraflex.motion import simulate_motion
+from paraflex.results import motion_dataset, tracking_dataset
 from paraflex.simulate import plan_tracking
 
 # Steps that damp the axial vibrations of links, which segments do not have.
@@ -57,3 +58,33 @@ def test_segments_are_told_as_links(links, square):
 def test_segments_are_not_cut_again(square):
     with pytest.raises(InputError, match="cut into segments already"):
         plan_tracking(raparm_i(), square, samples=3).in_segments(4).in_segments(2)
+
+
+def test_motors_speeds_and_powers(links, square):
+    """Power is torque times the rate of the joint: all the work there is where nothing else acts."""
+    np.testing.assert_allclose(links["motor_power"], links["torque"] * links["motor_speed"], rtol=1e-15)
+    rate = links["angular_velocity"].sel(body="link1")
+    np.testing.assert_array_equal(links["motor_speed"].sel(motor="tau1"), rate)
+    assert (links["motor_speed"].attrs["units"], links["motor_power"].attrs["units"]) == ("rad/s", "W")
+    # Without vibrations, which pass between samples.
+    rigid = study(raparm_i().rigid(), square)
+    done = np.trapezoid(rigid["motor_power"].sum("motor"), rigid["time"])
+    assert rigid["work"].values[-1] == pytest.approx(done, rel=1e-3)
+    # A motor turns the first segment of its link.
+    cut = study(raparm_i(), square, 4)
+    np.testing.assert_array_equal(cut["motor_speed"].sel(motor="tau1"), cut["angular_velocity"].sel(body="link1"))
+
+
+def test_a_motor_that_slides_without_a_path():
+    """A block of mass m pushed by a constant force F: v = F t / m, and the power F v."""
+    block = RigidBody("block", 2.0, 1e-3, points={"P": (0.0, 0.0)})
+    rail = PrismaticJoint("rail", PointRef("ground", "O"), PointRef("block", "P"), 0.0)
+    home = Assembly("home", {"block": 0.0}, {PointRef("block", "P"): (0.0, 0.0)})
+    mechanism = Mechanism(
+        "push", {"O": (0.0, 0.0)}, (block,), (rail,), motors=(Motor("push", "rail"),), assemblies=(home,)
+    )
+    data = motion_dataset(simulate_motion(mechanism, 1.0, samples=5, torques={"push": 3.0}))
+    np.testing.assert_allclose(data["motor_speed"].sel(motor="push"), 1.5 * data["time"], rtol=1e-9)
+    np.testing.assert_allclose(data["motor_power"].sel(motor="push"), 4.5 * data["time"], rtol=1e-9)
+    units = [data[name].attrs["units"] for name in ("motor_speed", "motor_power", "applied_torque")]
+    assert units == ["m/s", "W", "N"]

@@ -18,10 +18,10 @@ from paraflex.integrators.spectra import spectrum
 from paraflex.integrators.variation import check_differentiable
 from paraflex.motion import simulate_motion
 from paraflex.plots.agreement import select_model
-from paraflex.plots.catalogue import drawings, find_figure
 from paraflex.plots.designs import read_designs
 from paraflex.plots.driving import mode_conditions
 from paraflex.plots.film import FilmOptions, plan_film
+from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.runs import one_run
 from paraflex.plots.scene import check_shapes, scene, select
 from paraflex.plots.sources import open_source
@@ -76,7 +76,7 @@ def test_figures_that_are_not_there(motion, tmp_path):
     save_results(motion, tmp_path / "results.nc")
     source = open_source(tmp_path / "results.nc")
     refused(lambda: find_figure(source, "animals"), "FIGURE", "no such figure", "choose from")
-    figure = next(one for one in pf.plots.catalogue.figures_of(source) if one.takes not in ("run", "mode"))
+    figure = next(one for one in figures_of(source) if one.takes not in ("run", "mode"))
     refused(
         lambda: drawings(source, figure, ["++"]), "--mode", "this figure has no modes to choose from", "leave it out"
     )

@@ -12,12 +12,13 @@ import xarray as xr
 
 from paraflex.errors import InputError, OutputError
 from paraflex.plots.catalogue import CATALOGUE
+from paraflex.plots.labels import text_symbol as symbol
 from paraflex.report import (
     Chart,
     Curve,
     Page,
     Panel,
-    film,
+    animation,
     motion_page,
     render,
     save_page,
@@ -27,7 +28,7 @@ from paraflex.report import (
 from paraflex.report.film import MOST_FRAMES, frames_of
 from paraflex.report.packing import Series, packed
 from paraflex.report.page import plotly_script
-from paraflex.report.text import count, number, symbol
+from paraflex.report.text import count, number
 from paraflex.results import load_results, open_results
 from reports import FAILED, MODES, STOPPED, array_of, chart_of, html_of, rows_of, told, tracked, verified
 from test_cli import FAST, paraflex
@@ -107,8 +108,9 @@ def test_the_film_is_the_shapes_of_the_dataset_also_magnified(page):
         assert np.nanmax(np.abs(base + times * bend - exact)) < 1e-3 * extent
     assert [body[0] for body in shown["bodies"]] == [f"link{k}" for k in range(1, 9)]
     assert shown["bodies"][-1][2] == data.sizes["station"]
-    assert sum(shown["grounded"]) == 4
-    np.testing.assert_allclose(array_of(shown["tip"])[0], data["end_effector"].values[0], atol=1e-5)
+    still, _ = shown["marks"][0]
+    assert sum(look == "ground" for look, *_ in still["pieces"]) == 4
+    np.testing.assert_allclose((base + bend)[0, :, shown["tips"][0]], data["end_effector"].values[0], atol=1e-5)
     np.testing.assert_allclose(array_of(shown["path"])[0], data["end_effector_desired"].values[0], atol=1e-5)
 
 
@@ -360,8 +362,11 @@ def test_a_run_without_a_path_has_a_report(tmp_path):
         chart["identity"] for panel in page["panels"] for chart in panel["charts"]
     }
     # The bob has no joint: its trail is drawn.
+    shown = page["film"]
     np.testing.assert_allclose(
-        array_of(page["film"]["tip"])[0], data["point_position"].sel(point="beam.tip"), atol=1e-4
+        (array_of(shown["base"]) + array_of(shown["bend"]))[0, :, shown["tips"][0]],
+        data["point_position"].sel(point="beam.tip"),
+        atol=1e-4,
     )
     assert motion_page(data).film is not None
     tile = next(value for title, value, _ in motion_page(data).figures if title == "largest deflection")
@@ -369,7 +374,7 @@ def test_a_run_without_a_path_has_a_report(tmp_path):
     assert float(tile.split()[0]) == pytest.approx(
         {"mm": 1e3, "µm": 1e6}[unit] * float(data["deflection"].max()), rel=0.01
     )
-    assert film(data.drop_vars("shape"), ()) is None
+    assert animation(data.drop_vars("shape"), ()) is None
 
 
 def test_verify_has_a_report(tmp_path):

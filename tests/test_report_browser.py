@@ -239,6 +239,34 @@ def test_dark_and_light_follow_the_system_and_the_button(opened):
     assert (page.evaluate(ground), page.evaluate(ink)) == dark[:2]
 
 
+SLOW = """
+    const whole = Response.prototype.arrayBuffer;
+    Response.prototype.arrayBuffer = async function () {
+        await new Promise((done) => setTimeout(done, 150));
+        return whole.call(this);
+    };
+"""
+
+
+def test_a_page_repainted_while_its_film_is_unpacked_says_nothing(browser, report):
+    complaints = []
+    page = browser.new_page()
+    page.add_init_script(SLOW)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(report.as_uri())
+    page.evaluate(
+        """async () => {
+            for (let k = 0; k < 40; k++) {
+                report.setTheme(k % 2 ? "dark" : "light");
+                await new Promise((done) => setTimeout(done, 20));
+            }
+        }"""
+    )
+    assert len(set(coloured(page))) > 1
+    page.close()
+    assert complaints == []
+
+
 def test_everything_is_reached_by_keyboard_and_has_a_name(opened):
     page = opened()
     nameless = page.evaluate(

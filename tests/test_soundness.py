@@ -10,7 +10,7 @@ import pytest
 import twins
 from conftest import make_five_bar
 from paraflex.checks import check
-from paraflex.cli.frequencies import InfoRequest
+from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.inspect import describe, library
 from paraflex.dynamics import (
     build_system,

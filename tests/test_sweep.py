@@ -1,8 +1,7 @@
 """Sweeps in threads: one table whatever the order, resumed runs, rows of what cannot run, bad input, a full disk."""
 
-import errno
 import json
-import os
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -15,15 +14,16 @@ import pyarrow.parquet as pq
 import pytest
 
 import paraflex
+from paraflex.campaign import journal, tables
+from paraflex.campaign.journal import read_journal
+from paraflex.designs.measure import metrics_of
+from paraflex.designs.overlay import find_place, number_places, overlaid
 from paraflex.errors import InputError, OutputError
-from paraflex.files import load, load_data
+from paraflex.files import Model, load, load_data
 from paraflex.results import load_results, summary, tracking_dataset
 from paraflex.simulate import plan_tracking
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps import METRICS, Outcome, Task, run_task
-from paraflex.studies.sweeps import table as tables
-from paraflex.studies.sweeps.overlay import find_place, number_places, overlaid
-from paraflex.studies.sweeps.study import metrics_of
 
 STUDY = """
 mechanism = "raparm_i"
@@ -94,7 +94,7 @@ def test_every_run_has_its_row(finished):
     ]
     assert data["id"].is_unique
     assert np.allclose(data["time_reached"], 0.2)
-    assert not (result.folder / "parts").exists()
+    assert not (result.folder / "unfinished.parquet").exists()
     assert json.loads((result.folder / "summary.json").read_text())["status"] == {"complete": 8}
 
 
@@ -130,8 +130,9 @@ def test_metrics_are_those_of_the_dataset(finished):
     assert row["total_mass"] == pytest.approx(sum(_mass(body) for body in model.mechanism.bodies), rel=1e-12)
     # Three active motors; their speeds from the angles of the links they drive at the base.
     speeds = dataset["angular_velocity"].sel(mode="+++-", body=["link1", "link2", "link5"]).values
-    power = np.abs(torque[:, :3] * speeds).sum(axis=1)
-    assert row["motor_energy"] == pytest.approx(np.trapezoid(power, dataset["time"].values), rel=1e-9)
+    power = np.abs(torque[:, :3] * speeds)
+    assert row["motor_energy"] == pytest.approx(np.trapezoid(power.sum(axis=1), dataset["time"].values), rel=1e-9)
+    assert row["motor_power_max"] == pytest.approx(power.max(), rel=1e-9)
 
 
 def _mass(body):
@@ -214,12 +215,10 @@ def test_a_run_given_up_says_when(tmp_path):
 
 
 def test_an_error_nobody_thought_of_is_a_row(tmp_path, monkeypatch):
-    from paraflex.studies.sweeps import run as module
-
     def strange(*_, **__):
         raise ZeroDivisionError("by a strange design")
 
-    monkeypatch.setattr(module, "plan_tracking", strange)
+    monkeypatch.setattr(Model, "plan", strange)
     result = sweep(load_sweep(write(tmp_path)), tmp_path / "out")
     assert result.counts == {"failed": 8}
     assert set(pd.read_parquet(result.table)["reason"]) == {"ZeroDivisionError: by a strange design"}
@@ -251,7 +250,7 @@ def test_ids_follow_content(finished, tmp_path):
 
 
 def run_task_rows(file):
-    from paraflex.studies.sweeps.run import Task, lost
+    from paraflex.designs.run import Task, lost
 
     study = load_sweep(file)
     tasks = [Task(k, k, tuple(values), "line") for k, values in enumerate(study.designs.tolist())]
@@ -328,21 +327,26 @@ def test_two_sweeps_do_not_write_to_one_folder(finished, tmp_path):
 
 def test_a_full_disk_loses_nothing_that_is_written(tmp_path, monkeypatch):
     study = load_sweep(write(tmp_path))
-    whole, calls = pq.write_table, []
+    connect = sqlite3.connect
 
-    def full(table, where, **options):
-        calls.append(where)
-        if len(calls) == 3:
-            os.close(os.open(where, os.O_CREAT | os.O_WRONLY))
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        whole(table, where, **options)
+    def small(*arguments, **options):
+        """A disk with room for the rows of two tasks: SQLite itself says that there is no more."""
+        connection = connect(*arguments, **options)
+        if "rwc" in str(arguments[0]):
+            connection.execute("PRAGMA max_page_count = 50")
+        return connection
 
-    monkeypatch.setattr(pq, "write_table", full)
-    monkeypatch.setattr(paraflex.studies.sweeps.session, "_ROWS", 1)
-    with pytest.raises(OutputError, match=r"no space left on device.*what is written stays.*run the same command"):
-        sweep(study, tmp_path / "out", workers=1, run=stub)
-    names = sorted(file.name for file in (tmp_path / "out" / "parts").iterdir())
-    assert names == ["part-000001.parquet", "part-000002.parquet"]
+    def long(setting, task, watch=None):
+        outcome = stub(setting, task)
+        return Outcome(task, [row | {"reason": "x" * 40_000} for row in outcome.rows])
+
+    with monkeypatch.context() as patch:
+        patch.setattr(sqlite3, "connect", small)
+        patch.setattr(journal, "_ROWS", 1)
+        with pytest.raises(OutputError, match=r"no space left on device.*what is written stays.*run the same command"):
+            sweep(study, tmp_path / "out", workers=1, run=long)
+    with read_journal(tmp_path / "out" / "journal.sqlite") as kept:
+        assert [row["run"] for row in kept.rows()] == [0, 1, 2, 3]
     made = []
 
     def counted(setting, task, watch=None):
@@ -354,13 +358,15 @@ def test_a_full_disk_loses_nothing_that_is_written(tmp_path, monkeypatch):
     assert sorted(made) == [2, 3]
 
 
-def test_a_damaged_part_is_named(tmp_path):
+def test_a_damaged_journal_is_named(tmp_path):
     study = load_sweep(write(tmp_path))
     sweep(study, tmp_path / "out", workers=1, run=stub, limit=2)
-    part = tmp_path / "out" / "parts" / "part-000001.parquet"
-    part.write_bytes(part.read_bytes()[:100])
-    with pytest.raises(OutputError, match=r"part-000001.parquet: cannot be read .*delete this file"):
+    file = tmp_path / "out" / "journal.sqlite"
+    file.write_bytes(file.read_bytes()[:100])
+    with pytest.raises(OutputError, match=r"journal.sqlite: cannot be read .*delete this file"):
         sweep(study, tmp_path / "out", workers=1, run=stub)
+    file.unlink()
+    assert sweep(study, tmp_path / "out", workers=1, run=stub).finished
 
 
 MANY = """
@@ -394,19 +400,19 @@ def test_memory_is_flat(tmp_path):
     assert peaks[10_000] < peaks[1000] + 4e6
 
 
-def test_merging_holds_one_group_at_a_time(tmp_path, monkeypatch):
-    """Groups smaller than the table, parts that overlap them: the same file as from one part in order."""
+def test_exporting_holds_one_group_at_a_time(tmp_path, monkeypatch):
+    """Groups smaller than the table, commits that overlap them: the same file as from rows in order."""
     monkeypatch.setattr(tables, "_GROUP", 64)
     study = load_sweep(write(tmp_path, MANY % 300))
     one = sweep(study, tmp_path / "one", workers=1, run=stub)
-    monkeypatch.setattr(paraflex.studies.sweeps.session, "_ROWS", 7)
+    monkeypatch.setattr(journal, "_ROWS", 7)
     two = sweep(study, tmp_path / "two", workers=4, run=stub)
     assert two.table.read_bytes() == one.table.read_bytes()
     assert pq.ParquetFile(one.table).num_row_groups == 5
 
 
 def test_designs():
-    from paraflex.studies.sweeps.samples import Varied, designs
+    from paraflex.designs.samples import Varied, designs
 
     a = Varied("a", ("a",), low=1.0, high=100.0, log=True)
     b = Varied("b", ("b",), low=2, high=5, whole=True)
@@ -427,7 +433,7 @@ def test_designs():
 
 
 def b_values():
-    from paraflex.studies.sweeps.samples import Varied
+    from paraflex.designs.samples import Varied
 
     return Varied("b", ("b",), values=(7.0, 8.0))
 
@@ -475,8 +481,13 @@ def test_the_error_of_the_mechanism_s_study_comes_first(error, first):
     assert set(metrics_of([], setting.error)) == set(METRICS)
 
 
-def test_metrics_are_documented():
-    page = (Path(__file__).parents[1] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+def test_metrics_are_documented(monkeypatch):
+    docs = Path(__file__).parents[1] / "docs"
+    monkeypatch.syspath_prepend(str(docs / "hooks"))
+    from metrics import on_page_markdown
+
+    page = type("Page", (), {"file": type("File", (), {"src_uri": "sweeps.md"})})
+    page = on_page_markdown((docs / "sweeps.md").read_text(encoding="utf-8"), page)
     for name in METRICS:
         assert f"`{name}`" in page, name
 
@@ -501,5 +512,5 @@ def test_command_line(tmp_path):
 def test_path_durations_keep_the_share_of_dwell():
     model = load("raparm_i")
     square, line = model.path("square"), model.path("line")
-    assert model.duration("square", square) == 0.7
-    assert model.duration("line", line) == pytest.approx(0.7 * line.duration / square.duration)
+    assert model.duration(square) == model.duration("square") == 0.7
+    assert model.duration(line) == pytest.approx(0.7 * line.duration / square.duration)

@@ -10,6 +10,7 @@ import time
 import pandas as pd
 import pytest
 
+from journals import rows_in
 from paraflex.errors import InputError
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps import LostCluster, Outcome, run_task
@@ -143,7 +144,7 @@ def test_a_cluster_that_goes_away_leaves_what_is_written(study, table, tmp_path)
 
 
 def test_an_unreachable_cluster(study, tmp_path, monkeypatch):
-    from paraflex.studies.sweeps import engines
+    from paraflex.campaign import workers as engines
 
     monkeypatch.setattr(engines, "_REACHED_WITHIN", 1.0)
     with pytest.raises(InputError, match=r"--cluster: cannot be reached .*127.0.0.1:9.*; start it with dask scheduler"):
@@ -173,7 +174,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(study, tmp_path):
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
-        while not any(out.glob("parts/part-*.parquet")):
+        while not rows_in(out):
             assert process.poll() is None
             time.sleep(0.05)
         os.killpg(process.pid, signal.SIGINT)
@@ -182,4 +183,4 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(study, tmp_path):
     assert "of 8192 runs:" in said
     assert "the same command goes on from there" in told
     assert "Traceback" not in told
-    assert 0 < len(pd.read_parquet(out / "parts")) < 8192
+    assert 0 < len(pd.read_parquet(out / "unfinished.parquet")) < 8192

@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from paraflex.designs.reopen import open_study, run_again
+from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
 from paraflex.files import library_file
 from paraflex.plots.designs import DesignTable, in_conflict, undominated
@@ -16,9 +18,7 @@ from paraflex.report.designs import Studied, read_studied, reasons
 from paraflex.report.film import frames_of
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
-from paraflex.studies.sweeps.reopen import open_study, run_again
 from paraflex.studies.sweeps.report import study_page
-from paraflex.studies.sweeps.units import unit_of
 from reports import array_of, chart_of, html_of, rows_of, told
 from test_cli import paraflex
 

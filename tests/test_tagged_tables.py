@@ -8,12 +8,12 @@ import tomllib
 
 import pytest
 
+from paraflex.designs.schema import SweepTable
 from paraflex.errors import InputError
 from paraflex.files import library_text
 from paraflex.files.read import validate
 from paraflex.files.schema import ModelTable, PathFile
 from paraflex.studies.optimisation.schema import StudyTable
-from paraflex.studies.sweeps.schema import SweepTable
 
 FILES = {
     "model": (ModelTable, tomllib.loads(library_text("five_bar"))),

@@ -32,6 +32,7 @@ PACKAGES = (
     "studies.sensitivities",
     "studies.optimisation",
     "studies",
+    "campaign",
     "engines",
     "errors",
     "compilation",

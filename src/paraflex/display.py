@@ -1,28 +1,38 @@
 """How objects show themselves in notebooks: tables of plain HTML that take their colours from the page, light or dark.
 
-What a run shows takes metrics, which are made from runs. Runs therefore name no function: `shown` finds it by the name
-of their class when a notebook asks.
+What a mechanism or a run shows takes drawings and metrics, which are made from them. Views therefore stand above what
+they show: `view` knows them by class, and `Shown` asks for them when a notebook does.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import singledispatch
 from html import escape
 from importlib import import_module
 from typing import Any
 
-_SHOWN_BY = {
-    "TrackingRun": ("paraflex.results.html", "tracking_run_html"),
-    "MotionRun": ("paraflex.results.html", "motion_run_html"),
-}
+# Where views are registered; loaded one after the other until that of a class is there.
+_VIEWS = ("paraflex.plots.mechanism_html", "paraflex.results.html", "paraflex.studies.html")
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
 
 
-def shown(thing: object) -> str:
-    """The HTML of an object of a class whose function lies above it."""
-    module, function = _SHOWN_BY[type(thing).__name__]
-    return getattr(import_module(module), function)(thing)
+@singledispatch
+def view(thing: object) -> str:
+    """The HTML of an object; `view.register(CLASS)` says how one of a class is shown."""
+    raise TypeError(f"no view of {type(thing).__name__} is registered")
+
+
+class Shown:
+    """What shows itself in notebooks by the view of its class."""
+
+    def _repr_html_(self) -> str:
+        """In notebooks."""
+        for module in _VIEWS:
+            if view.dispatch(type(self)) is view.dispatch(object):
+                import_module(module)
+        return view(self)
 
 
 def page(title: str, *parts: str) -> str:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,9 +26,10 @@ from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments
-from paraflex.dynamics import BodyCoordinates, System, joint_coordinate, pack_signals
+from paraflex.dynamics import BodyCoordinates, State, System, joint_coordinate, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
+from paraflex.integrators.beam_ends import BeamEnds, beyond_ends, end_of_motion
 from paraflex.integrators.linear_structure import Block, Response, march
 from paraflex.integrators.newmark import NewmarkNumbers
 from paraflex.kernel.bodies import motion_forces, system_energy
@@ -71,7 +72,8 @@ def simulate_ked(
     Returns
     -------
     TrackingRun
-        Its `torques` are the feed-forward of the mode, which do not drive this model: `holding` are those that hold the
+        It ends where a point comes to the end of the beam it slides along, if `SlidingJoint.at_end` says "stop". Its
+        `torques` are the feed-forward of the mode, which do not drive this model: `holding` are those that hold the
         motors. Its task is of linear geometry.
         In its solution q = q_r + xi with derivatives v and a; multipliers are those of the system's rows, of least norm
         (rows scaled to one size) where rows are dependent; work and energy balance are NaN; the largest violations are
@@ -81,7 +83,8 @@ def simulate_ked(
     Raises
     ------
     InputError
-        Springs or dampers, a step that is not positive, or a spectral radius outside [0, 1].
+        Springs or dampers, a step that is not positive, a spectral radius outside [0, 1], or a point that starts off
+        the beam it slides along.
     ActuationError, SingularActuationError
         The mode cannot drive the mechanism along the path.
     IntegrationError
@@ -97,27 +100,44 @@ def simulate_ked(
     substeps = max(1, math.ceil((samples[1] - samples[0]) / step * (1.0 - _ROUNDING)))
     times = np.linspace(samples[0], samples[-1], substeps * (samples.size - 1) + 1)
     numbers = NewmarkNumbers.by_spectral_radius(spectral_radius)
-    nominal = _nominal(task, times)
+    nominal, rigid = _nominal(task, times), task.motion
+    BeamEnds(rigid.system, State(float(rigid.t[0]), rigid.q[0], rigid.v[0]))
+    end = end_of_motion(rigid.system, rigid.t, rigid.q, rigid.v)
+    stop = math.inf if end is None else end.time
     blocks = [Block(body.all, _mass(body), _stiffness(body)) for body in task.system.bodies]
     held = [motor.joint for motor in task.mechanism.motors if motor.name in torques.mode.motors]
-    kept, steps, status, message, failure = [], 0, "complete", "", None
+    kept: list[Response] = []
+    reached: list[float] = []
+    steps = 0
+    status, message, event, failure = "complete", "", "", None
     try:
         responses = march(numbers, blocks, lambda instants: nominal[instants].structure(held), times)
-        for steps, response in enumerate(responses):
-            if steps % substeps == 0:
+        for steps, (t, response) in enumerate(_until(stop, times, responses)):
+            if steps % substeps == 0 or t == stop:
                 kept.append(response)
+                reached.append(stop if t == stop else samples[steps // substeps])
                 if on_progress is not None:
-                    on_progress(float(times[steps]))
+                    on_progress(t)
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {times[steps]:.6g} s"
     except IntegrationError as error:
         status, message, failure = "failed", str(error), error
-    figures = _figures(task, torques, nominal[::substeps], kept)
+    figures = _figures(task, torques, np.array(reached), kept)
+    if end is not None and reached[-1] == stop:
+        status, event = "stopped", str(end.gauge.event)
+        message = f"{end.gauge.reached(figures['q'][-1])} at t = {stop:.6g} s"
     wall_time = time.perf_counter() - began
     solution = Solution(
-        **figures, status=status, message=message, steps=steps, factorisations=steps + 1, wall_time=wall_time
+        **figures,
+        status=status,
+        message=message,
+        steps=steps,
+        factorisations=steps + 1,
+        wall_time=wall_time,
+        event=event,
+        findings=beyond_ends(task.system, figures["t"], figures["q"], figures["v"]),
     )
-    holding = _holding(task.system, torques.mode, kept)
+    holding = _holding(task.system, torques.mode, kept[: len(kept) - bool(event)])
     run = TrackingRun(task, torques, condition, solution, method="KED, generalised-alpha", holding=holding)
     if failure is not None:
         failure.partial = run
@@ -249,11 +269,23 @@ def _turned(system: System, values: Array, angles: Array) -> Array:
     return out
 
 
-def _figures(task: TrackingTask, torques: FeedForward, nominal: _Motion, kept: list[Response]) -> dict[str, Any]:
-    """What a Solution holds of the samples reached; violations are those of the nonlinear constraints there."""
-    system, t = task.system, task.motion.t[: len(kept)]
+def _until(stop: float, times: Array, responses: Iterable[Response]) -> Iterator[tuple[float, Response]]:
+    """Instants and responses, the last at `stop` between two of them."""
+    earlier, before = math.nan, None
+    for t, response in zip(times.tolist(), responses, strict=False):
+        if before is not None and t >= stop:
+            part = (stop - earlier) / (t - earlier)
+            yield stop, Response(*(x + part * (y - x) for x, y in zip(before, response, strict=True)))
+            return
+        yield t, response
+        earlier, before = t, response
+
+
+def _figures(task: TrackingTask, torques: FeedForward, t: Array, kept: list[Response]) -> dict[str, Any]:
+    """What a Solution holds of the instants kept; violations are those of the nonlinear constraints there."""
+    system = task.system
     xi, dxi, ddxi, mu = (np.array(values) for values in zip(*kept, strict=True))
-    q, v, a = nominal[: len(kept)].displaced(xi, dxi, ddxi)
+    q, v, a = _nominal(task, t).displaced(xi, dxi, ddxi)
     scratch = make_scratch(system.packed)
     energy = np.array([system_energy(system.packed, *state, scratch) for state in zip(q, v, strict=True)])
     signals, _ = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))

@@ -81,6 +81,10 @@ class InputError(ParaflexError, ValueError):
         """The same error, naming the file it came from."""
         return type(self)(self.problem, field=self.field, value=self.value, remedy=self.remedy, source=source)
 
+    def at(self, field: str) -> InputError:
+        """The same error, naming the option or field that the user gave."""
+        return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy)
+
     def within(self, table: str) -> InputError:
         """The same error, its field named from the table it stands in."""
         field = f"{table}.{self.field}"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.display import shown
+from paraflex.display import Shown
 from paraflex.dynamics import (
     State,
     System,
@@ -22,7 +22,7 @@ from paraflex.dynamics import (
 )
 from paraflex.errors import InputError, IntegrationError, ResultWarning, suggestion
 from paraflex.findings import Finding, warn_of
-from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
+from paraflex.integrators import IntegrationOptions, Solution, check_times, choose, integrate
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start
 from paraflex.validity import Validity, assess, doubtful_results, warn, with_blame
@@ -30,7 +30,7 @@ from paraflex.validity import Validity, assess, doubtful_results, warn, with_bla
 
 @given_as("a run without a path", "the run that simulate_motion returns")
 @dataclass(frozen=True)
-class MotionRun:
+class MotionRun(Shown):
     """A mechanism's own motion.
 
     Attributes
@@ -57,10 +57,6 @@ class MotionRun:
     def doubts(self) -> tuple[Finding, ...]:
         """What happened in it, and what of its results is not plausible."""
         return (*self.solution.findings, *doubtful_results(self.system, self.solution))
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        return shown(self)
 
 
 @checked_arguments()
@@ -115,10 +111,7 @@ def simulate_motion(
     if start is None and not isinstance(given, Mechanism):
         start = given.start
     options = choose(method, options)
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
-    if samples < 2:
-        raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+    check_times(duration, samples)
     names = [motor.name for motor in mechanism.motors]
     for name, torque in (torques or {}).items():
         if name not in names:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.display import shown
+from paraflex.display import Shown
 from paraflex.dynamics import (
     State,
     System,
@@ -26,7 +26,7 @@ from paraflex.dynamics import (
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
 from paraflex.findings import Finding, warn_of
-from paraflex.integrators import IntegrationOptions, Solution, choose, integrate
+from paraflex.integrators import IntegrationOptions, Solution, check_times, choose, integrate
 from paraflex.integrators.beam_ends import leave_beam
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
@@ -182,7 +182,7 @@ class TrackingTask:
 
 @given_as("a run along a path", "a run that simulate returns")
 @dataclass(frozen=True)
-class TrackingRun:
+class TrackingRun(Shown):
     """One mode of a task, simulated.
 
     Attributes
@@ -224,10 +224,11 @@ class TrackingRun:
     def doubts(self) -> tuple[Finding, ...]:
         """What happened in it, and what of its results is not plausible for mass, size and speed of the mechanism."""
         whole = self.task.whole or self.task
-        found = doubtful_results(self.task.system, self.solution, self._driven(), whole.mechanism)
+        found = doubtful_results(self.task.system, self.solution, self.driven, whole.mechanism)
         return (*self.solution.findings, *found)
 
-    def _driven(self) -> Driven | None:
+    @cached_property
+    def driven(self) -> Driven | None:
         """Path, efforts and condition number, where torques drive the mechanism along the path."""
         task, solution = self.task, self.solution
         # The state at an event is a sample more than the task's times.
@@ -249,17 +250,12 @@ class TrackingRun:
 
     def _following(self) -> Following | None:
         """Deviation from the path and condition number, where torques drive the mechanism along it."""
-        driven = self._driven()
-        return None if driven is None else Following(driven.deviation, driven.condition)
+        return None if self.driven is None else Following(self.driven.deviation, self.driven.condition)
 
     def warn(self) -> None:
         """Issue a `ValidityWarning` or a `ResultWarning` for each reason to doubt the run."""
         warn(self.validity, f"mode {self.mode.name}")
         warn_of(self.doubts, ResultWarning)
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        return shown(self)
 
 
 @checked_arguments()
@@ -303,10 +299,7 @@ def plan_tracking(
     """
     mechanism, path = _planned(mechanism, path)
     end = path.duration if duration is None else duration
-    if not (np.isfinite(end) and end > 0.0):
-        raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
-    if samples < 2:
-        raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+    check_times(end, samples)
     times = np.linspace(0.0, end, samples)
 
     follow = path_follower(mechanism, path, end, assembly=assembly, orientation=orientation)

@@ -12,9 +12,9 @@ from paraflex.errors import ActuationError, AssemblyError, InputError, Numerical
 from paraflex.files import Model
 from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
-from paraflex.mechanism import ActuationMode, AxisJoint, Mechanism, parse_mode
+from paraflex.mechanism import ActuationMode, AxisJoint, Mechanism
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
-from paraflex.simulate import TrackingTask, plan_tracking
+from paraflex.simulate import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import GRAVITY, mechanism_mass, mechanism_size
 from paraflex.validity.plausibility import Driven, doubtful_efforts
@@ -53,9 +53,8 @@ def study_findings(
             "add an [end_effector] table with its point",
         )  # fmt: skip
         return
-    chosen = model.path(path)
-    name = next(key for key, value in model.paths.items() if value is chosen)
-    duration = model.duration(name, chosen)
+    name = model.path_name(path)
+    chosen, duration = model.paths[name], model.duration(name)
     if duration < chosen.duration:
         # With xarray, which descriptions of mechanisms do without.
         from paraflex.results.dataset import part_of
@@ -66,7 +65,8 @@ def study_findings(
     yield from path_findings(model, chosen, name, duration)
     try:
         # What comes after the path is rest.
-        task = _planned(model, chosen, min(duration, _REST * chosen.duration), assembly)
+        end = min(duration, _REST * chosen.duration)
+        task = model.plan(chosen, mechanism=model.mechanism.rigid(), duration=end, samples=_SAMPLES, assembly=assembly)
     except UnreachablePathError as error:
         yield Finding(
             "path-unreachable", f"path.{name}", str(error), "move the path or the bases, or choose another assembly"
@@ -173,29 +173,15 @@ def _turns(place: str, path: Path, orientation: float) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _planned(model: Model, path: Path, duration: float, assembly: str | None) -> TrackingTask:
-    study = model.study
-    return plan_tracking(
-        model.mechanism.rigid(),
-        path,
-        duration=duration,
-        samples=_SAMPLES,
-        assembly=assembly or study.assembly,
-        orientation=study.orientation,
-        after=study.after,
-    )
-
-
 def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> Iterator[Finding]:
     mechanism = model.mechanism
-    wanted = names or model.study.modes or [mode.name for mode in mechanism.modes]
-    if not wanted:
+    asked = model.modes(names or ())
+    if not asked:
         what = "no actuation mode" if mechanism.motors else "no motor"
         yield Finding(
             "mode-missing", "mode", f"there is a path and {what} to drive the mechanism along it",
             "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
         )  # fmt: skip
-    asked = list(dict.fromkeys(parse_mode(mechanism, name) for name in wanted))
     yield from task_findings(task, asked)
     for mode in asked:
         yield from _efforts(task, mode)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from paraflex.cli.tables import number
-from paraflex.results.metrics import SPAN_WORDS, ErrorSpan
+from paraflex.cli.tables import number, plain_table
+from paraflex.results.following import SPAN_WORDS, ErrorSpan
 
 # Names that fit above a column.
 _SHORT = {
@@ -57,7 +56,7 @@ def print_agreement(console: Console, figures: dict[str, Any], mode: str) -> Non
 
 
 def _errors(models: dict[str, Any], reference: str) -> Table:
-    table = _table("model", "error\n[m]", "largest\n[m]", "RMS\n[m]", "wall\n[s]")
+    table = plain_table("model", numbers=("error\n[m]", "largest\n[m]", "RMS\n[m]", "wall\n[s]"))
     for name, values in models.items():
         if "tracking_error" not in values:
             table.add_row(_SHORT[name], "failed")
@@ -72,7 +71,7 @@ def _errors(models: dict[str, Any], reference: str) -> Table:
 
 
 def _distances(finished: dict[str, Any], distances: dict[str, Any]) -> Table:
-    table = _table("", *(_SHORT[name] for name in finished))
+    table = plain_table("", numbers=(_SHORT[name] for name in finished))
     for name in finished:
         table.add_row(
             _SHORT[name], *("" if other == name else number(distances[name][other], ".1e") for other in finished)
@@ -81,22 +80,14 @@ def _distances(finished: dict[str, Any], distances: dict[str, Any]) -> Table:
 
 
 def _soundness(finished: dict[str, Any]) -> Table:
-    table = _table("model", *_SOUND)
+    table = plain_table("model", numbers=_SOUND)
     for name, values in finished.items():
         table.add_row(_SHORT[name], *(number(values[key], ".1e") for key in _SOUND.values()))
     return table
 
 
 def _links(links: list[str], compared: dict[str, Any], key: str) -> Table:
-    table = _table("link", *(_SHORT[name] for name in compared))
+    table = plain_table("link", numbers=(_SHORT[name] for name in compared))
     for link in links:
         table.add_row(link, *(number(values[f"{key}_difference_rms"][link], ".1e") for values in compared.values()))
-    return table
-
-
-def _table(first: str, *headings: str) -> Table:
-    table = Table(box=box.SIMPLE, collapse_padding=True, pad_edge=False)
-    table.add_column(first, no_wrap=True)
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
     return table

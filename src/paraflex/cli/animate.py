@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
+from paraflex.cli.bars import bars, begun_late
+from paraflex.cli.commands.results import AnimateRequest
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.results import open_results
@@ -19,25 +20,8 @@ if TYPE_CHECKING:
     from paraflex.plots.film import Film
 
 COMPLETE, INTERRUPTED = 0, 130
-# Options as the command spells them.
-_FLAGS = ("magnify", "fps", "speed", "size", "theme", "at", "mode", "model")
-
-
-@dataclass(frozen=True)
-class AnimateRequest:
-    """What `paraflex animate` was asked for."""
-
-    results: str
-    output: str
-    modes: list[str]
-    magnify: float
-    fps: float
-    speed: float | None
-    size: str | None
-    theme: str
-    at: float | None
-    model: str | None
-    force: bool
+# Fields of `FilmOptions` that are given as they are.
+_OPTIONS = ("magnify", "fps", "speed", "theme", "at", "model")
 
 
 def animate_command(request: AnimateRequest) -> int:
@@ -50,15 +34,8 @@ def animate_command(request: AnimateRequest) -> int:
 
     console = plain_console(stderr=True)
     try:
-        options = FilmOptions(
-            magnify=request.magnify,
-            fps=request.fps,
-            speed=request.speed,
-            size=None if request.size is None else _size(request.size),
-            theme=request.theme,
-            at=request.at,
-            model=request.model,
-        )
+        size = None if request.size is None else _size(request.size)
+        options = FilmOptions(size=size, **{name: getattr(request, name) for name in _OPTIONS})
         film = _drawn(console, lambda report: write_film(data, output, request.modes, options, on_progress=report))
     except KeyboardInterrupt:
         console.print("interrupted: nothing was written")
@@ -79,7 +56,7 @@ def animate_command(request: AnimateRequest) -> int:
 
 
 def refuse_existing(output: Path, force: bool) -> None:
-    """Nothing, if there is no file of that name, nor anything in a folder of it, or it may be written over.
+    """Check that there is no file of that name, nor anything in a folder of it, or that it may be written over.
 
     Raises
     ------
@@ -97,20 +74,15 @@ def refuse_existing(output: Path, force: bool) -> None:
 
 def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film]) -> Film:
     """Draw, telling how far that is."""
-    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    progress = Progress(TextColumn("{task.description}"), *columns, console=console, transient=not console.is_terminal)
+    progress = bars(console, TaskProgressColumn(), TimeRemainingColumn())
     bar = progress.add_task("pictures", total=None)
 
     def report(done: int, total: int) -> None:
-        # Not before there is something to tell: an error is one line.
         progress.start()
         progress.update(bar, completed=done, total=total)
 
-    try:
+    with begun_late(progress):
         return draw(report)
-    finally:
-        if progress.live.is_started:
-            progress.stop()
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -123,7 +95,7 @@ def _size(text: str) -> tuple[int, int]:
 def _at_fault(error: InputError, request: AnimateRequest) -> InputError:
     """The same error, naming the option or file it came from."""
     field = {"results": request.results, "output": request.output}.get(error.field, error.field)
-    if error.field in _FLAGS:
+    if error.field in (*_OPTIONS, "size", "mode"):
         field = f"--{error.field}"
     value = None if field == error.value else error.value
     return type(error)(error.problem, field=field, value=value, remedy=error.remedy)

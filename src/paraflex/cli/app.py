@@ -10,8 +10,9 @@ from typing import Annotated
 import typer
 
 from paraflex.cli.collected import collecting
-from paraflex.cli.commands import models, results, runs, studies
+from paraflex.cli.commands import shell
 from paraflex.cli.commands.once import Command
+from paraflex.cli.commands.requests import with_options
 from paraflex.errors import InputError, ParaflexError
 
 app = typer.Typer(
@@ -24,26 +25,26 @@ app = typer.Typer(
 
 # In the order of `paraflex --help`.
 for _command in (
-    runs.run,
-    runs.verify,
-    results.report,
-    runs.compare_methods,
-    studies.sensitivity,
-    studies.sweep,
-    studies.optimise,
-    studies.identify,
-    studies.indices,
-    results.animate,
-    results.plot,
-    results.export,
-    models.modes,
-    models.methods,
-    models.info,
-    models.new,
-    models.schema,
+    shell.run,
+    shell.verify,
+    shell.report,
+    shell.compare_methods,
+    shell.sensitivity,
+    shell.sweep,
+    shell.optimise,
+    shell.identify,
+    shell.indices,
+    shell.animate,
+    shell.plot,
+    shell.export,
+    shell.modes,
+    shell.methods,
+    shell.info,
+    shell.new,
+    shell.schema,
 ):
-    app.command(cls=Command)(_command)
-app.command("optimize", cls=Command, hidden=True)(studies.optimise)
+    app.command(cls=Command)(with_options(_command))
+app.command("optimize", cls=Command, hidden=True)(with_options(shell.optimise))
 
 BAD_INPUT, TROUBLE, INTERRUPTED = 2, 1, 130
 

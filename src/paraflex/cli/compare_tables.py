@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from paraflex.cli.tables import number
+from paraflex.cli.tables import number, plain_table
 
 _KEPT = {
     "gap\n[m]": "constraint_position_max",
@@ -56,7 +55,7 @@ def _complete(method: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _precision(methods: dict[str, Any], uncertainty: float) -> Table:
-    table = _table("method", _SETTING, "error\n[m]", "wall\n[s]", *_KEPT)
+    table = plain_table("method", numbers=(_SETTING, "error\n[m]", "wall\n[s]", *_KEPT))
     for name, method in methods.items():
         for run in _complete(method):
             error = f"{run['error']:.1e}" if run["error"] > uncertainty else f"<{uncertainty:.0e}"
@@ -66,7 +65,7 @@ def _precision(methods: dict[str, Any], uncertainty: float) -> Table:
 
 
 def _work(methods: dict[str, Any]) -> Table:
-    table = _table("method", _SETTING, *_COUNTS)
+    table = plain_table("method", numbers=(_SETTING, *_COUNTS))
     for name, method in methods.items():
         for run in _complete(method):
             table.add_row(name, _setting(run), *(str(run[key]) for key in _COUNTS.values()))
@@ -75,7 +74,7 @@ def _work(methods: dict[str, Any]) -> Table:
 
 def _times(methods: dict[str, Any], figures: dict[str, Any]) -> Table:
     levels = list(figures["fastest"])
-    table = _table("method", *(f"{level} m" for level in levels), "x TR-BDF2")
+    table = plain_table("method", numbers=(*(f"{level} m" for level in levels), "x TR-BDF2"))
     for name, method in methods.items():
         times = (number(method["time_to_reach"][level], ".3g") for level in levels)
         table.add_row(name, *times, number(method["relative_time"], ".2f"))
@@ -96,11 +95,3 @@ def _setting(run: dict[str, Any]) -> str:
     if run["step"] is not None:
         return f"{run['step']:g} s"
     return "" if run["tolerance"] is None else f"{run['tolerance']:g}"
-
-
-def _table(first: str, *headings: str) -> Table:
-    table = Table(box=box.SIMPLE, collapse_padding=True, pad_edge=False)
-    table.add_column(first, no_wrap=True)
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
-    return table

@@ -9,6 +9,7 @@ from pathlib import Path
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_text, model_schema
+from paraflex.writing import write_text
 
 
 def new_command(name: str, template: str) -> None:
@@ -16,19 +17,12 @@ def new_command(name: str, template: str) -> None:
     try:
         text = library_text(template)
     except InputError as error:
-        raise InputError(error.problem, field="--from", value=error.value, remedy=error.remedy) from None
+        raise error.at("--from") from None
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if path.exists():
         raise OutputError("there is one already", field=str(path), remedy="choose another name, or remove it")
     text = re.sub(r'^name = ".*"$', lambda _: f"name = {json.dumps(path.stem)}", text, count=1, flags=re.MULTILINE)
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written ({(error.strerror or str(error)).lower()})",
-            field=str(path),
-            remedy="choose another folder",
-        ) from error
+    write_text(path, text, parents=False)
     console = plain_console()
     console.print(f"{path}: a copy of {template} to edit. Then", soft_wrap=True)
     console.print(f"  paraflex info {path}\n  paraflex run --mechanism {path}", soft_wrap=True)

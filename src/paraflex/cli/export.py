@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
+from paraflex.cli.commands.results import ExportRequest
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.results import open_results
 from paraflex.results.export import export_results, export_table
 
 _TABLE = "results.parquet"
-
-
-@dataclass(frozen=True)
-class ExportRequest:
-    """What `paraflex export` was asked for."""
-
-    results: str
-    to: str
-    output: str | None
-    shapes: bool
-    force: bool
 
 
 def export_command(request: ExportRequest) -> int:
@@ -39,7 +28,7 @@ def export_command(request: ExportRequest) -> int:
     except InputError as error:
         if error.field not in ("to", "output"):
             raise
-        raise InputError(error.problem, field=f"--{error.field}", value=error.value, remedy=error.remedy) from None
+        raise error.at(f"--{error.field}") from None
     console = plain_console(stderr=True)
     for file in files:
         console.print(f"{file} ({file.stat().st_size / 1e6:.3g} MB)", soft_wrap=True)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.checks import BALANCED
+from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.request import UNBALANCED
 from paraflex.dynamics import (
     State,
@@ -28,32 +28,6 @@ from paraflex.kinematics import follow_path
 
 # Poses between the start and the time asked for, where prescribed angles lead there.
 _POSES_BETWEEN = 200
-
-
-@dataclass(frozen=True)
-class InfoRequest:
-    """What `paraflex info` was asked for.
-
-    Attributes
-    ----------
-    source : str or None
-        A library mechanism or a file; None for what the library has.
-    assembly : str or None
-    path : str or None
-        Along which `at` counts.
-    at : float or None
-        When [s]: the pose that frequencies are for.
-    balanced : bool
-        Frequencies about static equilibrium.
-    json : bool
-    """
-
-    source: str | None = None
-    assembly: str | None = None
-    path: str | None = None
-    at: float | None = None
-    balanced: bool = False
-    json: bool = False
 
 
 def frequencies(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from paraflex.cli.search import SearchRequest, parameter_table, plain_table, search_command
-from paraflex.cli.tables import plain_console
+from paraflex.cli.commands.studies import SearchRequest
+from paraflex.cli.search import parameter_table, search_command
+from paraflex.cli.tables import plain_console, plain_table
 from paraflex.studies import IdentificationResult, identify, load_identification
 
 
@@ -16,11 +17,7 @@ def _report(result: IdentificationResult) -> None:
     console = plain_console()
     found = result.confidence
     console.print(parameter_table(result, deviation=_deviations(result)))
-    table = plain_table()
-    for heading in ("mode", "path", "metric"):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("target", "start", "reached", "residual"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = plain_table("mode", "path", "metric", numbers=("target", "start", "reached", "residual"))
     for each in result.targets:
         target = each.target
         numbers = [f"{value:.5g}" for value in (target.value, each.start, each.reached)]

@@ -3,53 +3,32 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 
-from rich.progress import BarColumn, Progress, TextColumn
-
-from paraflex.cli.request import COMPLETE, INTERRUPTED, study_folder
-from paraflex.cli.search import plain_table
-from paraflex.cli.tables import number, plain_console, warn_of
+from paraflex.cli.bars import bars
+from paraflex.cli.commands.studies import IndicesRequest
+from paraflex.cli.request import COMPLETE, INTERRUPTED
+from paraflex.cli.tables import number, plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
 from paraflex.studies import IndicesResult, SweepProgress, load_indices, sobol_indices
-
-
-@dataclass(frozen=True)
-class IndicesRequest:
-    """What `paraflex indices` was asked for."""
-
-    study: str
-    output: str | None
-    metrics: list[str]
-    samples: int | None
-    seed: int | None
-    engine: str
-    workers: int | None
-    cluster: str | None
-    json: bool
 
 
 def indices_command(request: IndicesRequest) -> int:
     """Do what is left of the runs, and say the indices; the exit code."""
     console = plain_console(stderr=True)
     study = load_indices(request.study, request.metrics, request.samples, request.seed)
-    folder = study_folder(request.study, request.output)
     compile_kernels_for(study.sweep.model().mechanism, console.print)
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.completed}/{task.total}"))
-    with Progress(*columns, console=console, transient=not console.is_terminal, refresh_per_second=4) as progress:
+    with bars(console, "{task.completed}/{task.total}") as progress:
         bar = progress.add_task(study.sweep.name, total=study.sweep.runs)
 
         def tell(at: SweepProgress) -> None:
             progress.update(bar, completed=at.done)
 
-        result = sobol_indices(
-            study, folder, engine=request.engine, workers=request.workers, cluster=request.cluster, on_progress=tell
-        )
+        result = sobol_indices(study, request.folder, on_progress=tell, **request.workers.given)
     if not result.sweep.finished:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED
-    save_search_figures(result.figures(), folder / "figures")
+    save_search_figures(result.figures(), request.folder / "figures")
     verdict = study.sweep.setting.verdict()
     warn_of(console if request.json else plain_console(), verdict)
     if request.json:
@@ -61,11 +40,8 @@ def indices_command(request: IndicesRequest) -> int:
 
 
 def _report(result: IndicesResult) -> None:
-    table = plain_table("Sobol indices and half the width of their intervals of 95 %")
-    for heading in ("metric", "path", "mode", "parameter"):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("first", "±", "total", "±"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    title = "Sobol indices and half the width of their intervals of 95 %"
+    table = plain_table("metric", "path", "mode", "parameter", numbers=("first", "±", "total", "±"), title=title)
     for each in result.indices:
         for row in each.rows():
             keys = ("first", "first_confidence", "total", "total_confidence")

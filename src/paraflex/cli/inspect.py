@@ -8,7 +8,8 @@ from typing import Any
 
 from paraflex.checks import check, examine
 from paraflex.cli.collected import printed
-from paraflex.cli.frequencies import InfoRequest, frequencies, hertz
+from paraflex.cli.commands.models import InfoRequest
+from paraflex.cli.frequencies import frequencies, hertz
 from paraflex.cli.inspect_tables import print_facts, print_library
 from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, closure_of, mobility
 from paraflex.files import Model, library_names, load
@@ -21,11 +22,11 @@ _LISTED = 1000
 
 def info_command(request: InfoRequest) -> int:
     """Describe a mechanism, or the library; the exit code."""
-    if request.source is None:
+    if request.model.given is None:
         facts: Any = library()
         verdict = None
     else:
-        facts = describe(load(request.source), request)
+        facts = describe(load(request.model.given), request)
         verdict = facts["verdict"]["level"]
         # They are part of what is printed.
         printed(map(Finding.from_dict, facts["verdict"]["findings"]))

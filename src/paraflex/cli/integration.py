@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
+from paraflex.cli.commands.requests import flags
+from paraflex.cli.commands.runs import RunRequest
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults
 from paraflex.integrators import (
@@ -20,59 +21,29 @@ from paraflex.integrators import (
 )
 from paraflex.mechanism import Mechanism
 
-_FLAGS = {
-    "tolerance": "--tol",
-    "alpha": "--alpha",
-    "beta": "--beta",
-    "max_steps": "--max-steps",
-    "method": "--method",
-    "parameters": "--method-parameter",
-    "step": "--step",
-    "constraints": "--constraints",
-    "automatic_gains": "--automatic-gains",
-}
+# Fields of a request that `IntegrationOptions` has too, and those that kineto-elastodynamics has no use for.
+_OPTIONS = ("tolerance", "alpha", "beta", "max_steps", "method", "step", "constraints", "automatic_gains")
+_OF_STEPS = (*_OPTIONS, "parameters", "stop_at", "balanced", "after")
 _SPECS = "joint:NAME=LOW..HIGH, deflection:BODY=METRES or singular=DISTANCE"
 
 
-@dataclass(frozen=True)
-class IntegrationRequest:
-    """What was asked for on the command line; None takes the model's or the program's default."""
-
-    tolerance: float | None = None
-    alpha: float | None = None
-    beta: float | None = None
-    max_steps: int | None = None
-    method: str | None = None
-    parameters: Sequence[str] = field(default_factory=list)
-    step: float | None = None
-    constraints: str | None = None
-    automatic_gains: bool = False
-    stop_at: Sequence[str] = field(default_factory=list)
-
-    def given(self) -> dict[str, object]:
-        """Flags that were given, with their values."""
-        values = {flag: getattr(self, name) for name, flag in _FLAGS.items()} | {"--stop-at": self.stop_at}
-        listed = {flag: value[0] if isinstance(value, list) and value else value for flag, value in values.items()}
-        return {flag: value for flag, value in listed.items() if value not in (None, False, [])}
+def given_flags(request: RunRequest) -> dict[str, object]:
+    """Flags of how a run starts, is integrated and ends that were given, with their values."""
+    flag = flags(request)
+    values = {flag[name]: getattr(request, name) for name in _OF_STEPS}
+    listed = {name: value[0] if isinstance(value, list) and value else value for name, value in values.items()}
+    return {name: value for name, value in listed.items() if value not in (None, False, [])}
 
 
-def integration_options(request: IntegrationRequest, study: StudyDefaults) -> IntegrationOptions:
-    """The options of the command line, and for what it leaves out the study's; errors name the flag.
-
-    A step goes with a method: naming another method leaves the study's step out.
-    """
-    given: dict[str, Any] = {name: getattr(request, name) for name in _FLAGS if name != "parameters"}
-    if given["tolerance"] is None:
-        given["tolerance"] = study.tolerance
-    if given["method"] in (None, study.method):
-        given["method"] = study.method
-        given["step"] = study.step if given["step"] is None else given["step"]
+def integration_options(request: RunRequest, study: StudyDefaults) -> IntegrationOptions:
+    """The options of the command line, and for what it leaves out the study's; errors name the flag."""
+    given: dict[str, Any] = {name: getattr(request, name) for name in _OPTIONS}
     given["parameters"] = dict(_parameter(text) for text in request.parameters)
     given["events"] = tuple(parse_event(text) for text in request.stop_at)
     try:
-        options = IntegrationOptions(**{name: value for name, value in given.items() if value is not None})
+        options = study.integration(given)
     except InputError as error:
-        flag = _FLAGS[error.field.split(".")[0]]
+        flag = flags(request)[error.field.split(".")[0]]
         value = error.field.partition(".")[2] + f"={error.value}" if "." in error.field else error.value
         remedy = error.remedy.replace("constraints = ", "--constraints ")
         raise InputError(error.problem, field=flag, value=value, remedy=remedy) from None
@@ -80,7 +51,7 @@ def integration_options(request: IntegrationRequest, study: StudyDefaults) -> In
     return options
 
 
-def _check_coefficients(request: IntegrationRequest, options: IntegrationOptions) -> None:
+def _check_coefficients(request: RunRequest, options: IntegrationOptions) -> None:
     """Baumgarte's coefficients where something else keeps the constraints, or chooses them."""
     for flag, value in (("--alpha", request.alpha), ("--beta", request.beta)):
         if value is None:
@@ -154,9 +125,9 @@ def _number(value: str, flag: str, text: str) -> float:
     return number
 
 
-def check_stops(mechanism: Mechanism, options: IntegrationOptions, request: IntegrationRequest) -> None:
-    """Nothing, if the mechanism can have the events; errors name the flag."""
-    for event, text in zip(options.events, request.stop_at, strict=True):
+def check_stops(mechanism: Mechanism, options: IntegrationOptions, stop_at: Sequence[str]) -> None:
+    """Check that the mechanism can have the events; errors name the flag."""
+    for event, text in zip(options.events, stop_at, strict=True):
         try:
             check_events(mechanism, (event,))
         except InputError as error:
@@ -164,7 +135,7 @@ def check_stops(mechanism: Mechanism, options: IntegrationOptions, request: Inte
             raise InputError(problem, field="--stop-at", value=text, remedy=error.remedy) from None
 
 
-def integration_parameters(options: IntegrationOptions, request: IntegrationRequest) -> dict[str, Any]:
+def integration_parameters(options: IntegrationOptions, stop_at: Sequence[str]) -> dict[str, Any]:
     """How a run was integrated, for provenance."""
     return {
         "tolerance": options.tolerance,
@@ -175,5 +146,5 @@ def integration_parameters(options: IntegrationOptions, request: IntegrationRequ
         "step": options.step,
         "constraints": options.treatment.value,
         "automatic_gains": options.automatic_gains,
-        "stop_at": list(request.stop_at),
+        "stop_at": list(stop_at),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import combinations, islice
 from typing import Any
 
@@ -18,7 +19,6 @@ from paraflex.dynamics import build_system, closure_of, mobility, reach
 from paraflex.errors import ActuationError
 from paraflex.files import Model, load
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
-from paraflex.simulate import plan_tracking
 
 # Samples of the path at which modes are judged.
 _SAMPLES = 201
@@ -51,16 +51,11 @@ def _effort(model: Model, path: str | None) -> Effort | None:
     """What the path asks of the motors; None without a path, or a point to follow it."""
     if model.mechanism.end_effector is None or not (path is not None or model.paths):
         return None
-    study = model.study
     followed, _ = find_path(model, path)
-    return plan_tracking(
-        model.mechanism.rigid(),
-        followed,
-        samples=_SAMPLES,
-        assembly=study.assembly,
-        orientation=study.orientation,
-        warning=False,
-    ).effort
+    rigid = model.mechanism.rigid()
+    # The path says where it starts.
+    placed = replace(model, start=None)
+    return placed.plan(followed, mechanism=rigid, duration=followed.duration, samples=_SAMPLES, warning=False).effort
 
 
 def _named_modes(model: Model) -> list[ActuationMode]:

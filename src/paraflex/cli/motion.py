@@ -4,37 +4,40 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import TimeElapsedColumn
 
 from paraflex.checks import check
+from paraflex.cli.bars import bars, begun_late
 from paraflex.cli.collected import collected
+from paraflex.cli.commands.options import PlanChoice
+from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
     TROUBLE,
     UNBALANCED,
-    StudyRequest,
     at_fault,
     of_assembly,
-    report_too,
     results_folder,
-    write_json,
+    say_where,
 )
 from paraflex.cli.tables import FINISHED, plain_console, validity, warn_of_doubts
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
 from paraflex.errors import AssemblyError, InputError, IntegrationError
-from paraflex.files import Model
+from paraflex.files import Model, StudyDefaults
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary, save_results
+from paraflex.writing import write_json
 
 # Singular positions listed one by one.
 _NAMED = 4
@@ -43,7 +46,7 @@ _POINTS = 20
 
 
 def run_motion(
-    request: StudyRequest,
+    request: RunRequest,
     model: Model,
     mechanism: Mechanism,
     options: IntegrationOptions,
@@ -51,13 +54,7 @@ def run_motion(
     how: dict[str, Any],
 ) -> int:
     """Run a mechanism's own motion and write its results, how it was integrated among them; the exit code."""
-    duration = model.study.duration if request.duration is None else request.duration
-    if duration is None:
-        raise InputError(
-            "the model has no path, and nothing says how long it is to run",
-            field="--duration",
-            remedy="give it in seconds",
-        )
+    study = own_motion(model, request.plan)
     if request.modes:
         raise InputError(
             "a model without a path has no actuation modes, its torques are constant",
@@ -71,17 +68,16 @@ def run_motion(
             value=request.after,
             remedy="leave it out",
         )
-    samples = model.study.samples if request.samples is None else request.samples
     folder = results_folder(request.out)
     say_replaced(folder, "run")
     compile_kernels_for(mechanism, console.print)
     began = time.perf_counter()
-    run = _simulate(console, model, mechanism, duration, samples, request, options)
+    run = _simulate(console, replace(model, study=study), mechanism, options, balanced=request.balanced)
     parameters = {
         "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "duration": duration, "samples": samples} | how,
+        "run": {"mechanism": model.source, "duration": study.duration, "samples": study.samples} | how,
     }
-    seen = check(model, assembly=request.assembly)
+    seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     figures = motion_summary(data)
     _write(data, figures, folder, report=request.report)
@@ -90,7 +86,7 @@ def run_motion(
         print(json.dumps(figures, indent=2))
     else:
         _report(figures, data)
-        console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
+        say_where(console, began, "results, figures", folder, report=request.report)
     if run.solution.status in FINISHED:
         return COMPLETE
     console.print(f"error: {run.solution.message}", soft_wrap=True)
@@ -98,46 +94,53 @@ def run_motion(
 
 
 def _simulate(
-    console: Console,
-    model: Model,
-    mechanism: Mechanism,
-    duration: float,
-    samples: int,
-    request: StudyRequest,
-    options: IntegrationOptions,
+    console: Console, model: Model, mechanism: Mechanism, options: IntegrationOptions, *, balanced: bool
 ) -> MotionRun:
-    columns = (TextColumn(mechanism.name, markup=False), BarColumn(), TimeElapsedColumn())
-    progress = Progress(*columns, console=console, transient=not console.is_terminal)
-    bar = progress.add_task("", total=duration)
+    study, progress = model.study, bars(console, TimeElapsedColumn())
+    assert study.duration is not None
+    bar = progress.add_task(mechanism.name, total=study.duration)
 
     def report(reached: float) -> None:
-        # Not before there is something to tell: an error is one line.
         progress.start()
         progress.update(bar, completed=reached)
 
-    assembly = request.assembly or model.study.assembly
     try:
-        start = start_of(model, mechanism, assembly, balanced=request.balanced)
-        return simulate_motion(
-            mechanism,
-            duration,
-            samples=samples,
-            assembly=assembly,
-            torques=model.study.torques,
-            start=start,
-            options=options,
-            on_progress=report,
-            warning=False,
-        )
+        with begun_late(progress):
+            return simulate_motion(
+                mechanism,
+                study.duration,
+                samples=study.samples,
+                assembly=study.assembly,
+                torques=study.torques,
+                start=start_of(model, mechanism, study.assembly, balanced=balanced),
+                options=options,
+                on_progress=report,
+                warning=False,
+            )
     except IntegrationError as error:
         return error.partial
     except AssemblyError as error:
         raise of_assembly(error, model) from error
     except InputError as error:
         raise at_fault(error, model) from None
-    finally:
-        if progress.live.is_started:
-            progress.stop()
+
+
+def own_motion(model: Model, chosen: PlanChoice) -> StudyDefaults:
+    """The study of a model without a path, with what is chosen of it.
+
+    Raises
+    ------
+    InputError
+        Nothing says how long it is to run.
+    """
+    study = model.study.filled(**asdict(chosen))
+    if study.duration is None:
+        raise InputError(
+            "the model has no path, and nothing says how long it is to run",
+            field="--duration",
+            remedy="give it in seconds",
+        )
+    return study
 
 
 def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanced: bool) -> State | None:
@@ -200,7 +203,7 @@ def _write(data: xr.Dataset, figures: dict, folder: Path, *, report: bool) -> No
 
     folder.mkdir(parents=True, exist_ok=True)
     save_results(data, folder / "results.nc")
-    write_json(figures, folder / "summary.json")
+    write_json(folder / "summary.json", figures)
     save_overview(data, folder / "figures")
     if report:
         from paraflex.report import motion_page, save_page

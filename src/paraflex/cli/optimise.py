@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from paraflex.cli.search import SearchRequest, parameter_table, plain_table, search_command
-from paraflex.cli.tables import plain_console
+from paraflex.cli.commands.studies import SearchRequest
+from paraflex.cli.search import parameter_table, search_command
+from paraflex.cli.tables import plain_console, plain_table
 from paraflex.studies import OptimisationResult, load_optimisation, optimise
 
 
@@ -15,10 +16,7 @@ def optimise_command(request: SearchRequest) -> int:
 def _report(result: OptimisationResult) -> None:
     console = plain_console()
     console.print(parameter_table(result))
-    table = plain_table()
-    table.add_column("", no_wrap=True)
-    table.add_column("start", justify="right")
-    table.add_column("best", justify="right")
+    table = plain_table("", numbers=("start", "best"))
     table.add_row("objective", f"{result.start_objective:.6g}", f"{result.objective:.6g}")
     for name, value in result.metrics.items():
         table.add_row(name, f"{result.start_metrics[name]:.6g}", f"{value:.6g}")

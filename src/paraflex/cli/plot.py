@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import typer
 
+from paraflex.cli.commands.results import PlotRequest
 from paraflex.errors import InputError, suggestion
-from paraflex.plots.catalogue import drawings, figures_of, find_figure
+from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.sources import Source, open_source
 
 ALL = "all"
@@ -19,26 +19,11 @@ STYLES = ("single", "double")
 _DENSEST = 2400.0
 
 
-@dataclass(frozen=True)
-class PlotRequest:
-    """What `paraflex plot` was asked for."""
-
-    results: str
-    figures: list[str]
-    modes: list[str]
-    metrics: list[str]
-    style: str | None
-    formats: list[str]
-    output: str | None
-    dpi: float
-    force: bool
-
-
 def plot_command(request: PlotRequest) -> int:
     """Draw the figures asked for and say where they are, or list those there are; the exit code."""
     _check(request)
     source = open_source(request.results)
-    if not request.figures:
+    if request.only_list or not request.figures:
         _list(source, request.results)
         return COMPLETE
     chosen = figures_of(source) if request.figures == [ALL] else [find_figure(source, n) for n in request.figures]
@@ -48,16 +33,15 @@ def plot_command(request: PlotRequest) -> int:
     from paraflex.plots.save import write_figures
 
     folder = source.folder / "figures" if request.output is None else Path(request.output)
-    written = write_figures(
-        drawn, folder, request.formats, style=request.style, dpi=request.dpi, force=request.force
-    )  # fmt: skip
+    formats = [name.strip().lower() for name in request.format.split(",") if name.strip()]
+    written = write_figures(drawn, folder, formats, style=request.style, dpi=request.dpi, force=request.force)
     for file in written:
         typer.echo(file)
     return COMPLETE
 
 
 def _check(request: PlotRequest) -> None:
-    """Nothing, if the options make sense."""
+    """Check that the options make sense."""
     if request.style is not None and request.style not in STYLES:
         remedy = suggestion(request.style, STYLES)
         raise InputError("unknown style", field="--style", value=request.style, remedy=remedy)

@@ -40,7 +40,7 @@ def report_command(results: str, output: str | None, *, force: bool) -> None:
 
 def study_of(results: Path) -> Path | None:
     """The folder of a study of many designs that was named, or whose table was; None where there is none."""
-    from paraflex.studies.sweeps.folder import STUDY
+    from paraflex.campaign import STUDY
 
     folder = results.parent if results.is_file() and results.suffix in (".parquet", ".json") else results
     return folder if (folder / STUDY).is_file() else None

@@ -2,93 +2,82 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass, field
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-from paraflex.errors import AssemblyError, InputError, OutputError, UnreachablePathError
+from rich.console import Console
+
+from paraflex.cli.commands.options import FramesChoice, PlanChoice
+from paraflex.cli.commands.requests import flags
+from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.files import Model, load_path
 from paraflex.kinematics import Path as EndEffectorPath
-from paraflex.mechanism import ActuationMode, Mechanism, parse_mode
-from paraflex.simulate import TrackingTask, plan_tracking
+from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.simulate import TrackingTask
 from paraflex.validity import to_blame
+from paraflex.writing import unwritable
 
 COMPLETE, TROUBLE, INTERRUPTED = 0, 1, 130
 
 
-@dataclass(frozen=True)
-class StudyRequest:
-    """What was asked for on the command line; None takes the model's or the library's default."""
-
-    mechanism: str
-    path: str | None
-    modes: list[str]
-    duration: float | None
-    samples: int | None
-    assembly: str | None
-    out: str
-    json: bool
-    balanced: bool = field(default=False, kw_only=True)
-    after: str | None = field(default=None, kw_only=True)
-    report: bool = field(default=True, kw_only=True)
-
-
-def with_frames(mechanism: Mechanism, reference: str | None, curvature: str | None) -> Mechanism:
+def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:
     """The mechanism with all beams in the frames and of the curvature asked for; None leaves them as they are."""
+    with flagged(frames):
+        return mechanism.with_beams(reference=frames.reference, curvature=frames.curvature)
+
+
+@contextmanager
+def flagged(request: object) -> Iterator[None]:
+    """An error that names an option's field, in whatever table, names the option's flag instead."""
     try:
-        return mechanism.with_beams(reference=reference, curvature=curvature)
+        yield
     except InputError as error:
-        flag = f"--{error.field.rpartition('.')[2]}"
-        raise InputError(error.problem, field=flag, value=error.value, remedy=error.remedy) from None
+        flag = flags(request).get(error.field.rpartition(".")[2])
+        raise (error if flag is None else error.at(flag)) from None
 
 
 def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
     """A path of the model or of a file, and its name."""
     if name is not None and name not in model.paths and name.endswith(".toml"):
         return load_path(name), name
-    path = model.path(name)
-    return path, next(key for key, value in model.paths.items() if value is path)
+    name = model.path_name(name)
+    return model.paths[name], name
 
 
 def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
     """The modes asked for, or the study's."""
-    wanted = names or list(model.study.modes) or [mode.name for mode in model.mechanism.modes]
-    if not wanted:
+    try:
+        modes = model.modes(names)
+    except InputError as error:
+        raise error.at("--mode") from None
+    if not modes:
         raise InputError(
             "no actuation mode to run",
             field="--mode",
             remedy="name one (paraflex modes lists what there is), or add [study] modes to the file",
         )
-    try:
-        return list(dict.fromkeys(parse_mode(model.mechanism, name) for name in wanted))
-    except InputError as error:
-        raise InputError(error.problem, field="--mode", value=error.value, remedy=error.remedy) from None
+    return list(modes)
+
+
+def find_mode(model: Model, names: list[str]) -> ActuationMode:
+    """Of the modes asked for, or the study's, the one with most motors."""
+    return max(find_modes(model, names), key=lambda mode: len(mode.motors))
 
 
 def plan_study(
-    model: Model, mechanism: Mechanism, path: EndEffectorPath, path_name: str, request: StudyRequest
+    model: Model,
+    mechanism: Mechanism,
+    path: EndEffectorPath,
+    path_name: str,
+    chosen: PlanChoice,
+    after: str | None = None,
 ) -> TrackingTask:
     """The study, planned; errors name the option or the field at fault."""
-    if model.start is not None:
-        raise InputError(
-            "a path says where and how the mechanism starts", field="start", source=model.source,
-            remedy="drop the [start] table, or run without a path",
-        )  # fmt: skip
-    duration, samples = request.duration, request.samples
-    if duration is None:
-        duration = model.duration(path_name, path)
     try:
-        return plan_tracking(
-            mechanism,
-            path,
-            duration=duration,
-            samples=model.study.samples if samples is None else samples,
-            assembly=request.assembly or model.study.assembly,
-            orientation=model.study.orientation,
-            after=model.study.after if request.after is None else request.after,
-            warning=False,
-        )
+        return model.plan(path, mechanism=mechanism, **asdict(chosen), after=after, warning=False)
     except AssemblyError as error:
         if not isinstance(error, UnreachablePathError):
             raise of_assembly(error, model) from error
@@ -118,7 +107,7 @@ def at_fault(error: InputError, model: Model) -> InputError:
         "events": "--stop-at",
     }
     if error.field in flags:
-        return InputError(error.problem, field=flags[error.field], value=error.value, remedy=error.remedy)
+        return error.at(flags[error.field])
     return error.in_file(model.source)
 
 
@@ -132,12 +121,7 @@ def results_folder(out: str) -> Path:
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise OutputError(
-            f"cannot be written ({(error.strerror or str(error)).lower()})",
-            field="--out",
-            value=out,
-            remedy="choose another folder",
-        ) from error
+        raise unwritable(error, "--out", "choose another folder", out) from error
     finally:
         for parent in made:
             if parent.is_dir() and not any(parent.iterdir()):
@@ -145,18 +129,7 @@ def results_folder(out: str) -> Path:
     return folder
 
 
-def report_too(request: StudyRequest) -> str:
-    """How the last line of a command goes on where it has written a report."""
-    return " and report.html" if request.report else ""
-
-
-def study_folder(study: str, output: str | None) -> Path:
-    """Where results of a study file go: where it is said, else results/ and the file's name."""
-    return Path("results") / Path(study).stem if output is None else Path(output)
-
-
-def write_json(figures: Any, file: Path) -> None:
-    """Write a file of numbers; it appears whole or not at all."""
-    unfinished = file.with_name(file.name + ".part")
-    unfinished.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
-    unfinished.replace(file)
+def say_where(console: Console, began: float, what: str, folder: Path, *, report: bool = False) -> None:
+    """The last line of a command: how long it took, and where things are."""
+    more = " and report.html" if report else ""
+    console.print(f"{time.perf_counter() - began:.1f} s; {what}{more} in {folder}", soft_wrap=True)

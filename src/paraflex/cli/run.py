@@ -5,30 +5,31 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import TimeElapsedColumn
 
 from paraflex.checks import check_planned
+from paraflex.cli.bars import bars
 from paraflex.cli.collected import collected
-from paraflex.cli.integration import IntegrationRequest, check_stops, integration_options, integration_parameters
+from paraflex.cli.commands.runs import RunRequest
+from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
     TROUBLE,
-    StudyRequest,
     at_fault,
     find_modes,
     find_path,
+    flagged,
     plan_study,
-    report_too,
     results_folder,
+    say_where,
     with_frames,
-    write_json,
 )
 from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of, warn_of_doubts
 from paraflex.compilation import compile_kernels
@@ -42,31 +43,19 @@ from paraflex.results import save_results, summary
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
 from paraflex.studies import Simulator, StudyResult, run_study
-
-
-@dataclass(frozen=True)
-class RunRequest(StudyRequest):
-    """What `paraflex run` was asked for."""
-
-    integration: IntegrationRequest = field(default_factory=IntegrationRequest)
-    rigid: bool = False
-    geometry: str | None = None
-    reference: str | None = None
-    curvature: str | None = None
-    segments: int | None = None
-    ked: bool = False
+from paraflex.writing import write_json
 
 
 def run_command(request: RunRequest) -> int:
     """Run a study and write its results; the exit code."""
     console = plain_console(stderr=True)
-    model = load(request.mechanism)
+    model = load(request.model.name)
     _check_fidelity(request)
-    options = integration_options(request.integration, model.study)
-    how = {} if request.ked else integration_parameters(options, request.integration)
+    options = integration_options(request, model.study)
+    how = {} if request.ked else integration_parameters(options, request.stop_at)
     if not model.paths and request.path is None:
         mechanism = _without_path(model, request)
-        check_stops(mechanism, options, request.integration)
+        check_stops(mechanism, options, request.stop_at)
         return run_motion(request, model, mechanism, options, console, how)
     path, path_name = find_path(model, request.path)
     modes = find_modes(model, request.modes)
@@ -75,16 +64,16 @@ def run_command(request: RunRequest) -> int:
     say_replaced(folder, "run")
     mechanism = asked_mechanism(model, request)
     if request.segments is None:
-        check_stops(mechanism, options, request.integration)
+        check_stops(mechanism, options, request.stop_at)
     stiff = request.rigid or request.ked or request.segments is not None
     compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
     began = time.perf_counter()
-    task = plan_study(model, mechanism, path, path_name, request)
+    task = plan_study(model, mechanism, path, path_name, request.plan, request.after)
     if request.segments is not None:
         task = task.in_segments(proportional_segments(mechanism, request.segments))
-        check_stops(task.mechanism, options, request.integration)
+        check_stops(task.mechanism, options, request.stop_at)
     parameters = _parameters(model, path_name, modes, task, how, request)
-    doubts = check_planned(model, task, path_name, modes, request.assembly)
+    doubts = check_planned(model, task, path_name, modes, request.plan.assembly)
     method = _method(request, options)
     try:
         result = _simulate(console, task, modes, options, parameters, method, model.study.error, doubts)
@@ -105,7 +94,7 @@ def run_command(request: RunRequest) -> int:
         warn_of_doubts(plain_console(), figures)
         print_study(plain_console(), figures, task, _model_name(request, mechanism))
         validity(plain_console(), {name: mode.get("validity") for name, mode in figures["modes"].items()})
-        console.print(f"{time.perf_counter() - began:.1f} s; results, figures{report_too(request)} in {folder}")
+        say_where(console, began, "results, figures", folder, report=request.report)
     failures(console, result)
     if result.interrupted:
         return INTERRUPTED
@@ -150,14 +139,14 @@ def _check_fidelity(request: RunRequest) -> None:
     asked = [flag for flag, given in chosen.items() if given]
     if len(asked) > 1:
         raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
-    for flag, given in (("--reference", request.reference), ("--curvature", request.curvature)):
+    for name, given in asdict(request.frames).items():
         if given is not None and (request.rigid or request.segments is not None):
-            raise InputError(f"means nothing with {asked[0]}", field=flag, value=given, remedy="leave one of them out")
+            raise InputError(
+                f"means nothing with {asked[0]}", field=f"--{name}", value=given, remedy="leave one of them out"
+            )
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
-    given = request.integration.given() | ({"--balanced": True} if request.balanced else {})
-    given |= {} if request.after is None else {"--after": request.after}
-    for flag, value in given.items():
+    for flag, value in given_flags(request).items():
         if request.ked:
             raise InputError(
                 "means nothing with --ked",
@@ -178,13 +167,11 @@ def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
 def asked_mechanism(model: Model, request: RunRequest) -> Mechanism:
     """The mechanism at the fidelity asked for."""
     mechanism = model.mechanism.rigid() if request.rigid else model.mechanism
-    mechanism = with_frames(mechanism, request.reference, request.curvature)
+    mechanism = with_frames(mechanism, request.frames)
     if request.geometry is None:
         return mechanism
-    try:
+    with flagged(request):
         return mechanism.with_geometry(request.geometry)
-    except InputError as error:
-        raise InputError(error.problem, field="--geometry", value=error.value, remedy=error.remedy) from None
 
 
 def _parameters(
@@ -210,9 +197,8 @@ def _parameters(
             "after": task.after.value,
             "error": model.study.error,
             "geometry": task.mechanism.geometry.value,
-            "reference": request.reference,
-            "curvature": request.curvature,
         }
+        | asdict(request.frames)
         | how,
     }
 
@@ -228,17 +214,12 @@ def _simulate(
     doubts: Iterable[Finding],
 ) -> StudyResult:
     end = float(task.motion.t[-1])
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.completed:.3f}/{task.total:.3f} s"),
-    )
-    with Progress(*columns, TimeElapsedColumn(), console=console, transient=not console.is_terminal) as progress:
-        bars: dict[str, TaskID] = {mode.name: progress.add_task(mode.name, total=end, start=False) for mode in modes}
+    with bars(console, "{task.completed:.3f}/{task.total:.3f} s", TimeElapsedColumn()) as progress:
+        of_mode = {mode.name: progress.add_task(mode.name, total=end, start=False) for mode in modes}
 
         def report(name: str, reached: float) -> None:
-            progress.start_task(bars[name])
-            progress.update(bars[name], completed=reached)
+            progress.start_task(of_mode[name])
+            progress.update(of_mode[name], completed=reached)
 
         return run_study(
             task,
@@ -259,7 +240,7 @@ def _write(result: StudyResult, folder: Path, *, report: bool) -> None:
     assert result.data is not None
     folder.mkdir(parents=True, exist_ok=True)
     save_results(result.data, folder / "results.nc")
-    write_json(summary(result.data, result.failed), folder / "summary.json")
+    write_json(folder / "summary.json", summary(result.data, result.failed))
     save_figures(result.data, folder / "figures")
     if report:
         from paraflex.report import save_page, tracking_page

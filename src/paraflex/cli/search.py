@@ -4,40 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, study_folder
-from paraflex.cli.tables import plain_console, warn_of
+from paraflex.cli.bars import bars
+from paraflex.cli.commands.studies import SearchRequest
+from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
+from paraflex.cli.tables import plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
 from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
 from paraflex.studies.optimisation import Progress as SearchProgress
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
-
-
-@dataclass(frozen=True)
-class SearchRequest:
-    """What a command that looks for a design was asked for."""
-
-    study: str
-    output: str | None
-    engine: str
-    workers: int | None
-    cluster: str | None
-    json: bool
-
-    @property
-    def folder(self) -> Path:
-        """Where results go."""
-        return study_folder(self.study, self.output)
 
 
 def search_command(
@@ -66,10 +48,7 @@ def search_command(
 
 def parameter_table(result: R, **columns: dict[str, str]) -> Table:
     """The start and the best of every parameter, and more columns of text."""
-    table = plain_table()
-    table.add_column("parameter", no_wrap=True)
-    for heading in ("start", "best", *columns):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = plain_table("parameter", numbers=("start", "best", *columns))
     table.add_column("", no_wrap=True)
     for name, value in result.values.items():
         more = [column.get(name, "") for column in columns.values()]
@@ -78,31 +57,19 @@ def parameter_table(result: R, **columns: dict[str, str]) -> Table:
     return table
 
 
-def plain_table(title: str | None = None) -> Table:
-    """A table without frames."""
-    return Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
-
-
 def _kind(result: OptimisationResult | IdentificationResult) -> str:
     return "optimisation" if isinstance(result, OptimisationResult) else "identification"
 
 
 def _with_bar(console: Console, study: DesignStudy, request: SearchRequest, look: Callable[..., R], what: str) -> R:
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.completed} designs, at most {task.total}"),
-        TextColumn("{task.fields[told]}", markup=False),
-    )
-    with Progress(*columns, console=console, transient=not console.is_terminal, refresh_per_second=4) as progress:
+    with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[told]}") as progress:
         bar = progress.add_task(study.name, total=study.search.evaluations, told="")
 
         def tell(at: SearchProgress) -> None:
             told = "" if at.best is None else f"{what} {at.best:.4g}"
             progress.update(bar, completed=at.evaluations, told=told)
 
-        given: dict[str, Any] = {"engine": request.engine, "workers": request.workers, "cluster": request.cluster}
-        return look(study, request.folder, on_progress=tell, **given)
+        return look(study, request.folder, on_progress=tell, **request.workers.given)
 
 
 def _say_end(console: Console, result: OptimisationResult | IdentificationResult, folder: Path) -> None:

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from paraflex.campaign import held
+from paraflex.cli.commands.studies import SensitivityRequest
 from paraflex.cli.replacing import say_replaced
-from paraflex.cli.request import COMPLETE, study_folder
-from paraflex.cli.tables import number, plain_console, warn_of_doubts
+from paraflex.cli.request import COMPLETE
+from paraflex.cli.tables import number, plain_console, plain_table, warn_of_doubts
+from paraflex.designs.setting import digest
 from paraflex.errors import InputError, OutputError
 from paraflex.plots import save_elasticities
 from paraflex.studies import Sensitivities, load_sensitivities, sensitivities
-from paraflex.studies.sweeps.folder import held
-from paraflex.studies.sweeps.study import digest
-from paraflex.studies.sweeps.table import whole_file, write_json
+from paraflex.writing import whole_file, write_json
 
 RESULTS, TABLE, LINES = "sensitivity.json", "sensitivity.csv", "sensitivity.parquet"
 FIGURES = "figures"
@@ -30,22 +29,11 @@ _COLUMNS = 4
 _OURS = {RESULTS, TABLE, LINES, FIGURES, ".lock"}
 
 
-@dataclass(frozen=True)
-class SensitivityRequest:
-    """What `paraflex sensitivity` was asked for."""
-
-    study: str
-    output: str | None
-    at: list[str]
-    metrics: list[str]
-    json: bool
-
-
 def sensitivity_command(request: SensitivityRequest) -> int:
     """Differentiate the runs of a study; write sensitivity.json, the table and figures. The exit code."""
     study = load_sensitivities(request.study, [name for entry in request.metrics for name in _names(entry)])
     at = _values(request.at)
-    folder = study_folder(request.study, request.output)
+    folder = request.folder
     setting = study.setting
     places = [[list(place) for place in places] for places in setting.places]
     asked = digest([setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics, at])
@@ -83,7 +71,7 @@ def _values(entries: list[str]) -> dict[str, float]:
 
 
 def _claim(folder: Path, asked: str) -> None:
-    """Nothing, if the folder is empty or holds what the same study wrote."""
+    """Check that the folder is empty or holds what the same study wrote."""
     others = sorted(entry.name for entry in folder.iterdir() if entry.name not in _OURS)
     if others:
         raise InputError(
@@ -137,9 +125,7 @@ def _print(console: Console, found: Sensitivities, row: int) -> None:
 
 
 def _table(found: Sensitivities, row: int, shown: NDArray[np.float64], some: slice, form: str) -> Table:
-    table = Table(box=box.SIMPLE, collapse_padding=True, pad_edge=False)
-    table.add_column("metric", no_wrap=True)
-    table.add_column("value", justify="right", no_wrap=True)
+    table = plain_table("metric", numbers=("value",))
     for name, value in zip(found.parameters[some], found.nominal[some], strict=True):
         table.add_column(f"{name}\n{value:g}", justify="right")
     named = zip(found.metrics, found.units, found.values[row], shown, strict=True)

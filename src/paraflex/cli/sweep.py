@@ -4,41 +4,27 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
-from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE, study_folder
+from paraflex.cli.bars import bars
+from paraflex.cli.commands.studies import SweepRequest
+from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
 from paraflex.cli.tables import plain_console, warn_of
 from paraflex.compilation import compile_kernels_for
+from paraflex.designs.measure import beyond_limits
 from paraflex.studies import SweepProgress, SweepResult, load_sweep, sweep
 from paraflex.studies.sweeps import SweepStudy
-from paraflex.studies.sweeps.metrics import beyond_limits
 
 REPORT = "report.html"
-
-
-@dataclass(frozen=True)
-class SweepRequest:
-    """What `paraflex sweep` was asked for."""
-
-    study: str
-    output: str | None
-    engine: str
-    workers: int | None
-    cluster: str | None
-    limit: int | None
-    report: bool
-    json: bool
 
 
 def sweep_command(request: SweepRequest) -> int:
     """Do what is left of a sweep; the exit code."""
     console = plain_console(stderr=True)
     study = load_sweep(request.study)
-    folder = study_folder(request.study, request.output)
+    folder = request.folder
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
     told = request.report and bool(result.done) and _write_report(console, folder)
@@ -57,13 +43,7 @@ def sweep_command(request: SweepRequest) -> int:
 
 
 def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequest) -> SweepResult:
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.completed}/{task.total} runs"),
-        TextColumn("{task.fields[told]}", markup=False),
-    )
-    with Progress(*columns, console=console, transient=not console.is_terminal, refresh_per_second=4) as progress:
+    with bars(console, "{task.completed}/{task.total} runs", "{task.fields[told]}") as progress:
         bar = progress.add_task(study.name, total=study.runs, told="", start=False)
 
         def report(at: SweepProgress) -> None:
@@ -71,15 +51,7 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
             progress.start_task(bar)
             progress.update(bar, completed=at.done, told=f"{at.rate:.1f} runs/s{left}")
 
-        return sweep(
-            study,
-            folder,
-            engine=request.engine,
-            workers=request.workers,
-            cluster=request.cluster,
-            limit=request.limit,
-            on_progress=report,
-        )
+        return sweep(study, folder, limit=request.limit, on_progress=report, **request.workers.given)
 
 
 def _write_report(console: Console, folder: Path) -> bool:

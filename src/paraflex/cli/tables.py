@@ -53,15 +53,14 @@ def print_study(console: Console, figures: dict[str, Any], task: TrackingTask, m
 
 def _study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Table:
     """Tracking error and peak torques of every mode, and what the solver did."""
-    from paraflex.results.metrics import HEADLINE, SPAN_WORDS, ErrorSpan
+    from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 
     span = ErrorSpan(figures["error"])
     motors = [motor.name for motor in task.mechanism.motors]
     heads = [f"{name}\n[{unit}]" for name, unit in zip(motors, task.mechanism.motor_units(), strict=True)]
     efforts = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
-    table = _table(f"{figures['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {efforts}")
-    for heading in ("error\n[m]", *heads, "steps\n", "wall\n[s]"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    title = f"{figures['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {efforts}"
+    table = plain_table("mode", numbers=("error\n[m]", *heads, "steps\n", "wall\n[s]"), title=title)
     for name, mode in figures["modes"].items():
         if "steps" not in mode:
             table.add_row(name, "failed", *["" for _ in motors], "", "")
@@ -82,10 +81,9 @@ def _after_table(figures: dict[str, Any], task: TrackingTask) -> Table:
     motors = "held by brakes" if held else "free"
     if figures["parameters"]["run"].get("ked"):
         motors = "held all the time"
-    table = _table(f"Tracking error during the motion and after it, the motors {motors}")
     heads = ("motion\n[m]", "after\n[m]", "drift\n[m/s]", "vibration\n[m]", *(["brakes\n[J]"] if held else []))
-    for heading in heads:
-        table.add_column(heading, justify="right", no_wrap=True)
+    title = f"Tracking error during the motion and after it, the motors {motors}"
+    table = plain_table("mode", numbers=heads, title=title)
     keys = ("tracking_rms_motion", "tracking_rms_after", "drift_speed", "residual_vibration")
     for name, mode in figures["modes"].items():
         if "steps" in mode:
@@ -94,10 +92,13 @@ def _after_table(figures: dict[str, Any], task: TrackingTask) -> Table:
     return table
 
 
-def _table(title: str) -> Table:
-    """An empty table with a column for modes."""
+def plain_table(*texts: str, numbers: Iterable[str] = (), title: str | None = None) -> Table:
+    """An empty table without frames: columns of text, then of numbers."""
     table = Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
-    table.add_column("mode", no_wrap=True)
+    for heading in texts:
+        table.add_column(heading, no_wrap=True)
+    for heading in numbers:
+        table.add_column(heading, justify="right", no_wrap=True)
     return table
 
 

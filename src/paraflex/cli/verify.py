@@ -4,61 +4,47 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from paraflex.cli.agreement import print_agreement
+from paraflex.cli.bars import counting
+from paraflex.cli.commands.runs import VerifyRequest
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     COMPLETE,
     INTERRUPTED,
     TROUBLE,
-    StudyRequest,
+    find_mode,
     find_modes,
     find_path,
+    flagged,
     plan_study,
-    report_too,
     results_folder,
+    say_where,
     with_frames,
-    write_json,
 )
 from paraflex.cli.tables import plain_console, warn_of_doubts
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
 from paraflex.files import load
-from paraflex.integrators import find_method
 from paraflex.mechanism import ActuationMode, Geometry
 from paraflex.results import save_results
 from paraflex.simulate import TrackingTask
 from paraflex.studies import FIDELITIES, Verification, VerificationOptions, agreement, check_model, verify
-
-
-@dataclass(frozen=True)
-class VerifyRequest(StudyRequest):
-    """What `paraflex verify` was asked for."""
-
-    engines: list[str]
-    fidelities: list[str]
-    segments: int | None
-    tolerance: float | None = None
-    method: str | None = None
-    reference: str | None = None
-    curvature: str | None = None
+from paraflex.writing import write_json
 
 
 def verify_command(request: VerifyRequest) -> int:
     """Run all models, write what they say of each other; the exit code."""
     console = plain_console(stderr=True)
-    model = load(request.mechanism)
+    model = load(request.model.name)
     path, path_name = find_path(model, request.path)
-    modes = find_modes(model, request.modes)
-    if not request.modes:
-        modes = [max(modes, key=lambda mode: len(mode.motors))]
-    options, mechanism = _options(request), with_frames(model.mechanism, request.reference, request.curvature)
+    modes = find_modes(model, request.modes) if request.modes else [find_mode(model, [])]
+    options, mechanism = _options(request), with_frames(model.mechanism, request.frames)
     models = _models(request)
     for name in models:
         check_model(name, mechanism)
@@ -68,12 +54,12 @@ def verify_command(request: VerifyRequest) -> int:
         if geometry is Geometry.LINEAR or "second-order" in models:
             compile_kernels(geometry, console.print)
     began = time.perf_counter()
-    task = plan_study(model, mechanism, path, path_name, request)
+    task = plan_study(model, mechanism, path, path_name, request.plan)
     verification = _run(console, task, modes, models, options)
     parameters = {
         "model": dict(model.parameters),
         "run": {"mechanism": model.source, "path": path_name, "modes": [mode.name for mode in modes]}
-        | {"reference": request.reference, "curvature": request.curvature}
+        | asdict(request.frames)
         | asdict(options),
     }
     figures = agreement(verification, model.study.error) | {"parameters": parameters}
@@ -86,7 +72,7 @@ def verify_command(request: VerifyRequest) -> int:
         out = plain_console()
         for mode in figures["modes"]:
             print_agreement(out, figures, mode)
-        console.print(f"{time.perf_counter() - began:.1f} s; numbers, figures{report_too(request)} in {folder}")
+        say_where(console, began, "numbers, figures", folder, report=request.report)
     for mode, by_model in verification.runs.items():
         for name, runs in by_model.items():
             if runs.failure:
@@ -100,16 +86,9 @@ def _options(request: VerifyRequest) -> VerificationOptions:
     for flag, value in (("--tol", request.tolerance), ("--segments", request.segments)):
         if value is not None and not 0 < value < float("inf"):
             raise InputError("must be positive", field=flag, value=value, remedy="leave it out for the default")
-    default = VerificationOptions()
-    try:
-        method = find_method(default.method if request.method is None else request.method).name
-    except InputError as error:
-        raise InputError(error.problem, field="--method", value=error.value, remedy=error.remedy) from None
-    return VerificationOptions(
-        method=method,
-        tolerance=default.tolerance if request.tolerance is None else request.tolerance,
-        segments=default.segments if request.segments is None else request.segments,
-    )
+    given = {name: getattr(request, name) for name in ("method", "tolerance", "segments")}
+    with flagged(request):
+        return VerificationOptions(**{name: value for name, value in given.items() if value is not None})
 
 
 def _models(request: VerifyRequest) -> list[str]:
@@ -123,14 +102,7 @@ def _models(request: VerifyRequest) -> list[str]:
 def _run(
     console: Console, task: TrackingTask, modes: list[ActuationMode], models: list[str], options: VerificationOptions
 ) -> Verification:
-    columns = (BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
-    text = TextColumn("{task.description}", markup=False)
-    with Progress(text, *columns, console=console, transient=not console.is_terminal) as progress:
-        bar = progress.add_task("", total=None)
-
-        def report(what: str, number: int, total: int) -> None:
-            progress.update(bar, description=what, completed=number, total=total)
-
+    with counting(console) as report:
         return verify(task, modes, models=models, options=options, on_progress=report)
 
 
@@ -138,7 +110,7 @@ def _write(verification: Verification, figures: dict, parameters: dict, folder: 
     from paraflex.plots import save_agreement_figures
 
     folder.mkdir(parents=True, exist_ok=True)
-    write_json(figures, folder / "verify.json")
+    write_json(folder / "verify.json", figures)
     data = verification.dataset(parameters=parameters, error=figures["error"])
     save_results(data, folder / "verify.nc")
     save_agreement_figures(data, folder / "figures")

@@ -445,6 +445,7 @@ def _record(
         joint_force=-samples.multipliers[:, model.rows],
         joint_moment=np.full((len(samples.t), len(mechanism.joints)), np.nan),
         multiplier=np.full((len(samples.t), task.system.m), np.nan),
+        motor_speed=_motor_speeds(linkage, mechanism, samples),
         kinetic_energy=kinetic,
         strain_energy=strain,
         work=work,
@@ -478,10 +479,14 @@ def _largest(values: Array) -> float:
 
 def _work(linkage: Linkage, mechanism: Mechanism, torques: FeedForward, history: History) -> Array:
     """Of the motors, by the trapezoidal rule over the steps."""
-    power = np.zeros(history.t.size)
-    for motor, torque in zip(mechanism.motors, torques.evaluate(history.t).T, strict=True):
-        power += torque * linkage.joint_turn(mechanism.joint(motor.joint), history).rate
+    power = np.sum(torques.evaluate(history.t) * _motor_speeds(linkage, mechanism, history), axis=1)
     return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(history.t))])[: power.size]
+
+
+def _motor_speeds(linkage: Linkage, mechanism: Mechanism, history: History) -> Array:
+    """Of all motors (k, motors) [rad/s]."""
+    joints = [mechanism.joint(motor.joint) for motor in mechanism.motors]
+    return np.array([linkage.joint_turn(joint, history).rate for joint in joints]).reshape(-1, history.t.size).T
 
 
 def _spring_energy(linkage: Linkage, mechanism: Mechanism, history: History) -> Array:

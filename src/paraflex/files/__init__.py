@@ -2,8 +2,9 @@
 
 from paraflex.files.generators import generator_names
 from paraflex.files.library import library_file, library_names, library_text
-from paraflex.files.model import Model, StudyDefaults, load, load_data, load_path, model_from
+from paraflex.files.model import Model, load, load_data, load_path, model_from
 from paraflex.files.schema import model_schema
+from paraflex.files.study import StudyDefaults
 
 __all__ = [
     "Model",

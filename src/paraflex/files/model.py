@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path as FilePath
 from typing import Any
@@ -16,7 +16,7 @@ from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.laws import quantities, read_law
 from paraflex.files.library import library_file, library_names
-from paraflex.files.read import read_toml, validate
+from paraflex.files.read import naming, read_toml, validate
 from paraflex.files.rows import with_rows
 from paraflex.files.schema import (
     AssemblyTable,
@@ -38,8 +38,8 @@ from paraflex.files.schema import (
     TorqueTable,
 )
 from paraflex.files.start import read_start
+from paraflex.files.study import StudyDefaults, check_study
 from paraflex.findings import warn_of
-from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
     ActuationMode,
@@ -74,51 +74,8 @@ from paraflex.mechanism import (
     WeldJoint,
     parse_mode,
 )
+from paraflex.simulate import Ending, TrackingTask, plan_tracking
 from paraflex.validity import doubtful_numbers
-
-
-@dataclass(frozen=True)
-class StudyDefaults:
-    """What a study of the model does unless asked otherwise.
-
-    Attributes
-    ----------
-    path : str or None
-        The name of one of the model's paths.
-    modes : tuple of str
-    duration : float or None
-        [s]; the path's own where None.
-    samples : int
-    assembly : str or None
-        The first of the mechanism where None.
-    torques : mapping of str to float
-        Constant motor torques of a run without a path [N m].
-    orientation : float
-        Angle of the end-effector along the path, where it is a task coordinate [rad].
-    method : str or None
-        Of integration; the program's own where None.
-    tolerance : float or None
-        Of the integration [m].
-    step : float or None
-        Fixed [s].
-    after : str
-        What the active motors do after the path: "free" or "hold".
-    error : str
-        Which tracking error ranks modes: that of the "motion", or of the "whole" run.
-    """
-
-    path: str | None = None
-    modes: tuple[str, ...] = ()
-    duration: float | None = None
-    samples: int = 701
-    assembly: str | None = None
-    torques: Mapping[str, float] = field(default_factory=dict)
-    orientation: float = 0.0
-    method: str | None = None
-    tolerance: float | None = None
-    step: float | None = None
-    after: str = "free"
-    error: str = "motion"
 
 
 @given_as("a model", "the model that paraflex.load reads")
@@ -149,16 +106,15 @@ class Model:
     def _repr_html_(self) -> str:
         """In notebooks."""
         from paraflex.display import facts, page
-        from paraflex.mechanism.html import mechanism_html
 
         study = self.study
-        shown = [
+        told = [
             ("paths", list(self.paths)),
             ("study: path", study.path),
             ("study: modes", list(study.modes)),
             ("study: duration [s]", study.duration),
         ]
-        return page(f"Model {self.source}", facts(shown), mechanism_html(self.mechanism))
+        return page(f"Model {self.source}", facts(told), self.mechanism._repr_html_())
 
     @checked_arguments()
     def path(self, name: str | None = None) -> Path:
@@ -169,33 +125,102 @@ class Model:
         InputError
             There is none of that name.
         """
+        return self.paths[self.path_name(name)]
+
+    @checked_arguments()
+    def path_name(self, name: str | None = None) -> str:
+        """The name of a path: that given, the study's, or that of the first path; see `path`."""
         wanted = name or self.study.path or next(iter(self.paths), None)
         if wanted is None:
             raise InputError(
                 "the model has no path", field="path", remedy="add a [path.NAME] table", source=self.source
             )
         if wanted not in self.paths:
-            raise InputError(
-                "unknown path",
-                field="path",
-                value=wanted,
-                remedy=suggestion(wanted, list(self.paths)),
-                source=self.source,
-            )
-        return self.paths[wanted]
+            remedy = suggestion(wanted, list(self.paths))
+            raise InputError("unknown path", field="path", value=wanted, remedy=remedy, source=self.source)
+        return wanted
 
-    def duration(self, name: str, path: Path) -> float:
-        """How long a run along a path of that name takes [s].
+    @checked_arguments()
+    def modes(self, names: Sequence[str] = ()) -> tuple[ActuationMode, ...]:
+        """Actuation modes by name, else those of the study, else all of the mechanism; none where it has none.
 
-        The study's duration along its own path; another path has another length, and the study's share of dwell.
+        Raises
+        ------
+        InputError
+            An unknown mode.
         """
-        if self.study.duration is None:
-            return path.duration
-        if name == self.study.path:
-            return self.study.duration
-        if self.study.path is None:
-            return path.duration
-        return path.duration * self.study.duration / self.paths[self.study.path].duration
+        wanted = names or self.study.modes or [mode.name for mode in self.mechanism.modes]
+        return tuple(dict.fromkeys(parse_mode(self.mechanism, name) for name in wanted))
+
+    @checked_arguments()
+    def duration(self, path: Path | str, chosen: float | None = None) -> float:
+        """How long a run along a path takes, dwell included [s].
+
+        As chosen; else the study's duration along its own path. Another path has another length, and the study's share
+        of dwell.
+        """
+        if chosen is not None:
+            return chosen
+        followed, own = self.path(path) if isinstance(path, str) else path, self.paths.get(self.study.path or "")
+        if self.study.duration is None or own is None:
+            return followed.duration
+        return self.study.duration if followed is own else followed.duration * self.study.duration / own.duration
+
+    @checked_arguments()
+    def plan(
+        self,
+        path: Path | str | None = None,
+        *,
+        mechanism: Mechanism | None = None,
+        duration: float | None = None,
+        samples: int | None = None,
+        assembly: str | None = None,
+        after: Ending | str | None = None,
+        warning: bool = True,
+    ) -> TrackingTask:
+        """Plan a run along a path; what is not given is as the model's [study] has it.
+
+        Parameters
+        ----------
+        path : Path or str, optional
+            A path, or the name of one of the model's.
+        mechanism : Mechanism, optional
+            Another form of the model's own: rigid, or of another geometry.
+        duration, samples, assembly, after, warning
+            See `simulate.plan_tracking`.
+
+        Raises
+        ------
+        InputError, AssemblyError, UnreachablePathError
+            See there; or the model has a [start].
+        """
+        self.check_start()
+        followed = path if isinstance(path, Path) else self.path(path)
+        study = self.study.filled(samples=samples, assembly=assembly, after=after)
+        return plan_tracking(
+            self.mechanism if mechanism is None else mechanism,
+            followed,
+            duration=self.duration(followed, duration),
+            samples=study.samples,
+            assembly=study.assembly,
+            orientation=study.orientation,
+            after=study.after,
+            warning=warning,
+        )
+
+    def check_start(self) -> None:
+        """Check that a run along a path may start where the path says.
+
+        Raises
+        ------
+        InputError
+            The model has a [start] of its own.
+        """
+        if self.start is not None:
+            raise InputError(
+                "a path says where and how the mechanism starts", field="start", source=self.source,
+                remedy="drop the [start] table, or run without a path",
+            )  # fmt: skip
 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
@@ -231,10 +256,8 @@ def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:
         Unknown name, unreadable file, or a file it names that cannot be read.
     """
     data, source, folder = _read(name_or_file)
-    try:
+    with naming(source):
         return with_rows(data, folder), source
-    except InputError as error:
-        raise (error if error.source else error.in_file(source)) from None
 
 
 @checked_arguments()
@@ -248,10 +271,8 @@ def model_from(data: dict[str, Any], source: str) -> Model:
     source : str
         Named in errors.
     """
-    try:
+    with naming(source):
         return _model(validate(ModelTable, data, source), data, source)
-    except InputError as error:
-        raise (error if error.source else error.in_file(source)) from None
 
 
 def _read(name_or_file: str | FilePath) -> tuple[dict[str, Any], str, FilePath]:
@@ -287,9 +308,7 @@ def load_path(file: str | FilePath) -> Path:
     try:
         return _path(table.path)
     except InputError as error:
-        raise InputError(
-            error.problem, field=f"path.{error.field}", value=error.value, remedy=error.remedy, source=source
-        ) from None
+        raise error.within("path").in_file(source) from None
 
 
 def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
@@ -299,9 +318,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
         try:
             paths[name] = _path(entry)
         except InputError as error:
-            raise InputError(
-                error.problem, field=f"path.{name}.{error.field}", value=error.value, remedy=error.remedy
-            ) from error
+            raise error.within(f"path.{name}") from error
     study = StudyDefaults(
         path=table.study.path,
         modes=tuple(table.study.modes),
@@ -316,7 +333,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
         after=table.study.after,
         error=table.study.error,
     )
-    _check_study(mechanism, paths, study)
+    check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
     if table.study.orientation is not None and not turns:
         raise InputError(
@@ -325,38 +342,6 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
         )  # fmt: skip
     start = None if table.start is None else read_start(table.start, mechanism)
     return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start)
-
-
-def _check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
-    if study.path is not None and study.path not in paths:
-        raise InputError(
-            "unknown path", field="study.path", value=study.path, remedy=suggestion(study.path, list(paths))
-        )
-    for mode in study.modes:
-        try:
-            parse_mode(mechanism, mode)
-        except InputError as error:
-            raise InputError(error.problem, field="study.modes", value=error.value, remedy=error.remedy) from error
-    motors = [motor.name for motor in mechanism.motors]
-    for name in study.torques:
-        if name not in motors:
-            raise InputError("unknown motor", field="study.torques", value=name, remedy=suggestion(name, motors))
-    if study.assembly is not None and study.assembly not in {a.name for a in mechanism.assemblies}:
-        raise InputError(
-            "unknown assembly",
-            field="study.assembly",
-            value=study.assembly,
-            remedy=suggestion(study.assembly, [a.name for a in mechanism.assemblies]),
-        )
-    if study.duration is not None and not study.duration > 0.0:
-        raise InputError("must be positive", field="study.duration", value=study.duration, remedy="give it in s")
-    if study.samples < 2:
-        raise InputError("too few samples", field="study.samples", value=study.samples, remedy="ask for at least 2")
-    given = {name: getattr(study, name) for name in ("method", "tolerance", "step")}
-    try:
-        IntegrationOptions(**{name: value for name, value in given.items() if value is not None})
-    except InputError as error:
-        raise error.within("study") from None
 
 
 def _mechanism(table: ModelTable) -> Mechanism:

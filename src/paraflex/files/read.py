@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import tomllib
 import typing
+from collections.abc import Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -64,6 +66,15 @@ def _not_toml(reason: str, source: str) -> InputError:
     return InputError(
         f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out", source=source
     )
+
+
+@contextmanager
+def naming(source: str) -> Iterator[None]:
+    """Errors that name no file name this one."""
+    try:
+        yield
+    except InputError as error:
+        raise (error if error.source else error.in_file(source)) from None
 
 
 def validate(schema: type[T], data: dict[str, Any], source: str) -> T:

@@ -42,16 +42,17 @@ def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 def _read_rows(path: Path, name: str, field: str) -> list[list[float]]:
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError("too large a file", field=field, value=name, remedy="at most 5 MB of two columns")
+        size = path.stat().st_size
         # Some spreadsheets put a mark before the first line.
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = [] if size > _LARGEST_FILE else path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise InputError("not a text file in UTF-8", field=field, value=name, remedy="save it as CSV") from None
     except (OSError, ValueError) as error:
         reason = (getattr(error, "strerror", None) or str(error)).lower()
         remedy = "name a file, seen from the model file's folder"
         raise InputError(f"cannot be read ({reason})", field=field, value=name, remedy=remedy) from None
+    if size > _LARGEST_FILE:
+        raise InputError("too large a file", field=field, value=name, remedy="at most 5 MB of two columns")
     rows: list[list[float]] = []
     headed = False
     for number, line in enumerate(lines, start=1):

@@ -3,7 +3,7 @@
 from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, SingularDistance, check_events
 from paraflex.integrators.integrate import integrate
 from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method, Treatment, find_method
-from paraflex.integrators.options import IntegrationOptions, choose
+from paraflex.integrators.options import IntegrationOptions, check_times, choose
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.solution import Solution
 from paraflex.integrators.tableaux import TR_BDF2
@@ -21,6 +21,7 @@ __all__ = [
     "Solution",
     "Treatment",
     "check_events",
+    "check_times",
     "choose",
     "find_method",
     "integrate",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class _Leaving:
-    """A point that goes on where its beam ends, since when [s]."""
+class Leaving:
+    """A point that comes to the end of its beam, and when [s]."""
 
     gauge: Gauge
     time: float
@@ -43,7 +43,7 @@ class BeamEnds:
     """
 
     def __init__(self, system: System, start: State) -> None:
-        self._left: list[_Leaving] = []
+        self._left: list[Leaving] = []
         within = []
         for gauge in beam_end_gauges(system):
             if gauge.inside(start.q[None])[0] > 0.0:
@@ -51,14 +51,14 @@ class BeamEnds:
             elif gauge.ends_run:
                 raise _off_at_start(gauge, start)
             else:
-                self._left.append(_Leaving(gauge, start.time))
+                self._left.append(Leaving(gauge, start.time))
         self.gauges = tuple(within)
 
     def pass_over(self, crossing: Crossing, gauges: Sequence[Gauge]) -> tuple[tuple[Gauge, ...], Crossing | None]:
         """Gauges that a run goes on with after a crossing, and the crossing that ends it, in the same step, or None."""
         left, found = tuple(gauges), crossing
         while found is not None and not found.gauge.ends_run:
-            self._left.append(_Leaving(found.gauge, found.t))
+            self._left.append(Leaving(found.gauge, found.t))
             left = tuple(gauge for gauge in left if gauge is not found.gauge)
             found = first_crossing(left, found.before, found.after)
         return left, found
@@ -80,19 +80,34 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
     UnreachablePathError
         A point leaves a beam whose joint asks for an error.
     """
-    found = []
+    for one, k in _leavings(system, t, q, v):
+        end = one.gauge.event
+        assert isinstance(end, BeamEnd)
+        if end.at_end is AtEnd.ERROR:
+            moment = Moment(one.time, k)
+            raise UnreachablePathError(_planned(end, one.gauge.value(q)), moment, remedy=STAY_ON_BEAM)
+    return beyond_ends(system, t, q, v)
+
+
+def beyond_ends(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
+    """Findings of points that go on where their beams end, in a motion at samples t, q, v."""
+    leavings = _leavings(system, t, q, v)
+    return tuple(_finding(one, one.gauge.value(q)) for one, _ in leavings if not one.gauge.ends_run)
+
+
+def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Leaving | None:
+    """The point that ends a motion at samples t, q, v, since it comes to the end of its beam first; None for none."""
+    ending = [one for one, _ in _leavings(system, t, q, v) if one.gauge.ends_run]
+    return min(ending, key=lambda one: one.time, default=None)
+
+
+def _leavings(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Leaving, int]]:
+    """Points that a motion takes off their beams, each with the first sample outside."""
     for gauge in beam_end_gauges(system):
         outside = np.nonzero(gauge.inside(q) <= 0.0)[0]
-        if not outside.size:
-            continue
-        end, k = gauge.event, int(outside[0])
-        assert isinstance(end, BeamEnd)
-        time = float(t[0]) if k == 0 else _first_outside(gauge, t, q, v, k)
-        if end.at_end is AtEnd.ERROR:
-            raise UnreachablePathError(_planned(end, gauge.value(q)), Moment(time, k), remedy=STAY_ON_BEAM)
-        if end.at_end is AtEnd.WARN:
-            found.append(_finding(_Leaving(gauge, time), gauge.value(q)))
-    return tuple(found)
+        if outside.size:
+            k = int(outside[0])
+            yield Leaving(gauge, float(t[0]) if k == 0 else _first_outside(gauge, t, q, v, k)), k
 
 
 def _first_outside(gauge: Gauge, t: Array, q: Array, v: Array, k: int) -> float:
@@ -125,7 +140,7 @@ def _off_at_start(gauge: Gauge, start: State) -> InputError:
     )
 
 
-def _finding(one: _Leaving, places: Array) -> Finding:
+def _finding(one: Leaving, places: Array) -> Finding:
     end = one.gauge.event
     assert isinstance(end, BeamEnd)
     beyond = np.maximum(-places, places - end.length)

@@ -137,6 +137,20 @@ class IntegrationOptions(CheckedFields):
             )  # fmt: skip
 
 
+def check_times(duration: float | None, samples: int | None) -> None:
+    """Check how long a run is to be [s] and how many samples of it are kept; None says nothing of it.
+
+    Raises
+    ------
+    InputError
+        It cannot be.
+    """
+    if duration is not None and not (math.isfinite(duration) and duration > 0.0):
+        raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
+    if samples is not None and samples < 2:
+        raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+
+
 @checked_arguments()
 def choose(method: str | None, options: IntegrationOptions | None) -> IntegrationOptions:
     """The options, by default the default ones, with the method where one is named.

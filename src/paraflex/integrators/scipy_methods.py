@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.integrators.forms import OdeForm
-from paraflex.integrators.stepper import Effort, Steps, attempts
+from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class ScipyStepper:
         self._class = solver(steps.order)
         self.form, self._tolerances, self._steps = form, tolerances, steps
         self._seen: list[float] = []
-        self._past, self._rejected, self._dense = Effort(0, 0, 0, 0), 0, None
+        self._past, self._rejected, self._dense = SolverCounts(0, 0, 0, 0), 0, None
 
     def begin(self, t: float, y: Array, stop: float) -> None:
         """See `Stepper`."""
@@ -96,11 +96,11 @@ class ScipyStepper:
             self._dense = self._solver.dense_output()
         return self._dense(time)
 
-    def effort(self) -> Effort:
+    def effort(self) -> SolverCounts:
         """See `Stepper`. SciPy counts evaluations; iterations follow from them."""
         solver = self._solver
         iterations = int(solver.nfev) // self._stages if self._stages else 0
-        return self._past + Effort(int(solver.nfev), self._rejected, iterations, int(solver.nlu))
+        return self._past + SolverCounts(int(solver.nfev), self._rejected, iterations, int(solver.nlu))
 
     def _evaluate(self, t: float, y: Array) -> Array:
         self._seen.append(t)

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 _SAME = 1e-9
 
 
-class Effort(NamedTuple):
+class SolverCounts(NamedTuple):
     """What steps took, as far as the solver tells or shows."""
 
     evaluations: int
@@ -24,9 +24,9 @@ class Effort(NamedTuple):
     iterations: int
     factorisations: int
 
-    def __add__(self, other: Effort) -> Effort:  # type: ignore[override]
+    def __add__(self, other: SolverCounts) -> SolverCounts:  # type: ignore[override]
         """Of both."""
-        return Effort(*(a + b for a, b in zip(self, other, strict=True)))
+        return SolverCounts(*(a + b for a, b in zip(self, other, strict=True)))
 
 
 class Steps(NamedTuple):
@@ -64,7 +64,7 @@ class Stepper(Protocol):
         """The solution within the last step, by the solver's own interpolation."""
         ...
 
-    def effort(self) -> Effort:
+    def effort(self) -> SolverCounts:
         """Since the run began."""
         ...
 

@@ -17,17 +17,18 @@ from paraflex.dynamics import (
     pack_signals,
     project_position,
     records,
+    redundant_rows,
     reference_pose,
 )
 from paraflex.dynamics.points import point_motion
-from paraflex.errors import AssemblyError, InputError, Moment, UnreachablePathError
+from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import CLOSED, SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.kinematics.reach import Reach, Shortfall
 from paraflex.mechanism import Assembly, Mechanism, PointRef
-from paraflex.mechanism.mechanism import TASK_COORDINATES
+from paraflex.mechanism.members import TASK_COORDINATES
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
 _LONGEST_STEP = 1e-3
@@ -168,8 +169,8 @@ def _assembled(
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
     closure = PathClosure(mechanism.rigid(), orientation, end)
-    closure.check_degrees_of_freedom()
     chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
+    closure.check_degrees_of_freedom(chosen)
     if _turning(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
         raise InputError(
             "the path gives angles, the task has none", field="end_effector.coordinates",
@@ -243,16 +244,26 @@ class PathClosure:
         self.packed, self.marker = with_marker(system, effector.point)
         self.reach = Reach(system, effector.point, self.coordinates, self.signals)
 
-    def check_degrees_of_freedom(self) -> None:
-        """Nothing, if there are as many task coordinates as degrees of freedom."""
-        free, tasks = self.system.n - self.system.n_constraints, self.coordinates.size
-        if free != tasks:
+    def check_degrees_of_freedom(self, assembly: Assembly) -> None:
+        """Raise unless there are as many task coordinates as degrees of freedom, and no row follows from others."""
+        free, tasks, repeated = self.system.n - self.system.n_constraints, self.coordinates.size, []
+        if free == tasks:
+            return
+        with suppress(NumericalError):
+            repeated = redundant_rows(self.system, self.assemble(assembly))
+        if free + len(repeated) == tasks:
             raise InputError(
-                f"the mechanism has {free} degrees of freedom, its task {tasks} coordinate(s)",
-                field="end_effector.coordinates",
-                value=[TASK_COORDINATES[i] for i in self.coordinates],
-                remedy="name as many task coordinates as there are degrees of freedom",
+                f"the mechanism holds itself twice ({', '.join(repeated)}), and joint motions along a path need each "
+                "motion held once",
+                field="joint",
+                remedy="leave out the joint, or the link, that repeats what others do",
             )
+        raise InputError(
+            f"the mechanism has {free + len(repeated)} degrees of freedom, its task {tasks} coordinate(s)",
+            field="end_effector.coordinates",
+            value=[TASK_COORDINATES[i] for i in self.coordinates],
+            remedy="name as many task coordinates as there are degrees of freedom",
+        )
 
     def assemble(self, assembly: Assembly) -> NDArray[np.float64]:
         """The pose of an assembly, loops closed."""

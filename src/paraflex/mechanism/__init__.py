@@ -1,6 +1,7 @@
 """What the user means: frozen descriptions of bodies, joints, motors and the mechanism they form."""
 
 from paraflex.fem import Polynomial, ShapeFunction, Sine
+from paraflex.mechanism.actuation_modes import mode_of_motors, mode_of_signs, parse_mode
 from paraflex.mechanism.bodies import (
     AssumedModesBeam,
     Body,
@@ -42,18 +43,10 @@ from paraflex.mechanism.loads import (
     TorsionalSpring,
 )
 from paraflex.mechanism.loops import loops
-from paraflex.mechanism.mechanism import (
-    ActuationMode,
-    Assembly,
-    EndEffector,
-    Geometry,
-    Mechanism,
-    mode_of_motors,
-    mode_of_signs,
-    parse_mode,
-)
+from paraflex.mechanism.mechanism import Mechanism
+from paraflex.mechanism.members import ActuationMode, Assembly, EndEffector, Geometry
 from paraflex.mechanism.modal import ModalBody, ModalPoint
-from paraflex.mechanism.poses import Pose, approximate_poses
+from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
 from paraflex.mechanism.raparm import raparm_i
 from paraflex.mechanism.rows import chain_of_segments, four_bars_in_a_row
 from paraflex.mechanism.segments import (
@@ -135,6 +128,7 @@ __all__ = [
     "mode_of_motors",
     "mode_of_signs",
     "parse_mode",
+    "placed_poses",
     "proportional_segments",
     "raparm_i",
     "stiffness_proportional",

@@ -130,6 +130,4 @@ def _within(field: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(
-            error.problem, field=f"{field}.{error.field}", value=error.value, remedy=error.remedy
-        ) from error
+        raise error.within(field) from error

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING
 
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism.bodies import FlexibleBeam
 from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.joints import GROUND, PointRef, SlidingJoint, WeldJoint
 from paraflex.mechanism.loads import PointForce
+from paraflex.mechanism.members import Members
 from paraflex.mechanism.poses import approximate_poses
 from paraflex.mechanism.quantities import finite, known, not_negative, positive
 
-if TYPE_CHECKING:
-    from paraflex.mechanism.mechanism import Mechanism
 
-
-def check_mechanism(mechanism: Mechanism) -> None:
+def check_mechanism(mechanism: Members) -> None:
     """Run every check below.
 
     Raises
@@ -35,7 +32,7 @@ def check_mechanism(mechanism: Mechanism) -> None:
     check_loads(mechanism)
 
 
-def check_names(mechanism: Mechanism) -> None:
+def check_names(mechanism: Members) -> None:
     """Every body, joint, motor, assembly and mode has a name of its own, and "ground" is taken."""
     groups = {
         "body": mechanism.bodies,
@@ -63,13 +60,13 @@ def check_names(mechanism: Mechanism) -> None:
         raise InputError("a mechanism needs at least one body", field="body", remedy="add a beam or a rigid body")
 
 
-def check_ground(mechanism: Mechanism) -> None:
+def check_ground(mechanism: Members) -> None:
     """Ground points are finite."""
     for name, position in mechanism.ground.items():
         finite(position, f"ground.{name}")
 
 
-def check_references(mechanism: Mechanism) -> None:
+def check_references(mechanism: Members) -> None:
     """Joints, motors, end-effector, assemblies and modes name things that exist."""
     joints = {joint.name: joint for joint in mechanism.joints}
     motors = {motor.name: motor for motor in mechanism.motors}
@@ -139,7 +136,7 @@ def check_references(mechanism: Mechanism) -> None:
         approximate_poses(mechanism, assembly)
 
 
-def check_connected(mechanism: Mechanism) -> None:
+def check_connected(mechanism: Members) -> None:
     """Where there is a ground joint, joints lead from the ground to every body. Free-floating: all hang together."""
     neighbours: dict[str, set[str]] = {body.name: set() for body in mechanism.bodies} | {GROUND: set()}
     for joint in mechanism.joints:
@@ -161,7 +158,7 @@ def check_connected(mechanism: Mechanism) -> None:
         )
 
 
-def check_task(mechanism: Mechanism) -> None:
+def check_task(mechanism: Members) -> None:
     """The end-effector is a point of a body."""
     if mechanism.end_effector is None:
         return
@@ -176,7 +173,7 @@ def check_task(mechanism: Mechanism) -> None:
         )
 
 
-def check_loads(mechanism: Mechanism) -> None:
+def check_loads(mechanism: Members) -> None:
     """Loads are finite and act on bodies; so is gravity."""
     finite(mechanism.gravity, "gravity")
     for spring in mechanism.linear_springs:
@@ -206,7 +203,7 @@ def check_loads(mechanism: Mechanism) -> None:
             finite([load.torque], f"{field}.torque")
 
 
-def _known_point(mechanism: Mechanism, ref: PointRef, field: str) -> None:
+def _known_point(mechanism: Members, ref: PointRef, field: str) -> None:
     points = mechanism.points
     known(ref.body, points, field, "body")
     if ref.point not in points[ref.body]:

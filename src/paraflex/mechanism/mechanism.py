@@ -1,118 +1,22 @@
-"""The mechanism: bodies, joints, motors, end-effector, assemblies and actuation modes, by name."""
+"""The mechanism: its members, checked when it is made, and the variants of it that differ in its bodies."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from enum import Enum
-from functools import cached_property
-from typing import TypeVar
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as, refused
-from paraflex.errors import InputError, as_enum, suggestion
+from paraflex.arguments import checked_arguments, given_as, refused
+from paraflex.display import Shown
+from paraflex.errors import InputError, as_enum
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.joints import (
-    GROUND,
-    AxisJoint,
-    Joint,
-    Motor,
-    PointRef,
-    PrescribedAngle,
-)
-from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
-
-T = TypeVar("T")
-
-TASK_COORDINATES = ("x", "y", "angle")
-# The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
-_SIGNS = str.maketrans({"⊕": "+", "⊖": "-", "−": "-", "–": "-"})
-
-
-@dataclass(frozen=True)
-class EndEffector(CheckedFields):
-    """The point whose motion is prescribed, and which of its coordinates are the task: "x", "y", "angle", each once."""
-
-    _table = "end_effector"
-
-    _own = ("coordinates",)
-    point: PointRef
-    coordinates: tuple[str, ...] = ("x", "y")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        given = self.coordinates
-        listed = not isinstance(given, str) and all(name in TASK_COORDINATES for name in given)
-        if not (listed and given and len(set(given)) == len(given)):
-            raise InputError(
-                "not a set of task coordinates",
-                field="end_effector.coordinates",
-                value=given,
-                remedy='choose from "x", "y", "angle", each once',
-            )
-        object.__setattr__(self, "coordinates", tuple(given))
-
-    @classmethod
-    def taken_from(cls, given: object, field: str) -> EndEffector | None:
-        """That at a point; None of anything that is none."""
-        return cls(PointRef.parse(given, str(field))) if isinstance(given, str) else None
-
-
-@dataclass(frozen=True)
-class Assembly(CheckedFields):
-    """One way of putting the mechanism together, given by an approximate angle [rad] of each body.
-
-    The solver closes the loops from there; several assemblies of one mechanism differ in their elbows.
-
-    Attributes
-    ----------
-    name : str
-    angles : mapping of str to float
-        Of all bodies, or of those whose angles do not follow from points [rad].
-    points : mapping of PointRef to (x, y)
-        Approximate places in the ground frame [m].
-    """
-
-    _table = "assembly"
-
-    name: str
-    angles: Mapping[str, float]
-    points: Mapping[PointRef, tuple[float, float]] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class ActuationMode(CheckedFields):
-    """A set of active motors; the others turn freely."""
-
-    _table = "mode"
-
-    name: str
-    motors: tuple[str, ...]
-
-
-_MODE = 'a mode by its name, its signs such as "+-+-", or its motors such as "tau1,tau5"'
-given_as("an actuation mode", _MODE)(str | ActuationMode)
-
-
-class Geometry(Enum):
-    """How the shape of a beam follows from its flexible coordinates.
-
-    LINEAR
-        As in the paper: displacements linear in the coordinates. A bent beam does not get shorter; where axial forces
-        are large the answer is wrong, by how much depends on the reference condition.
-    SECOND_ORDER
-        With the shortening by bending, kept through inertia, joints and their Jacobians: right where axial forces are
-        large.
-    """
-
-    LINEAR = "linear"
-    SECOND_ORDER = "second-order"
+from paraflex.mechanism.members import Geometry, Members
 
 
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
-class Mechanism(CheckedFields):
+class Mechanism(Members, Shown):
     """A planar mechanism of rigid bodies and flexible beams. Checked when it is made.
 
     Attributes
@@ -148,30 +52,6 @@ class Mechanism(CheckedFields):
         Anything that does not fit together: see `mechanism.checks`.
     """
 
-    name: str
-    ground: Mapping[str, tuple[float, float]]
-    bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...]
-    motors: tuple[Motor, ...] = ()
-    prescribed: tuple[PrescribedAngle, ...] = ()
-    end_effector: EndEffector | None = None
-    assemblies: tuple[Assembly, ...] = ()
-    modes: tuple[ActuationMode, ...] = ()
-    springs: tuple[TorsionalSpring, ...] = ()
-    dampers: tuple[TorsionalDamper, ...] = ()
-    frictions: tuple[JointFriction, ...] = ()
-    linear_springs: tuple[LinearSpring, ...] = ()
-    loads: tuple[Load, ...] = ()
-    gravity: tuple[float, float] = (0.0, 0.0)
-    geometry: Geometry = Geometry.SECOND_ORDER
-    description: str = field(default="", compare=False)
-
-    @classmethod
-    def taken_from(cls, given: object, field: str = "mechanism") -> Mechanism | None:
-        """The mechanism of a model; None of anything else, a task or a run among them."""
-        paths, mechanism = getattr(given, "paths", None), getattr(given, "mechanism", None)
-        return mechanism if isinstance(paths, Mapping) and isinstance(mechanism, cls) else None
-
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
@@ -190,57 +70,6 @@ class Mechanism(CheckedFields):
         if taken is None:
             raise refused(given, "mechanism", "a mechanism", "give a Mechanism, or the model that paraflex.load reads")
         return taken
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        from paraflex.mechanism.html import mechanism_html
-
-        return mechanism_html(self)
-
-    def body(self, name: str) -> Body:
-        """The body of that name; an `InputError` if there is none."""
-        return self._by_name("body", name, self._bodies_by_name)
-
-    def joint(self, name: str) -> Joint:
-        """The joint of that name; an `InputError` if there is none."""
-        return self._by_name("joint", name, self._joints_by_name)
-
-    def _by_name(self, kind: str, name: str, members: Mapping[str, T]) -> T:
-        try:
-            return members[name]
-        except (KeyError, TypeError):
-            raise InputError(f"unknown {kind}", field=kind, value=name, remedy=suggestion(name, members)) from None
-
-    @cached_property
-    def _bodies_by_name(self) -> dict[str, Body]:
-        return {body.name: body for body in self.bodies}
-
-    @cached_property
-    def _joints_by_name(self) -> dict[str, Joint]:
-        return {joint.name: joint for joint in self.joints}
-
-    @cached_property
-    def points(self) -> Mapping[str, Mapping[str, object]]:
-        """Named points of every body, and of the ground by its name."""
-        return {GROUND: self.ground} | {body.name: body.points for body in self.bodies}
-
-    def motor_units(self) -> tuple[str, ...]:
-        """What each motor's torque is counted in: N m, or N where its joint slides."""
-        return tuple("N" if isinstance(self.joint(motor.joint), AxisJoint) else "N m" for motor in self.motors)
-
-    def assembly(self, name: str | None = None) -> Assembly:
-        """The assembly of that name, or the first.
-
-        Raises
-        ------
-        InputError
-            If there is none.
-        """
-        known = ", ".join(assembly.name for assembly in self.assemblies) or "none"
-        for assembly in self.assemblies:
-            if name is None or assembly.name == name:
-                return assembly
-        raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {known}")
 
     @checked_arguments()
     def with_bodies(self, bodies: Iterable[Body]) -> Mechanism:
@@ -344,54 +173,3 @@ class Mechanism(CheckedFields):
             Neither of the two.
         """
         return replace(self, geometry=as_enum(Geometry, geometry, "geometry"))
-
-
-@checked_arguments()
-def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:
-    """The mode a sign string names, one sign a motor: "+" active, "-" passive (Table 1).
-
-    Raises
-    ------
-    InputError
-        Any other character, or a wrong number of them.
-    """
-    plain = signs.translate(_SIGNS)
-    names = [motor.name for motor in mechanism.motors]
-    if len(plain) != len(names) or set(plain) - {"+", "-"}:
-        raise InputError(
-            "not an actuation mode",
-            field="mode",
-            value=signs,
-            remedy=f"write one + or - for each of the {len(names)} motors ({', '.join(names)}), or motor names",
-        )
-    return ActuationMode(plain, tuple(name for name, sign in zip(names, plain, strict=True) if sign == "+"))
-
-
-@checked_arguments()
-def mode_of_motors(mechanism: Mechanism, names: Sequence[str]) -> ActuationMode:
-    """The mode in which just these motors are active, named by its sign string.
-
-    Raises
-    ------
-    InputError
-        An unknown motor, or one named twice.
-    """
-    known = [motor.name for motor in mechanism.motors]
-    for name in names:
-        if name not in known:
-            raise InputError("unknown motor", field="mode", value=name, remedy=f"choose from {', '.join(known)}")
-    if len(set(names)) != len(names):
-        raise InputError("a motor is named twice", field="mode", value=",".join(names), remedy="name each once")
-    return mode_of_signs(mechanism, "".join("+" if name in names else "-" for name in known))
-
-
-@checked_arguments()
-def parse_mode(mechanism: Mechanism, text: str) -> ActuationMode:
-    """Read a mode: its name in the mechanism, signs ("+-+-"), or motor names ("tau1,tau5")."""
-    for mode in mechanism.modes:
-        if text == mode.name:
-            return mode
-    names = [part.strip() for part in text.split(",")]
-    if all(name in {motor.name for motor in mechanism.motors} for name in names):
-        return mode_of_motors(mechanism, names)
-    return mode_of_signs(mechanism, text.strip())

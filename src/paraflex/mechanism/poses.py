@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
-from typing import TYPE_CHECKING
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body, RigidBody
-from paraflex.mechanism.joints import GROUND, PointJoint, PointRef
+from paraflex.mechanism.joints import GROUND, AxisJoint, PointJoint, PointRef
+from paraflex.mechanism.members import Assembly, Members
 from paraflex.mechanism.modal import ModalBody
-
-if TYPE_CHECKING:
-    from paraflex.mechanism.mechanism import Assembly, Mechanism
 
 Place = tuple[float, float]
 # Points of a body nearer one another than this part of its size do not tell its angle.
@@ -30,7 +27,7 @@ class Pose:
 
 
 @checked_arguments()
-def approximate_poses(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:
+def approximate_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
     """The pose of every body, undeformed: its angle as given, or from two of its points that are known.
 
     Known are points on the ground, points the assembly gives, points joined to known ones, and all points of a body
@@ -43,7 +40,7 @@ def approximate_poses(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pos
     """
     poses: dict[str, Pose] = {name: Pose(angle) for name, angle in assembly.angles.items()}
     if assembly.points:
-        poses |= _from_points(mechanism, assembly)
+        poses |= _from_points(mechanism, assembly.angles, assembly.points)
     for body in mechanism.bodies:
         if body.name not in poses:
             remedy = "give its approximate angle in rad, or the places of two of its points" + _joined(
@@ -53,7 +50,21 @@ def approximate_poses(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pos
     return poses
 
 
-def _joined(mechanism: Mechanism, body: str) -> str:
+def placed_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
+    """Poses with places of the bodies whose places follow from their angles, whatever the angles do not close.
+
+    A slider that hangs on nothing else is where its axis begins.
+
+    Raises
+    ------
+    InputError
+        See `approximate_poses`.
+    """
+    angles = {name: pose.angle for name, pose in approximate_poses(mechanism, assembly).items()}
+    return _from_points(mechanism, angles, assembly.points, sliding=True)
+
+
+def _joined(mechanism: Members, body: str) -> str:
     """Of a body that fewer than two joints hold, which: one may be missing."""
     names = [joint.name for joint in mechanism.joints if body in (joint.a.body, joint.b.body)]
     if not names:
@@ -61,29 +72,35 @@ def _joined(mechanism: Mechanism, body: str) -> str:
     return f"; {names[0]} alone holds it: is a joint missing?" if len(names) == 1 else ""
 
 
-def _from_points(mechanism: Mechanism, assembly: Assembly) -> dict[str, Pose]:
-    """Poses with places; passes over joints and bodies until nothing more is known."""
+def _from_points(
+    mechanism: Members, angles: Mapping[str, float], points: Mapping[PointRef, Place], *, sliding: bool = False
+) -> dict[str, Pose]:
+    """Poses with places; passes over joints and bodies until nothing more is known, then over joints that slide."""
     poses: dict[str, Pose] = {}
     known: dict[PointRef, Place] = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()}
-    known |= assembly.points
-    before = -1
-    while before < len(known) + len(poses):
-        before = len(known) + len(poses)
-        for joint in mechanism.joints:
-            # Others do not tell where a point is.
-            if isinstance(joint, PointJoint):
-                for one, other in ((joint.a, joint.b), (joint.b, joint.a)):
-                    if one in known:
-                        known.setdefault(other, known[one])
-        for body in mechanism.bodies:
-            if body.name not in poses:
-                local = local_points(body)
-                found = {name: known[ref] for name in local if (ref := PointRef(body.name, name)) in known}
-                pose = _fit(local, found, assembly.angles.get(body.name))
-                if pose is not None:
-                    poses[body.name] = pose
-                    for name, place in local.items():
-                        known.setdefault(PointRef(body.name, name), _placed(pose, place))
+    known |= points
+    # Others do not tell where a point is.
+    for kinds in ((PointJoint,), (PointJoint, AxisJoint))[: 1 + sliding]:
+        before = -1
+        while before < len(known) + len(poses):
+            before = len(known) + len(poses)
+            for joint in mechanism.joints:
+                if isinstance(joint, kinds):
+                    for one, other in ((joint.a, joint.b), (joint.b, joint.a)):
+                        if one in known:
+                            known.setdefault(other, known[one])
+            for body in mechanism.bodies:
+                if body.name not in poses:
+                    local = local_points(body)
+                    found = {name: known[ref] for name in local if (ref := PointRef(body.name, name)) in known}
+                    if sliding:
+                        # What angles do not close is open at one joint.
+                        found = dict([*found.items()][:1])
+                    pose = _fit(local, found, angles.get(body.name))
+                    if pose is not None:
+                        poses[body.name] = pose
+                        for name, place in local.items():
+                            known.setdefault(PointRef(body.name, name), _placed(pose, place))
     return poses
 
 

@@ -9,7 +9,8 @@ from paraflex.errors import InputError
 from paraflex.mechanism.bodies import RigidBody
 from paraflex.mechanism.joints import PointRef, RevoluteJoint
 from paraflex.mechanism.loads import TorsionalSpring
-from paraflex.mechanism.mechanism import Assembly, Mechanism
+from paraflex.mechanism.mechanism import Mechanism
+from paraflex.mechanism.members import Assembly
 
 GRAVITY = (0.0, -9.81)
 

@@ -14,7 +14,8 @@ from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shape
 from paraflex.mechanism.damping import stiffness_proportional
 from paraflex.mechanism.joints import Joint, PointRef, RevoluteJoint, SlidingJoint
 from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
-from paraflex.mechanism.mechanism import Assembly, Mechanism
+from paraflex.mechanism.mechanism import Mechanism
+from paraflex.mechanism.members import Assembly
 from paraflex.mechanism.poses import approximate_poses
 
 # Points at which segments hang together.

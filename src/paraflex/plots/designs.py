@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.campaign import read_table
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit, metric_name
+from paraflex.results.metrics import METRICS
 
 Array = NDArray[np.float64]
 
-# Not what a design is chosen for: figures of the solver.
-_OF_THE_SOLVER = ("steps", "rejected", "newton_iterations", "constraint_position_max", "energy_balance_max")
+# Not what a design is chosen for.
+_OF_THE_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
 _FIRST, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
 # A metric that changes by less, as a share of its size, is the same for all designs.
 _SAME = 1e-9
@@ -117,7 +119,7 @@ class DesignTable:
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
-    """The table of a study, from `results.parquet` or from its parts.
+    """The table of a study, from the files that `tables_of` its folder names.
 
     Raises
     ------
@@ -125,10 +127,9 @@ def read_designs(files: Sequence[Path]) -> DesignTable:
         A file that cannot be read, or is none of ours.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        table = pa.concat_tables([pq.read_table(file) for file in files])
+        table = pa.concat_tables([read_table(file) for file in files])
     except (OSError, pa.ArrowException) as error:
         raise InputError(
             f"cannot be read ({str(error).splitlines()[0]})", field=str(files[0]),

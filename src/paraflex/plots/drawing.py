@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -18,18 +19,18 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import mode_label, three_digits
 from paraflex.plots.layout import page_width
 from paraflex.plots.scene import (
+    LOOKS,
     Limits,
     Scene,
-    block,
+    by_look,
     figure_of,
-    ground_of,
+    is_plate,
+    moving_marks,
     run_times,
     scale_bar,
     scene,
     select,
-    square,
-    support,
-    zigzag,
+    still_marks,
 )
 from paraflex.plots.themes import Theme, theme
 
@@ -42,105 +43,99 @@ _MM = 1.0 / 25.4
 _HEAD, _FOOT = 5.0, 5.5
 
 
+# Width of links [pt], and diameters of a body at a single place, a pin and the end-effector.
+_LINK, _DOT, _PIN, _TIP = 3.4, 7.0, 5.4, 4.2
+# Share of the picture; Agg draws nothing of a line without length, nor of one that it snaps to a single pixel.
+_SHORT = 2e-3
+
+
 class Sketch:
     """A scene on Matplotlib's axes: what stays is drawn once, what moves is put in place picture by picture."""
 
     def __init__(self, axes: Axes, shown: Scene, limits: Limits, look: Theme, width: float = 1.0) -> None:
         self.scene, self.look = shown, look
         self.axes, self.limits, self._width = axes, limits, width
-        axes.set_xlim(limits.left, limits.right)
-        axes.set_ylim(limits.bottom, limits.top)
-        axes.set_axis_off()
-        self._draw_ground()
+        for kind, marks in by_look(still_marks(shown, limits)).items():
+            ground = self._symbols(kind, 1.0)
+            ground.set_label(f"_{kind}")
+            ground.set_verts([mark.places[0] for mark in marks], closed=False)
         if shown.desired is not None:
-            axes.plot(*shown.desired.T, color=look.desired, linewidth=1.1 * width, linestyle=(0, (3, 2)), zorder=1.5)
-        self._moving: list[Any] = []
-        self._trail = axes.plot([], [], color=look.trail, linewidth=1.3 * width, zorder=2.2)[0]
-        names = list(shown.bodies)
-        colours = [look.link(i) for i in range(len(names))]
-        self._stiff = self._lines(look.faint, 1.2, 2.4)
-        self._plates = PolyCollection([], facecolors=[], edgecolors="none", zorder=2.6)
-        axes.add_collection(self._plates, autolim=False)
-        self._links = self._lines(colours, 3.4, 3.0)
-        self._dots = axes.scatter([], [], s=[], zorder=3.0)
-        self._springs = self._lines(look.earth, 1.1, 3.1)
-        self._blocks = self._polygons(look.ground, look.ink, 1.2, 3.4)
-        self._welds = self._polygons(look.ink, look.ink, 0.8, 3.6)
-        self._pins = axes.plot(
-            [], [], linestyle="none", marker="o", markersize=5.4 * width, color=look.ground,
-            markeredgecolor=look.ink, markeredgewidth=1.3 * width, zorder=4.0,
-        )[0]  # fmt: skip
-        self._head = axes.plot(
-            [], [], linestyle="none", marker="o", markersize=4.2 * width, color=look.trail,
-            markeredgecolor=look.ground, markeredgewidth=0.7 * width, zorder=4.2,
-        )[0]  # fmt: skip
-        self._colours = dict(zip(names, colours, strict=True))
-        self._sliding = [block(joint, limits) for joint in shown.joints if joint.slides]
-        self._welded = [square(joint.place, limits) for joint in shown.joints if joint.kind == "weld"]
-        # What slides and turns, turns on a pin; what is welded to a block does neither.
-        self._pinned = [joint.place for joint in shown.joints if joint.kind in ("pin", "slot", "sliding")]
-        self._zigzags = [zigzag(ends, limits) for ends in shown.springs]
+            self._line(look.desired, 1.1, 1.5, linestyle=(0, (3, 2))).set_data(*shown.desired.T)
+        self._colours = {name: look.link(i) for i, name in enumerate(shown.bodies)}
+        self._trail = self._line(look.trail, 1.3, 2.2)
+        self._stiff = self._polygons("none", look.faint, 1.2, 2.4)
+        self._plates = self._polygons("none", "none", 0.0, 2.6)
+        self.links = LineCollection([], zorder=3.0, capstyle="round", joinstyle="round")
+        self.links.set(clip_on=False, in_layout=False, snap=False)
+        axes.add_collection(self.links, autolim=False)
+        self._moving = by_look(moving_marks(shown, limits))
+        self.marks = {
+            kind: self._dots(look.ground, look.ink, _PIN, LOOKS[kind].width, 3.9)
+            if marks[0].places.shape[1] == 1
+            else self._symbols(kind, 3.1)
+            for kind, marks in self._moving.items()
+        }
+        self._head = self._dots(look.trail, look.ground, _TIP, 0.7, 4.2)
 
     @property
     def artists(self) -> list[Artist]:
         """What moves."""
-        moving = [
-            self._trail, self._stiff, self._plates, self._links, self._dots, self._springs, self._blocks, self._welds,
-            self._pins, self._head,
-        ]  # fmt: skip
+        moving = [self._trail, self._stiff, self._plates, self.links, *self.marks.values(), self._head]
         return sorted(moving, key=lambda artist: artist.get_zorder())
 
     def show(self, i: int) -> None:
         """Put everything where it is at the scene's time of that number."""
         bodies = {name: figure_of(places[i]) for name, places in self.scene.bodies.items()}
-        self._links.set_segments([places for places in bodies.values() if len(places) > 1])
-        self._links.set_color([self._colours[name] for name, places in bodies.items() if len(places) > 1])
+        # A body at a single place is a dot: a line so short that its round ends are all that is seen.
+        dot = [[0.0, 0.0], [_SHORT * self.limits.size, 0.0]]
+        self.links.set_segments([places if len(places) > 1 else places + dot for places in bodies.values()])
+        self.links.set_linewidth([self._width * (_LINK if len(one) > 1 else _DOT) for one in bodies.values()])
+        self.links.set_color(list(self._colours.values()))
         plates = {name: places for name, places in bodies.items() if is_plate(places)}
-        self._plates.set_verts(list(plates.values()))
-        self._plates.set_facecolor([(*_rgb(self._colours[name]), 0.25) for name in plates])
-        single = {name: places[0] for name, places in bodies.items() if len(places) == 1}
-        self._dots.set_offsets(np.array(list(single.values())).reshape(-1, 2))
-        self._dots.set_sizes([(7.0 * self._width) ** 2] * len(single))
-        self._dots.set_color([self._colours[name] for name in single])
-        self._stiff.set_segments([places[i] for places in self.scene.stiff.values() if places.shape[1] > 1])
-        self._springs.set_segments([places[i] for places in self._zigzags])
-        self._blocks.set_verts([places[i] for places in self._sliding])
-        self._welds.set_verts([places[i] for places in self._welded])
-        self._pins.set_data(*np.array([places[i] for places in self._pinned]).reshape(-1, 2).T)
+        self._plates.set_verts([*plates.values()], closed=False)
+        self._plates.set_facecolor([to_rgba(self._colours[name], 0.25) for name in plates])
+        self._stiff.set_verts([places[i] for places in self.scene.stiff.values()], closed=False)
+        for kind, artist in self.marks.items():
+            places = [mark.places[i] for mark in self._moving[kind]]
+            if isinstance(artist, Line2D):
+                artist.set_data(*np.concatenate(places).T)
+            else:
+                artist.set_verts(places, closed=False)
         if self.scene.trail is not None:
             self._trail.set_data(*self.scene.trail[: i + 1].T)
             self._head.set_data(*self.scene.trail[i : i + 1].T)
 
-    def _lines(self, colours: Any, width: float, zorder: float) -> LineCollection:
-        lines = LineCollection(
-            [], colors=colours, linewidths=width * self._width, zorder=zorder, capstyle="round", joinstyle="round"
-        )
-        self.axes.add_collection(lines, autolim=False)
-        return lines
+    def _line(self, colour: str, width: float, zorder: float, **look: Any) -> Line2D:
+        (line,) = self.axes.plot([], [], color=colour, linewidth=width * self._width, zorder=zorder, **look)
+        line.set(clip_on=False, in_layout=False)
+        return line
+
+    def _dots(self, face: str, edge: str, size: float, width: float, zorder: float) -> Line2D:
+        return self._line(
+            face, 0.0, zorder, linestyle="none", marker="o", markersize=size * self._width, markeredgecolor=edge,
+            markeredgewidth=width * self._width,
+        )  # fmt: skip
+
+    def _symbols(self, kind: str, zorder: float) -> PolyCollection:
+        fill, stroke, width = LOOKS[kind]
+        face = getattr(self.look, fill) if fill else "none"
+        return self._polygons(face, getattr(self.look, stroke), width, zorder + 0.1 * list(LOOKS).index(kind))
 
     def _polygons(self, face: str, edge: str, width: float, zorder: float) -> PolyCollection:
-        polygons = PolyCollection([], facecolors=face, edgecolors=edge, linewidths=width * self._width, zorder=zorder)
+        polygons = PolyCollection(
+            [], closed=False, facecolors=face, edgecolors=edge, linewidths=width * self._width, zorder=zorder,
+            capstyle="round", joinstyle="round", clip_on=False, in_layout=False,
+        )  # fmt: skip
         self.axes.add_collection(polygons, autolim=False)
         return polygons
 
-    def _draw_ground(self) -> None:
-        lines, strokes = [], []
-        for joint in self.scene.joints:
-            if joint.grounded:
-                outlines, hatches = ground_of(joint, self.limits)
-                lines += outlines
-                strokes += list(hatches)
-        for place in self.scene.anchors:
-            outlines, hatches = support(place, self.limits)
-            lines += outlines
-            strokes += list(hatches)
-        for segments, width in ((lines, 1.2), (strokes, 0.8)):
-            self._lines(self.look.earth, width, 1.0).set_segments(segments)
 
-
-def is_plate(places: Array) -> bool:
-    """Whether the stations (s, 2) that `figure_of` gives are a closed figure."""
-    return len(places) > 3 and bool(np.all(places[0] == places[-1]))
+def bare(axes: Axes, limits: Limits) -> Axes:
+    """Axes that are the picture alone."""
+    axes.set_xlim(limits.left, limits.right)
+    axes.set_ylim(limits.bottom, limits.top)
+    axes.set_axis_off()
+    return axes
 
 
 def draw_scale_bar(
@@ -210,8 +205,9 @@ def mechanism_drawing(
     aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), 0.4, 1.25))
     height = width * aspect + _HEAD + _FOOT
     figure = Figure(figsize=(width * _MM, height * _MM), facecolor=look.ground)
-    axes = figure.add_axes((0.0, _FOOT / height, 1.0, 1.0 - (_HEAD + _FOOT) / height))
-    sketch = Sketch(axes, shown, limits.fitted(1.0 / aspect), look, width=0.5)
+    limits = limits.fitted(1.0 / aspect)
+    axes = bare(figure.add_axes((0.0, _FOOT / height, 1.0, 1.0 - (_HEAD + _FOOT) / height)), limits)
+    sketch = Sketch(axes, shown, limits, look, width=0.5)
     sketch.show(len(shown.time) - 1)
     draw_scale_bar(figure, sketch.limits, look, (0.98, 1.5 / height), 6.5)
     told = [shown.mechanism, *([f"mode {mode_label(shown.mode)}"] if shown.mode else [])]
@@ -237,7 +233,3 @@ def name_links(figure: Figure, shown: Scene, look: Theme, size: float, y: float)
             x, y, name, color=look.link(i), fontsize=size, ha="center", va="center", fontweight="bold",
             parse_math=False,
         )  # fmt: skip
-
-
-def _rgb(colour: str) -> tuple[float, float, float]:
-    return tuple(int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))  # type: ignore[return-value]

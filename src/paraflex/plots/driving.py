@@ -17,7 +17,7 @@ from paraflex.plots.layout import ONE_COLUMN, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_curves, select_run, shade_rest
 from paraflex.plots.scales import mark_powers
 from paraflex.plots.style import BLUE, GREEN, VERMILLION
-from paraflex.results.metrics import headline, ranked_by_motion
+from paraflex.results.following import headline, ranked_by_motion
 
 # Height of a line of a list [mm].
 _LINE = 5.5

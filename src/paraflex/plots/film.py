@@ -3,29 +3,35 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
+from html import escape
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib import rc_context
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
 from paraflex.errors import InputError, OutputError
-from paraflex.plots.animated_svg import animated_svg
-from paraflex.plots.drawing import Sketch, caption, draw_scale_bar, name_links
+from paraflex.plots.drawing import Sketch, bare, caption, draw_scale_bar, name_links
 from paraflex.plots.labels import mode_label
-from paraflex.plots.scene import Scene, common_limits, run_times, scene, select
+from paraflex.plots.scene import Scene, at_times, common_limits, run_times, scene, select
 from paraflex.plots.style import journal_style
+from paraflex.plots.svg import Pen, animated, moving_elements
 from paraflex.plots.themes import Theme, theme
+from paraflex.writing import whole_file, whole_folder
 
 FORMATS = (".mp4", ".gif", ".svg", ".png")
 # A film of less is not worth looking at, one of more tires; speeds to choose from [s].
@@ -38,6 +44,9 @@ _SMALLEST, _LARGEST = 64, 7680
 # Parts of the picture's height above and below the drawing.
 _HEAD, _FOOT = 0.105, 0.11
 _GIF_COLOURS, _NEAR = 128, 12
+# Key frames a second of an SVG; browsers go on evenly between them.
+_KEYS, _MOST_KEYS = 25.0, 400
+_ELSEWHERE = "choose another place"
 
 
 @dataclass(frozen=True)
@@ -173,25 +182,23 @@ def write_film(
     encoder = find_encoder() if kind == ".mp4" else ""
     film = plan_film(data, modes, options, kind)
     tell = on_progress or (lambda done, total: None)
-    try:
-        with _whole(file, folder=kind == "") as unfinished:
-            if kind == ".svg":
-                unfinished.write_text(animated_svg(film.scenes, film.size, film.look, film.speed), encoding="utf-8")
-                tell(len(film.time), len(film.time))
-            elif kind == ".mp4":
-                _write_mp4(film, unfinished, encoder, tell)
-            elif kind == ".gif":
-                _write_gif(film, unfinished, tell)
-            elif kind == ".png":
-                still = next(_frames(film, len(film.time) - 1))
-                Image.fromarray(still).convert("RGB").save(unfinished, format="PNG")
-                tell(1, 1)
-            else:
-                _write_pictures(film, unfinished, tell)
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written ({error.strerror or error})", field=str(file), remedy="choose another place"
-        ) from error
+    whole = whole_file(file, remedy=_ELSEWHERE)
+    if kind == "":
+        whole = whole_folder(file, replaced="frame_*.png", remedy=_ELSEWHERE)
+    with whole as unfinished:
+        if kind == ".svg":
+            unfinished.write_text(_animated_svg(film), encoding="utf-8")
+            tell(len(film.time), len(film.time))
+        elif kind == ".mp4":
+            _write_mp4(film, unfinished, encoder, tell)
+        elif kind == ".gif":
+            _write_gif(film, unfinished, tell)
+        elif kind == ".png":
+            still = next(_frames(film, len(film.time) - 1))
+            Image.fromarray(still).convert("RGB").save(unfinished, format="PNG")
+            tell(1, 1)
+        else:
+            _write_pictures(film, unfinished, tell)
     return film
 
 
@@ -316,7 +323,7 @@ def _stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
     look = film.look
     for k, shown in enumerate(film.scenes):
         axes = figure.add_axes((k / count, _FOOT, 1.0 / count, 1.0 - _HEAD - _FOOT))
-        sketches.append(Sketch(axes, shown, limits, look))
+        sketches.append(Sketch(bare(axes, limits), shown, limits, look))
         middle = (k + 0.5) / count
         if count > 1 or shown.mode:
             label = f"mode {mode_label(shown.mode)}"
@@ -337,33 +344,45 @@ def _stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
 # --- Files -----------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def _whole(path: Path, *, folder: bool) -> Iterator[Path]:
-    """A file or folder to write to that takes the place of another when it is whole."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + ".part")
-    _remove(unfinished)
-    if folder:
-        unfinished.mkdir()
-    try:
-        yield unfinished
-        if folder and path.is_dir():
-            for old in path.glob("frame_*.png"):
-                old.unlink()
-            for new in sorted(unfinished.iterdir()):
-                new.replace(path / new.name)
-            unfinished.rmdir()
-        else:
-            unfinished.replace(path)
-    finally:
-        _remove(unfinished)
+def _animated_svg(film: Film) -> str:
+    """One file that plays by itself in browsers: what stays from Matplotlib, what moves as values in time (SMIL)."""
+    (width, height), time = film.size, film.time
+    seconds = max(float(time[-1] - time[0]) / film.speed, 1e-3)
+    count = min(time.size, _MOST_KEYS, round(seconds * _KEYS) + 1)
+    keys = np.unique(np.linspace(0, time.size - 1, count).round()).astype(int)
+    with journal_style(), rc_context({"svg.fonttype": "none", "font.family": ["DejaVu Sans", "sans-serif"]}):
+        figure, sketches, texts = _stage(film)
+        texts[-1].set_text(f"t = {time[0]:.4g} to {clock(time[-1], time[-1])[4:]}")
+        still = _still_svg(figure, [artist for sketch in sketches for artist in sketch.artists])
+    moving = []
+    for shown, sketch in zip(film.scenes, sketches, strict=True):
+        box = sketch.axes.get_position()
+        scale = box.width * width / (sketch.limits.right - sketch.limits.left)
+        corner = box.x0 * width - scale * sketch.limits.left, (1.0 - box.y1) * height + scale * sketch.limits.top
+        pen = Pen(corner, scale, min(box.width * width, box.height * height) / 480.0, film.look, seconds)
+        moving += moving_elements(at_times(shown, keys), sketch.limits, pen)
+    named = ", ".join(mode_label(shown.mode) for shown in film.scenes if shown.mode)
+    title = f"{film.scenes[0].mechanism}{', mode ' + named if named else ''}: {caption(film.scenes[0])}"
+    # SMIL cannot count: a line fills as time passes.
+    line = (
+        f'<path d="M0 {height - 1.5}H{width}" stroke="{film.look.trail}" stroke-width="3" stroke-dasharray="{width}">'
+    )
+    view = f'viewBox="0 0 {width} {height}" width="{width}" height="{height}"'
+    return "\n".join([
+        f'<svg xmlns="http://www.w3.org/2000/svg" {view} style="max-width:100%;max-height:100vh" role="img">',
+        f"<title>{escape(title)}</title>", f'<svg width="{width}" height="{height}" {still}', *moving,
+        line + animated("stroke-dashoffset", [f"{width}", "0"], seconds) + "</path>", "</svg>", "",
+    ])  # fmt: skip
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
+def _still_svg(figure: Figure, moving: list[Artist]) -> str:
+    """A figure without what moves as SVG, from its `viewBox` on; its rules of style, which hold beyond it, left out."""
+    for artist in moving:
+        artist.set_visible(False)
+    out = StringIO()
+    figure.savefig(out, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    text = re.sub(r"<defs>\s*<style.*?</defs>", "", out.getvalue(), flags=re.DOTALL)
+    return text[text.index("viewBox=") :]
 
 
 def _write_pictures(film: Film, folder: Path, tell: Callable[[int, int], None]) -> None:
@@ -395,7 +414,7 @@ def _write_gif(film: Film, file: Path, tell: Callable[[int, int], None]) -> None
 def _palette(film: Film) -> Image.Image:
     """Colours of the first, a middle and the last picture."""
     chosen = np.array([0, len(film.time) // 2, len(film.time) - 1])
-    scenes = tuple(_at(shown, chosen) for shown in film.scenes)
+    scenes = tuple(at_times(shown, chosen) for shown in film.scenes)
     few = Film(scenes, film.size, film.fps, film.speed, film.look)
     palette = Image.fromarray(np.concatenate(list(_frames(few)))).convert("RGB").quantize(_GIF_COLOURS)
     # The ground is exactly what it is: nothing near it may stand in for it.
@@ -404,21 +423,6 @@ def _palette(film: Film) -> Image.Image:
     colours[np.max(np.abs(colours - ground), axis=1) < _NEAR] = ground
     palette.putpalette(colours.ravel().tolist())
     return palette
-
-
-def _at(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
-    """The same scene at a few of its times."""
-    return replace(
-        shown,
-        time=shown.time[chosen],
-        bodies={name: places[chosen] for name, places in shown.bodies.items()},
-        stiff={name: places[chosen] for name, places in shown.stiff.items()},
-        joints=tuple(
-            replace(joint, place=joint.place[chosen], direction=joint.direction[chosen]) for joint in shown.joints
-        ),
-        springs=tuple(ends[chosen] for ends in shown.springs),
-        trail=None if shown.trail is None else shown.trail[chosen],
-    )
 
 
 def _write_mp4(film: Film, file: Path, encoder: str, tell: Callable[[int, int], None]) -> None:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
+from paraflex.plots.catalogue import CATALOGUE
 from paraflex.plots.style import journal_style
 from paraflex.results.kinds import kind_of, wrong_kind
 
@@ -79,8 +80,6 @@ def _check_kind(data: xr.Dataset, figure: str) -> None:
 @cache
 def _kinds() -> dict[str, dict[str, str]]:
     """Of every figure the kinds of results that it can be drawn of, each with what its function takes."""
-    from paraflex.plots.catalogue import CATALOGUE
-
     found: dict[str, dict[str, str]] = {}
     for kind, figures in CATALOGUE.items():
         for figure in figures:

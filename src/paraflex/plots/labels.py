@@ -1,4 +1,4 @@
-"""Text and units of the figures: symbols of names, signs of modes, prefixes that suit a range."""
+"""Text and units of figures and pages: symbols of names, signs of modes, prefixes that suit a range."""
 
 from __future__ import annotations
 
@@ -9,8 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from paraflex.results.metrics import metric_label
+
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_GREEK = ("alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "tau", "omega")
+_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_GREEK = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ",
+    "omega": "ω",
+}  # fmt: skip
 
 
 class Quantity(NamedTuple):
@@ -64,31 +70,9 @@ def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", s
     return text if unit == "1" else f"{text} [{unit}]"
 
 
-# What a metric is called in print; others go by their own names.
-METRIC_NAMES = {
-    "tracking_rms_motion": "RMS error in the motion",
-    "tracking_max_motion": "largest error in the motion",
-    "tracking_rms_after": "RMS error after the motion",
-    "tracking_max_after": "largest error after the motion",
-    "tracking_rms": "RMS tracking error",
-    "tracking_max": "largest tracking error",
-    "residual_vibration": "residual vibration",
-    "drift_speed": "drift after the motion",
-    "deflection_max": "largest deflection",
-    "peak_torque_max": "peak torque",
-    "rms_torque_norm": "RMS torque",
-    "motor_energy": "energy of the motors",
-    "strain_energy_max": "largest strain energy",
-    "kinetic_energy_max": "largest kinetic energy",
-    "total_mass": "mass",
-    "actuation_condition_max": "largest condition number",
-}
-
-
 def metric_name(metric: str) -> str:
     """What a metric is called in print: "RMS tracking error"; "peak torque of tau1" of one motor's."""
-    name, dot, motor = metric.partition(".")
-    return plain(METRIC_NAMES.get(name, name.replace("_", " ")) + (f" of {motor}" if dot else ""))
+    return plain(metric_label(metric))
 
 
 def effort_label(units: str) -> str:
@@ -112,8 +96,8 @@ _PREFIXES = {
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """The unit for lengths ("m") or angles ("rad") that shows the largest of `values` with few leading zeros."""
-    largest, choices = peak(values), _PREFIXES[unit]
+    """The unit that shows the largest of lengths ("m") or angles ("rad") with few leading zeros; any other as it is."""
+    largest, choices = peak(values), _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
     if largest == 0.0:
         return choices[0]
     return next((choice for choice in choices if largest * choice.factor >= 0.1), choices[-1])
@@ -135,7 +119,12 @@ def power_of_ten(value: float) -> str:
     exponent = round(math.log10(value)) if value > 0.0 else 0
     if not math.isclose(value, 10.0**exponent, rel_tol=1e-9):
         return f"{value:g}"
-    return "10" + str(exponent).translate(_RAISED)
+    return f"10{raised(exponent)}"
+
+
+def raised(exponent: int) -> str:
+    """An exponent as print shows it: "⁻⁵"."""
+    return str(exponent).translate(_RAISED)
 
 
 def logarithmic_number(value: float) -> str:
@@ -144,19 +133,30 @@ def logarithmic_number(value: float) -> str:
         return f"{value:g}"
     exponent = math.floor(math.log10(value) + 1e-9)
     digits = f"{value / 10.0**exponent:.3g}"
-    return ("" if digits == "1" else f"{digits}·") + "10" + str(exponent).translate(_RAISED)
+    return ("" if digits == "1" else f"{digits}·") + f"10{raised(exponent)}"
 
 
 def symbol(name: str) -> str:
-    """A name as print shows it: "A1" and "tau1" as symbols with a subscript, "link1" as "link 1", others unchanged."""
-    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
-    if parts is None:
-        return name.replace("$", r"\$")
-    letters, number = parts.groups()
+    """A name as figures show it: "A1" and "tau1" as symbols with a subscript, "link1" as "link 1", others unchanged."""
+    letters, number = _parted(name)
+    if len(letters) != 1 and letters not in _GREEK:
+        return plain(text_symbol(name))
+    letter = letters if len(letters) == 1 else rf"\{letters}"
+    return rf"${letter}_{{{number}}}$" if number else f"${letter}$"
+
+
+def text_symbol(name: str) -> str:
+    """A name as pages show it: "τ₁" for "tau1", "A₁" for "A1", "link 1" for "link1", others unchanged."""
+    letters, number = _parted(name)
     if len(letters) == 1 or letters in _GREEK:
-        letter = letters if len(letters) == 1 else rf"\{letters}"
-        return rf"${letter}_{{{number}}}$" if number else f"${letter}$"
-    return f"{letters} {number}".rstrip()
+        return _GREEK.get(letters, letters) + number.translate(_LOWERED)
+    return f"{letters} {number}".rstrip() if letters else name
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """Letters and number of a name; none where it is of another kind."""
+    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
+    return (parts[1], parts[2]) if parts else ("", "")
 
 
 def plain(name: str) -> str:

@@ -2,47 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.path import Path
 from numpy.typing import NDArray
 
+from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import symbol
 from paraflex.plots.runs import samples
+from paraflex.plots.scene import DrawnJoint, Scene, limits_of, still_marks
 from paraflex.plots.style import BLACK
+from paraflex.plots.themes import theme
+from paraflex.results.outlines import figure_order
 
 Points = NDArray[np.float64]
 
-LINK: dict[str, Any] = {"color": "0.45", "linewidth": 2.2, "solid_capstyle": "round", "zorder": 1.5}
-JOINT: dict[str, Any] = {
-    "linestyle": "none",
-    "marker": "o",
-    "markersize": 4.0,
-    "markerfacecolor": "white",
-    "markeredgecolor": BLACK,
-    "markeredgewidth": 0.8,
-    "zorder": 3.0,
-}
 POINT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
-# A triangle on a base line, hanging from the pivot.
-_SUPPORT = Path(
-    [(0.0, 0.0), (-0.7, -1.2), (0.7, -1.2), (0.0, 0.0), (-1.1, -1.2), (1.1, -1.2)],
-    [Path.MOVETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY, Path.MOVETO, Path.LINETO],
-)
-GROUND: dict[str, Any] = {
-    "linestyle": "none",
-    "marker": _SUPPORT,
-    "markersize": 16.0,
-    "markerfacecolor": "0.8",
-    "markeredgecolor": BLACK,
-    "markeredgewidth": 0.6,
-    "zorder": 2.0,
-}
-IN_LEGEND: dict[str, Any] = {**GROUND, "markersize": 9.0}  # As high as one of its lines.
+_IN_LEGEND: dict[str, Any] = {"linestyle": "none", "marker": "^", "markerfacecolor": "none", "markeredgecolor": BLACK}
+_LOOK = replace(theme("light"), ink=BLACK, earth=BLACK, links=("#737373",))
+# Of lines, beside those of a film.
+_WIDTH = 0.68
 
 # Points this near to each other, or moving this little, share of the mechanism's size: constraints hold no better.
 _SAME = 1e-4
@@ -65,46 +48,46 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
         return
     places = 1e3 * run["point_position"].transpose("time", "point", "axis").values[: samples(run)]
     names = [str(name) for name in run["point"].values]
-    size = float(np.ptp(places[0], axis=0).max())
+    start, size = places[0], float(np.ptp(places[0], axis=0).max())
+    moves = np.ptp(places, axis=0).max(axis=1)
+    fixed = moves <= _SAME * size if moves.max() > _SAME * size else np.zeros(len(names), dtype=bool)
+    groups = _coincident(start, size)
+    joined = [group[0] for group in groups if len(group) > 1 or fixed[group[0]]]
+    joints = [DrawnJoint(names[k], "pin", bool(fixed[k]), start[None, k], np.full(1, np.nan)) for k in joined]
+    shown = _scene(start, names, tuple(joints))
+    sketch = Sketch(axes, shown, shown.limits, _LOOK, _WIDTH)
+    sketch.show(0)
+    sketch.links.set_label("links")
+    if joints:
+        sketch.marks["pin"].set_label("joints")
+    grounds = [mark.places[0] for mark in still_marks(shown, shown.limits)]
+    if grounds:
+        axes.plot([], [], label="ground", **_IN_LEGEND)
+    others = [group[0] for group in groups if group[0] not in joined]
+    if others:
+        axes.plot(*start[others].T, label="other points", **POINT)
+    taken = np.vstack([*map(_sampled, shown.bodies.values()), *grounds, clear_of])
+    taken = taken[np.isfinite(taken).all(axis=1)]
+    axes.update_datalim(np.vstack([start, taken]))
+    _name_points(axes, start, groups, names, taken)
+
+
+def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:
+    """Bodies as figures of their points, at one time."""
     bodies: dict[str, list[int]] = {}
     for k, name in enumerate(names):
         bodies.setdefault(name.rpartition(".")[0], []).append(k)
-
-    outlines = [_outline(places[0, ks]) for ks in bodies.values()]
-    for k, outline in enumerate(outlines):
-        axes.plot(*outline.T, label="links" if k == 0 else None, **LINK)
-    moves = np.ptp(places, axis=0).max(axis=1)
-    fixed = moves <= _SAME * size if moves.max() > _SAME * size else np.zeros(len(names), dtype=bool)
-    taken = [*map(_sampled, outlines), clear_of]
-    if fixed.any():
-        axes.plot(*places[0, fixed].T, **GROUND)
-        axes.plot([], [], label="ground", **IN_LEGEND)
-        axes.update_datalim(places[0, fixed] - [0.0, 0.045 * size])
-        taken += [places[0, fixed] - [0.0, depth * size] for depth in (0.02, 0.04)]
-    groups = _coincident(places[0], size)
-    joints = [group[0] for group in groups if len(group) > 1 or fixed[group[0]]]
-    others = [group[0] for group in groups if group[0] not in joints]
-    if joints:
-        axes.plot(*places[0, joints].T, label="joints", **JOINT)
-    if others:
-        axes.plot(*places[0, others].T, label="other points", **POINT)
-    _name_points(axes, places[0], groups, names, np.vstack(taken))
-
-
-def _outline(points: Points) -> Points:
-    """A link's line through its points, in order along it; a closed line round points that are not on one line."""
-    centred = points - points.mean(axis=0)
-    _, spread, directions = np.linalg.svd(centred)
-    if len(points) < 3 or spread[1] <= 0.02 * spread[0]:
-        return points[np.argsort(centred @ directions[0])]
-    round_centre = points[np.argsort(np.arctan2(centred[:, 1], centred[:, 0]))]
-    return np.vstack([round_centre, round_centre[:1]])
+    outlines = {name: points[None, ks][:, figure_order(points[ks])] for name, ks in bodies.items()}
+    return Scene(
+        mechanism="", mode="", time=np.zeros(1), magnified=1.0, bodies=outlines, stiff={}, joints=joints, springs={},
+        anchors=(), followed=None, trail=None, desired=None, reached=0.0, limits=limits_of(points),
+    )  # fmt: skip
 
 
 def _sampled(outline: Points) -> Points:
-    """Points along a line, close to one another."""
+    """Points along a line (1, s, 2), close to one another."""
     share = np.linspace(0.0, 1.0, 25)[:, None]
-    return np.vstack([a + share * (b - a) for a, b in pairwise(outline)] + [outline[:1]])
+    return np.vstack([a + share * (b - a) for a, b in pairwise(outline[0])] + [outline[0, :1]])
 
 
 def _coincident(points: Points, size: float) -> list[list[int]]:

@@ -15,7 +15,7 @@ from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_l
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.runs import draw_actual, samples, select_run, shade_rest
 from paraflex.plots.style import BLUE, VERMILLION, ZERO, keep_flat, look_of
-from paraflex.results.metrics import headline, ranked_by_motion
+from paraflex.results.following import headline, ranked_by_motion
 
 # Of a mode and the names of its passive motors, as many as fit above a panel.
 _TITLE_LETTERS = 22

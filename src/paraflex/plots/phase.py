@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, symbol
 from paraflex.plots.layout import is_narrow, lay_out, panels
-from paraflex.plots.runs import START, draw_actual, draw_desired, one_run, select_run
+from paraflex.plots.runs import END_EFFECTOR, START, draw_actual, draw_desired, one_run, select_run
 from paraflex.plots.style import BLUE, keep_flat
 
 # Bodies that have a panel.
@@ -31,15 +31,10 @@ def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
     InputError
         No such mode.
     """
-    quantities = (
-        ("end_effector", "position", 1e3),
-        ("end_effector_velocity", "velocity", 1.0),
-        ("end_effector_acceleration", "acceleration", 1.0),
-    )
     run = select_run(data, mode)
     directions = [str(axis) for axis in data["axis"].values]
     figure, axes = panels(2, len(directions))
-    for row, (across, up) in zip(axes, (quantities[:2], quantities[1:]), strict=True):
+    for row, (across, up) in zip(axes, (END_EFFECTOR[:2], END_EFFECTOR[1:]), strict=True):
         for panel, axis in zip(row, directions, strict=True):
             x, y = (factor * run[name].sel(axis=axis) for name, _, factor in (across, up))
             x_desired, y_desired = (factor * run[f"{name}_desired"].sel(axis=axis) for name, _, factor in (across, up))

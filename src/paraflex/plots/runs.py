@@ -39,6 +39,12 @@ START: dict[str, Any] = {
     "zorder": 4.0,
     "label": "start",
 }
+# Variables of the end-effector's motion, what they are, and what their values are multiplied by.
+END_EFFECTOR = (
+    ("end_effector", "position", 1e3),
+    ("end_effector_velocity", "velocity", 1.0),
+    ("end_effector_acceleration", "acceleration", 1.0),
+)
 
 
 def select_run(data: xr.Dataset, mode: str) -> xr.Dataset:

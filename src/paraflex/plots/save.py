@@ -10,12 +10,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.arguments import checked_arguments
-from paraflex.errors import InputError, OutputError, suggestion
-from paraflex.plots.catalogue import Drawing, drawings, figures_of
+from paraflex.errors import InputError, suggestion
 from paraflex.plots.layout import column_width
+from paraflex.plots.planned import PlannedFigure, drawings, figures_of
 from paraflex.plots.sources import Source
 from paraflex.plots.style import journal_style
 from paraflex.results.kinds import check_kind
+from paraflex.writing import whole_file
 
 # Files that do not depend on when they were written.
 _METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -146,7 +147,7 @@ def check_formats(formats: Sequence[str]) -> None:
 
 
 def write_figures(
-    drawn: Sequence[Drawing],
+    drawn: Sequence[PlannedFigure],
     folder: Path,
     formats: Sequence[str] = ("pdf",),
     *,
@@ -158,7 +159,7 @@ def write_figures(
 
     Parameters
     ----------
-    drawn : sequence of Drawing
+    drawn : sequence of PlannedFigure
     folder : Path
         Made if it is not there.
     formats : sequence of str
@@ -219,18 +220,8 @@ def _write(figure: Figure, files: Iterable[Path], dpi: float | None = None) -> l
     written = []
     for path in files:
         suffix = path.suffix[1:]
-        unfinished = path.with_name(path.name + ".part")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with journal_style():
-                figure.savefig(
-                    unfinished, format=suffix, metadata=_METADATA[suffix], dpi="figure" if dpi is None else dpi
-                )
-            unfinished.replace(path)
-        except OSError as error:
-            raise OutputError(
-                f"cannot be written ({error.strerror or error})", field=str(path.parent), remedy="choose another folder"
-            ) from error
+        with whole_file(path, field=str(path.parent)) as unfinished, journal_style():
+            figure.savefig(unfinished, format=suffix, metadata=_METADATA[suffix], dpi="figure" if dpi is None else dpi)
         written.append(path)
     return written
 

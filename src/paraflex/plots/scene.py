@@ -1,8 +1,12 @@
-"""What a picture of a mechanism consists of, in metres: links, joints, ground, springs and paths at given times."""
+"""The one description of a drawn mechanism, in metres: links, joints, ground, springs and paths at given times.
+
+Matplotlib (`plots/drawing.py`), files of SVG (`plots/svg.py`) and the player of the reports (`report/film.py`) draw it.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +25,10 @@ _MARGIN = 0.07
 _TEETH = 14
 # Shares of the width that a scale bar may take.
 _BAR = 0.28
-# A joint that moves by less than this part of the picture stays where it is.
-_STILL = 1e-3
+# A joint that moves by less than this part of the picture stays where it is, a point by less than this [m].
+_STILL, _HELD = 1e-3, 1e-6
+# Shares of all places in percent between which a run is that does not come apart.
+_MOST = (0.2, 99.8)
 
 
 class Limits(NamedTuple):
@@ -45,8 +51,35 @@ class Limits(NamedTuple):
         return Limits(self.left - wide, self.right + wide, self.bottom - high, self.top + high)
 
 
+class Look(NamedTuple):
+    """How symbols are drawn: colours of a theme by what they are for, empty for none, and a width of lines."""
+
+    fill: str
+    stroke: str
+    width: float
+
+
+# Symbols from the back to the front; links are drawn before the first that moves.
+LOOKS = {
+    "ground": Look("", "earth", 1.2),
+    "hatching": Look("", "earth", 0.8),
+    "spring": Look("", "earth", 1.1),
+    "block": Look("ground", "ink", 1.2),
+    "weld": Look("ink", "ink", 0.8),
+    "pin": Look("ground", "ink", 1.3),
+}
+
+
+class Mark(NamedTuple):
+    """A symbol of one of the `LOOKS` at f times: a line (f, n, 2), with gaps where it is NaN, or a dot (f, 1, 2)."""
+
+    look: str
+    name: str
+    places: Array
+
+
 @dataclass(frozen=True)
-class Joint:
+class DrawnJoint:
     """A joint at the f times of a scene: its kind, whether it is on the ground, places (f, 2), directions (f,)."""
 
     name: str
@@ -77,11 +110,13 @@ class Scene:
         Deflections magnified [m].
     stiff : mapping of str to (f, s, 2) array
         The same drawn stiff between joints; empty where nothing is magnified.
-    joints : tuple of Joint
-    springs : tuple of (f, 2, 2) arrays
+    joints : tuple of DrawnJoint
+    springs : mapping of str to (f, 2, 2) array
         Both ends.
     anchors : tuple of (2,) arrays
         Where springs hang on the ground.
+    followed : int or None
+        The station whose trail is drawn, of all bodies'.
     trail : (f, 2) array or None
         Of the end-effector.
     desired : (d, 2) array or None
@@ -97,9 +132,10 @@ class Scene:
     magnified: float
     bodies: dict[str, Array]
     stiff: dict[str, Array]
-    joints: tuple[Joint, ...]
-    springs: tuple[Array, ...]
+    joints: tuple[DrawnJoint, ...]
+    springs: dict[str, Array]
     anchors: tuple[Array, ...]
+    followed: int | None
     trail: Array | None
     desired: Array | None
     reached: float
@@ -180,46 +216,42 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     """
     if not (np.isfinite(magnify) and magnify >= 0.0):
         raise InputError("must not be negative", field="magnify", value=magnify, remedy="1 is the truth, 50 shows more")
-    shape, base = run["shape"].values.astype(float), run["shape_base"].values.astype(float)
-    kept = np.isfinite(shape).all(axis=(1, 2))
+    kept = np.isfinite(run["shape"].values).any(axis=(1, 2))
     samples = int(np.argmin(kept)) if not kept.all() else kept.size
     if not samples:
         raise InputError("this run has no sample", field="results", remedy="choose another mode")
-    time = run["time"].values[:samples]
-    drawn = base + magnify * (shape - base)
-    at = _Sampler(time, np.asarray(times, dtype=float))
-    owners = run["station_body"].values
-    bodies = {str(name): drawn[:samples, owners == name] for name in dict.fromkeys(owners.tolist())}
-    stiff = {} if magnify == 1.0 else {name: base[:samples, owners == name] for name in bodies}
-    joints = tuple(
-        Joint(
-            str(name),
-            str(run["joint_kind"].values[i]),
-            bool(run["joint_grounded"].values[i]),
-            at(run["joint_position"].values[:samples, i].astype(float)),
-            at(run["joint_direction"].values[:samples, i].astype(float)),
-        )
-        for i, name in enumerate(run["joint"].values)
-    )
-    trail = _trail(run, drawn)
     desired = run["end_effector_desired"].values if "end_effector_desired" in run else None
-    joint_places = run["joint_position"].values[:samples].reshape(-1, 2)
-    seen = [drawn[:samples].reshape(-1, 2), joint_places, *([] if desired is None else [desired]), *_anchors(run)]
-    seen = [places.reshape(-1, 2) for places in seen]
+    run = run.isel(time=slice(samples))
+    shape, base = run["shape"].values.astype(float), run["shape_base"].values.astype(float)
+    drawn = shape if magnify == 1.0 else base + magnify * (shape - base)
+    time, times = run["time"].values, np.asarray(times, dtype=float)
+    at = _Sampler(time, times)
+    owners = run["station_body"].values
+    bodies = {str(name): owners == name for name in dict.fromkeys(owners.tolist())}
+    places, directions = run["joint_position"].values.astype(float), run["joint_direction"].values.astype(float)
+    joints = tuple(
+        DrawnJoint(str(name), str(kind), bool(grounded), at(places[:, i]), at(directions[:, i]))
+        for i, (name, kind, grounded) in enumerate(
+            zip(run["joint"].values, run["joint_kind"].values, run["joint_grounded"].values, strict=True)
+        )
+    )
+    springs, followed = _springs(run, drawn), followed_station(run)
+    seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
     return Scene(
         mechanism=str(run.attrs["mechanism"]),
         mode=str(run["mode"].item()) if "mode" in run.coords else "",
-        time=np.asarray(times, dtype=float),
+        time=times,
         magnified=magnify,
-        bodies={name: at(places) for name, places in bodies.items()},
-        stiff={name: at(places) for name, places in stiff.items()},
+        bodies={name: at(drawn[:, own]) for name, own in bodies.items()},
+        stiff={} if magnify == 1.0 else {name: at(figure_of(base[:, own])) for name, own in bodies.items()},
         joints=joints,
-        springs=_springs(run, drawn[:samples], at),
+        springs={name: at(ends) for name, ends in springs.items()},
         anchors=_anchors(run),
-        trail=None if trail is None else at(trail[:samples]),
+        followed=followed,
+        trail=None if followed is None else at(drawn[:, followed]),
         desired=desired,
         reached=float(time[-1]),
-        limits=_limits(_with_rails(np.concatenate(seen), joints)),
+        limits=limits_of(_with_rails(np.concatenate([one.reshape(-1, 2) for one in seen]), joints)),
     )
 
 
@@ -237,13 +269,21 @@ class _Sampler:
         return (1.0 - part) * values[self.first] + part * values[self.last]
 
 
-def _trail(run: xr.Dataset, drawn: Array) -> Array | None:
-    """Where the end-effector is drawn; of a single body without one, its last station."""
+def followed_station(run: xr.Dataset) -> int | None:
+    """The station whose trail is drawn: the end-effector's, or else of the point at no joint that goes farthest."""
     points = [str(name) for name in run["point"].values]
-    followed = run.attrs.get("end_effector_point")
-    if followed in points:
-        return drawn[:, int(run["point_station"].values[points.index(followed)])]
-    return drawn[:, -1] if run.sizes["body"] == 1 else None
+    stations = run["point_station"].values
+    if run.attrs.get("end_effector_point") in points:
+        return int(stations[points.index(run.attrs["end_effector_point"])])
+    shape, joints = run["shape"].values.astype(float), run["joint_position"].values.astype(float)
+    travelled = {}
+    for station in stations.tolist():
+        place = shape[:, station]
+        apart = np.linalg.norm(joints - place[:, None], axis=-1)
+        if not (joints.size and np.min(np.max(apart, axis=0)) < _HELD):
+            travelled[station] = float(np.sum(np.linalg.norm(np.diff(place, axis=0), axis=-1)))
+    farthest = max(travelled, key=lambda station: travelled[station], default=None)
+    return farthest if farthest is not None and travelled[farthest] >= _HELD else None
 
 
 def _anchors(run: xr.Dataset) -> tuple[Array, ...]:
@@ -253,20 +293,18 @@ def _anchors(run: xr.Dataset) -> tuple[Array, ...]:
     return tuple(first[i, end] for i, end in zip(*np.nonzero(run["spring_station"].values < 0), strict=True))
 
 
-def _springs(run: xr.Dataset, drawn: Array, at: _Sampler) -> tuple[Array, ...]:
+def _springs(run: xr.Dataset, drawn: Array) -> dict[str, Array]:
     if "spring_position" not in run:
-        return ()
-    places = run["spring_position"].values[: len(drawn)].astype(float)
-    for i, stations in enumerate(run["spring_station"].values):
-        for end, station in enumerate(stations):
-            if station >= 0:
-                places[:, i, end] = drawn[:, station]
-    return tuple(at(places[:, i]) for i in range(places.shape[1]))
+        return {}
+    places = run["spring_position"].values.astype(float)
+    for i, end in zip(*np.nonzero(run["spring_station"].values >= 0), strict=True):
+        places[:, i, end] = drawn[:, int(run["spring_station"].values[i, end])]
+    return {str(name): places[:, i] for i, name in enumerate(run["spring"].values)}
 
 
-def _with_rails(places: Array, joints: tuple[Joint, ...]) -> Array:
+def _with_rails(places: Array, joints: tuple[DrawnJoint, ...]) -> Array:
     """Places, and where the rails of joints end."""
-    size = _limits(places).size
+    size = limits_of(places).size
     rails = [
         joint.place + sign * 1.2 * BLOCK[0] * size * np.column_stack([np.cos(joint.direction), np.sin(joint.direction)])
         for joint in joints
@@ -276,9 +314,13 @@ def _with_rails(places: Array, joints: tuple[Joint, ...]) -> Array:
     return np.concatenate([places, *rails])
 
 
-def _limits(places: Array) -> Limits:
+def limits_of(places: Array) -> Limits:
+    """What shows all of these places, with room round them."""
     places = places[np.isfinite(places).all(axis=1)]
-    low, high = places.min(axis=0), places.max(axis=0)
+    # A run that comes apart does not rule the picture.
+    usual = np.percentile(places, _MOST, axis=0)
+    far = np.max(np.ptp(usual, axis=0))
+    low, high = np.maximum(places.min(axis=0), usual[0] - far), np.minimum(places.max(axis=0), usual[1] + far)
     size = float(np.max(high - low)) or 1.0
     room = _MARGIN * size
     # Ground symbols hang below; a flat mechanism is not drawn in a slit.
@@ -296,12 +338,60 @@ def common_limits(scenes: list[Scene]) -> Limits:
     return Limits(float(left.min()), float(right.max()), float(bottom.min()), float(top.max()))
 
 
+def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
+    """The same scene at a few of its times."""
+    return replace(
+        shown,
+        time=shown.time[chosen],
+        bodies={name: places[chosen] for name, places in shown.bodies.items()},
+        stiff={name: places[chosen] for name, places in shown.stiff.items()},
+        joints=tuple(
+            replace(joint, place=joint.place[chosen], direction=joint.direction[chosen]) for joint in shown.joints
+        ),
+        springs={name: ends[chosen] for name, ends in shown.springs.items()},
+        trail=None if shown.trail is None else shown.trail[chosen],
+    )
+
+
 # --- Symbols ---------------------------------------------------------------------------------------------------------
 
 
-def is_guide(joint: Joint, limits: Limits) -> bool:
+def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
+    """Symbols of the ground, at one time."""
+    found = [(joint.name, ground_of(joint, limits)) for joint in shown.joints if joint.grounded]
+    found += [("", support(place, limits)) for place in shown.anchors]
+    return [
+        Mark(look, name, _joined(pieces)[None])
+        for name, (lines, strokes) in found
+        for look, pieces in (("ground", lines), ("hatching", strokes))
+    ]
+
+
+def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
+    """Symbols of springs and joints."""
+    out = [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
+    out += [Mark("block", joint.name, block(joint, limits)) for joint in shown.joints if joint.slides]
+    out += [Mark("weld", joint.name, square(joint.place, limits)) for joint in shown.joints if joint.kind == "weld"]
+    # What slides and turns, turns on a pin; what is welded to a block does neither.
+    turning = [joint for joint in shown.joints if joint.kind in ("pin", "slot", "sliding")]
+    return out + [Mark("pin", joint.name, joint.place[:, None]) for joint in turning]
+
+
+def by_look(marks: Sequence[Mark]) -> dict[str, list[Mark]]:
+    """Marks of each look, from the back to the front."""
+    found = {look: [mark for mark in marks if mark.look == look] for look in LOOKS}
+    return {look: some for look, some in found.items() if some}
+
+
+def _joined(pieces: Sequence[Array] | Array) -> Array:
+    """Lines one after the other, gaps between them."""
+    gap = np.full((1, 2), np.nan)
+    return np.concatenate([part for piece in pieces for part in (piece, gap)])[:-1]
+
+
+def is_guide(joint: DrawnJoint, limits: Limits) -> bool:
     """Whether what slides goes through a block that stays, instead of a block along a rail."""
-    return bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL * limits.size)
+    return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL * limits.size)
 
 
 def triangle(place: Array, limits: Limits) -> Array:
@@ -328,8 +418,8 @@ def support(place: Array, limits: Limits) -> tuple[list[Array], Array]:
     return [held, base], hatching(base[0], base[1], limits)
 
 
-def ground_of(joint: Joint, limits: Limits) -> tuple[list[Array], Array]:
-    """Lines of a joint's ground, and its hatching (n, 2, 2)."""
+def ground_of(joint: DrawnJoint, limits: Limits) -> tuple[list[Array], Array]:
+    """Lines of a joint's ground, and its hatching (n, 2, 2): a rail where it slides, else a support."""
     size = limits.size
     if joint.slides and not is_guide(joint, limits):
         along = np.array([np.cos(joint.direction[0]), np.sin(joint.direction[0])])
@@ -347,7 +437,7 @@ def ground_of(joint: Joint, limits: Limits) -> tuple[list[Array], Array]:
     return support(joint.place[0], limits)
 
 
-def block(joint: Joint, limits: Limits) -> Array:
+def block(joint: DrawnJoint, limits: Limits) -> Array:
     """Corners (f, 5, 2) of what slides, or of the guide it slides through."""
     a, b = 0.5 * np.array(BLOCK) * limits.size
     corners = np.array([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]])
@@ -375,9 +465,15 @@ def zigzag(ends: Array, limits: Limits) -> Array:
 
 
 def figure_of(places: Array) -> Array:
-    """The stations (s, 2) of a body that are joined by lines: of a closed figure, up to where it closes."""
-    back = np.flatnonzero(np.all(places[1:] == places[0], axis=1))
-    return places[: back[0] + 2] if back.size and back[0] > 1 else places
+    """The stations (..., s, 2) of a body that are joined by lines: of a closed figure, up to where it closes."""
+    first = places.reshape(-1, *places.shape[-2:])[0]
+    back = np.flatnonzero(np.all(first[1:] == first[0], axis=1))
+    return places[..., : back[0] + 2, :] if back.size and back[0] > 1 else places
+
+
+def is_plate(places: Array) -> bool:
+    """Whether the stations (s, 2) that `figure_of` gives are a closed figure."""
+    return len(places) > 3 and bool(np.all(places[0] == places[-1]))
 
 
 def scale_bar(limits: Limits) -> tuple[float, str]:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from paraflex.campaign import tables_of
 from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable, read_designs
 
 _OURS = "name a folder or file that paraflex wrote"
 # Files of results, those that tell what a folder is first.
-_TABLES = ("results.parquet",)
 _FILES = ("results.nc", "verify.nc", "compare-methods.json", "sensitivity.json", "indices.json", "result.json")
 _BEGINNINGS = {b"\x89HDF": "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", b"PAR1": "parquet"}
 
@@ -110,10 +110,10 @@ def _json(file: Path) -> Source:
 
 
 def _designs(folder: Path) -> DesignTable | None:
-    """The table of a folder's runs, or its parts while it is not finished."""
-    files = [folder / name for name in _TABLES if (folder / name).is_file()]
-    files += sorted((folder / "parts").glob("part-*.parquet"))
-    return read_designs(files) if files else None
+    """The table of a folder's runs; None where there are none."""
+    files = tables_of(folder)
+    table = read_designs(files) if files else None
+    return table if table is not None and table.complete.size else None
 
 
 def _has(*keys: str) -> Callable[[Any], bool]:

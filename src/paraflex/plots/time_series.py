@@ -12,7 +12,16 @@ from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, symbol
 from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
-from paraflex.plots.runs import draw_actual, draw_curves, draw_desired, one_run, run_label, select_run, shade_rest
+from paraflex.plots.runs import (
+    END_EFFECTOR,
+    draw_actual,
+    draw_curves,
+    draw_desired,
+    one_run,
+    run_label,
+    select_run,
+    shade_rest,
+)
 from paraflex.plots.style import keep_flat
 
 # Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
@@ -166,15 +175,10 @@ def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
     InputError
         No such mode.
     """
-    rows = (
-        ("end_effector", "position", 1e3),
-        ("end_effector_velocity", "velocity", 1.0),
-        ("end_effector_acceleration", "acceleration", 1.0),
-    )
     run, time = select_run(data, mode), data["time"].values
     directions = [str(axis) for axis in data["axis"].values]
-    figure, axes = panels(len(rows), len(directions))
-    for row, (variable, quantity, factor) in zip(axes, rows, strict=True):
+    figure, axes = panels(len(END_EFFECTOR), len(directions))
+    for row, (variable, quantity, factor) in zip(axes, END_EFFECTOR, strict=True):
         desired = factor * run[f"{variable}_desired"]
         scale = float(np.ptp(desired.values, axis=0).max())
         for panel, axis in zip(row, directions, strict=True):

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.plots.labels import display_unit
+from paraflex.plots.labels import display_unit, text_symbol
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.page import Chart, Curve, Look
-from paraflex.report.text import symbol
 
 # What the page has, a solid line among the dashes.
 COLOURS, DASHES = 8, 5
@@ -20,18 +18,6 @@ MOST_SAMPLES = 2000
 # What the charts of tip displacements show: a deflection is from a link's chord.
 TIP_TITLE, TIP_LABEL = "Displacements of the links' ends across them", "transverse displacement of the tip"
 TIP_NOTE = "Of a link's last end from the tangent at its first end."
-
-
-class Unit(NamedTuple):
-    """A unit to show values in, and what values in SI are multiplied by."""
-
-    name: str
-    factor: float
-
-
-def unit_for(unit: str, values: NDArray[np.float64]) -> Unit:
-    """The unit that shows lengths ("m") and angles ("rad") with few leading zeros; any other as it is."""
-    return Unit(*display_unit(unit, values)) if unit in ("m", "rad") else Unit(unit, 1.0)
 
 
 def look(k: int) -> Look:
@@ -65,10 +51,10 @@ def followed(
         Drawn dashed.
     selecting, choosing, note : str
     """
-    shown = unit_for(unit, values)
+    shown = display_unit(unit, values)
     curves = [
         Curve(
-            symbol(part),
+            text_symbol(part),
             shown.factor * values[r, :, p],
             run=r,
             shown=(r,),
@@ -83,7 +69,7 @@ def followed(
             Curve("desired", shown.factor * desired[:, p], choice=0, look=Look(look(p).colour, DOTTED), quiet=True)
             for p in range(len(parts))
         ]
-    choices = [f"all {choosing}s" if len(parts) > 1 else symbol(parts[0])] if parts else []
+    choices = [f"all {choosing}s" if len(parts) > 1 else text_symbol(parts[0])] if parts else []
     if len(runs) > 1:
         for p, part in enumerate(parts):
             curves += [
@@ -94,7 +80,7 @@ def followed(
                 curves.append(
                     Curve("desired", shown.factor * desired[:, p], choice=len(choices), look=Look(dash=DOTTED))
                 )
-            choices.append(f"{symbol(part)}, all {selecting}s")
+            choices.append(f"{text_symbol(part)}, all {selecting}s")
     return Chart(
         identity, title, f"{label} [{shown.name}]", curves,
         choices=choices if len(choices) > 1 else (), choosing=choosing, note=note,
@@ -113,7 +99,7 @@ def compared(
     note: str = "",
 ) -> Chart:
     """A quantity (runs, samples) over time in all runs."""
-    shown = unit_for(unit, values)
+    shown = display_unit(unit, values)
     factor = shown.factor
     curves = [Curve(run, factor * values[r], run=r, look=look(r)) for r, run in enumerate(runs)]
     name = f"{label} [{shown.name}]" if shown.name not in ("1", "") else label

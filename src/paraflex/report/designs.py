@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.campaign import read_table
 from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable, read_designs
-from paraflex.plots.labels import METRIC_NAMES
-from paraflex.report.curves import unit_for
-from paraflex.report.page import Column
-from paraflex.report.text import symbol
+from paraflex.plots.labels import display_unit, text_symbol
+from paraflex.report.page import DesignColumn
+from paraflex.results.metrics import metric_label
 
 # Reasons of failures that are listed.
 _REASONS = 12
@@ -75,7 +75,7 @@ class Studied:
 
 
 def read_studied(files: Sequence[Path]) -> Studied:
-    """The rows of a study, from `results.parquet` or from its parts.
+    """The rows of a study, from the files that `tables_of` its folder names.
 
     Raises
     ------
@@ -83,10 +83,9 @@ def read_studied(files: Sequence[Path]) -> Studied:
         A file that cannot be read, or is none of ours.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     table = read_designs(files)
-    told = pa.concat_tables([pq.read_table(file, columns=["run", "design", "status", "reason"]) for file in files])
+    told = pa.concat_tables([read_table(file).select(["run", "design", "status", "reason"]) for file in files])
     texts = {name: np.array(told[name].to_pylist(), dtype=str) for name in ("status", "reason")}
     studied = Studied(table, told["run"].to_numpy(), told["design"].to_numpy(), **texts)
     order = np.argsort(studied.run, kind="stable")
@@ -95,7 +94,7 @@ def read_studied(files: Sequence[Path]) -> Studied:
 
 def columns(
     studied: Studied, rows: NDArray[np.intp], units: Mapping[str, str], logarithmic: Sequence[str]
-) -> list[Column]:
+) -> list[DesignColumn]:
     """Parameters that vary and metrics of some rows, as the page draws them.
 
     Parameters
@@ -113,14 +112,18 @@ def columns(
         values = table.parameters[name]
         unit, factor = shown_unit(units.get(name, ""), values)
         log = name in logarithmic and _is_wide(values, _WIDE_RANGE)
-        out.append(Column(name, symbol(name.replace("_", " ")), unit, factor * values[rows], parameter=True, log=log))
+        out.append(
+            DesignColumn(
+                name, text_symbol(name.replace("_", " ")), unit, factor * values[rows], parameter=True, log=log
+            )
+        )
     rest = [name for name in table.metrics if name not in judged]
     for name in [*judged, *rest]:
         values = np.where(table.complete, table.metrics[name], np.nan)
         if not np.isfinite(values).any():
             continue
         unit, factor = shown_unit(table.units.get(name, ""), values)
-        out.append(Column(name, metric_name(name), unit, factor * values[rows], log=_is_wide(values, _WIDE)))
+        out.append(DesignColumn(name, metric_name(name), unit, factor * values[rows], log=_is_wide(values, _WIDE)))
     return out
 
 
@@ -128,16 +131,13 @@ def shown_unit(unit: str, values: NDArray[np.float64]) -> tuple[str, float]:
     """The unit that values are shown in, and what they are multiplied by; "" of those without one."""
     if unit in ("", "1"):
         return "", 1.0
-    name, factor = unit_for(unit, values)
+    name, factor = display_unit(unit, values)
     return name.replace("^2", "²").replace("^3", "³").replace("^4", "⁴"), factor
 
 
 def metric_name(metric: str) -> str:
     """What a metric is called: "RMS tracking error"; "peak torque of τ₁" of one motor's."""
-    name, dot, motor = metric.partition(".")
-    return METRIC_NAMES.get(name, name.replace("_", " ").replace("rms ", "RMS ")) + (
-        f" of {symbol(motor)}" if dot else ""
-    )
+    return metric_label(metric, text_symbol)
 
 
 def reasons(studied: Studied) -> list[tuple[str, str, int]]:

@@ -1,16 +1,32 @@
-"""The animation: where bodies and joints are in some hundred frames of every run."""
+"""The animation of a page: the scenes of all its runs as the player draws them, in some hundred frames."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from paraflex.errors import InputError
+from paraflex.plots.scene import (
+    LOOKS,
+    Limits,
+    Mark,
+    Scene,
+    common_limits,
+    figure_of,
+    is_plate,
+    moving_marks,
+    scene,
+    still_marks,
+)
 from paraflex.report.packing import packed
+
+Array = NDArray[np.float64]
 
 MOST_FRAMES = 350
 _SHAPES = ("shape", "shape_base", "joint_position", "joint_direction")
@@ -21,7 +37,7 @@ NO_SHAPES = (
 
 
 @dataclass(frozen=True)
-class Film:
+class Animation:
     """Frames of all runs; drawn magnified by m, a body is at `base + m (shape - base)`.
 
     Attributes
@@ -32,81 +48,72 @@ class Film:
         Drawn points of all bodies, and where they were if nothing bent [m].
     bodies : sequence of (str, int, int)
         Name, first station and the one after the last.
-    joints : (runs, frames, joints, 2) array
-        [m]
-    directions : (runs, frames, joints, 2) array
-        Unit vectors along which joints slide; NaN for those that do not.
-    springs : (runs, frames, springs, 2, 2) array, optional
-        Both ends of springs between points [m].
-    joint_names, joint_kinds : sequence of str
-    grounded : sequence of bool
-        Joints with the ground.
-    tip : (runs, frames, 2) array, optional
-        The end-effector, or another point whose trail is drawn [m].
+    scenes : sequence of Scene or None
+        Of each run, with its true deflections; none of a run without a sample.
     path : (samples, 2) or (runs, samples, 2) array, optional
-        Where it should go [m], in all runs or in each.
+        Where the end-effector should go [m], in all runs or in each.
     """
 
-    time: NDArray[np.float64]
-    shape: NDArray[np.float64]
-    base: NDArray[np.float64]
+    time: Array
+    shape: Array
+    base: Array
     bodies: Sequence[tuple[str, int, int]]
-    joints: NDArray[np.float64]
-    directions: NDArray[np.float64]
-    joint_names: Sequence[str]
-    joint_kinds: Sequence[str]
-    grounded: Sequence[bool]
-    springs: NDArray[np.float64] | None = None
-    tip: NDArray[np.float64] | None = None
-    path: NDArray[np.float64] | None = None
+    scenes: Sequence[Scene | None]
+    path: Array | None = None
 
     def told(self) -> dict[str, Any]:
-        """The film as JSON holds it."""
+        """The animation as JSON holds it."""
+        known = [one for one in self.scenes if one is not None]
+        limits = common_limits(known) if known else Limits(-1.0, 1.0, -1.0, 1.0)
+        shown = next((k for k, one in enumerate(self.scenes) if one is not None), 0)
+        figures = [figure_of(self.base[shown, :, first:end]) for _, first, end in self.bodies]
         return {
             "time": self.time.tolist(),
             "base": packed(self.base),
             "bend": packed(self.shape - self.base),
-            "bodies": [list(body) for body in self.bodies],
-            "joints": packed(self.joints),
-            "directions": packed(self.directions),
-            "springs": None if self.springs is None else packed(self.springs),
-            "jointNames": list(self.joint_names),
-            "jointKinds": list(self.joint_kinds),
-            "grounded": [bool(one) for one in self.grounded],
-            "tip": None if self.tip is None else packed(self.tip),
+            # Where lines end, and whether they are filled.
+            "bodies": [
+                [name, first, first + figure.shape[1], is_plate(figure[0])]
+                for (name, first, _), figure in zip(self.bodies, figures, strict=True)
+            ],
+            "looks": LOOKS,
+            "marks": [one and [_marks(still_marks(one, limits), 1), _marks(moving_marks(one, limits), self.time.size)]
+                      for one in self.scenes],
+            "tips": [one and one.followed for one in self.scenes],
             "path": None if self.path is None else packed(self.path.reshape(-1, *self.path.shape[-2:])),
-            "view": _view(self.shape, self.joints, self.path, self.springs),
-        }
+            "view": [limits.left, limits.bottom, limits.right, limits.top],
+        }  # fmt: skip
 
 
-def film(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Film | None:
-    """The film of a dataset whose runs lie along these dimensions; None where it holds no shapes."""
+def _marks(marks: list[Mark], frames: int) -> dict[str, Any]:
+    """Looks and names of symbols, the places each has among all of them, and these."""
+    ends = np.cumsum([0, *(mark.places.shape[1] for mark in marks)]).tolist()
+    pieces = [[mark.look, mark.name, first, end] for mark, first, end in zip(marks, ends, ends[1:], strict=False)]
+    places = np.concatenate([np.zeros((frames, 0, 2)), *(mark.places for mark in marks)], axis=1)
+    return {"pieces": pieces, "places": packed(places[None])}
+
+
+def animation(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Animation | None:
+    """The animation of a dataset whose runs lie along these dimensions; None where it holds no shapes."""
     if any(name not in data for name in _SHAPES):
         return None
-    time = data["time"].values
-    kept = frames_of(time.size)
-    shape, base, joints, angles = (_runs(data[name].isel(time=kept), dims) for name in _SHAPES)
-    springs = _runs(data["spring_position"].isel(time=kept), dims) if "spring_position" in data else None
-    followed = data["end_effector"] if "end_effector" in data else _free_point(data)
-    tip = None if followed is None else _runs(followed.isel(time=kept), dims)
+    few = data.isel(time=frames_of(data.sizes["time"]))
     path = None
     if "end_effector_desired" in data:
         path = _runs(data["end_effector_desired"], dims)
         path = path[:, frames_of(path.shape[1], 2 * MOST_FRAMES)]
         path = path[0] if all(np.array_equal(path[0], each) for each in path) else path
-    names = [str(name) for name in data["joint"].values]
-    return Film(
-        time=time[kept],
-        shape=shape,
-        base=base,
-        bodies=_bodies(data["station_body"].values),
-        joints=joints,
-        directions=np.stack([np.cos(angles), np.sin(angles)], axis=-1),
-        springs=springs,
-        joint_names=names,
-        joint_kinds=[str(kind) for kind in data["joint_kind"].values],
-        grounded=[bool(one) for one in data["joint_grounded"].values],
-        tip=tip,
+    names = [str(name) for name in data["station_body"].values]
+    starts = [k for k, name in enumerate(names) if k == 0 or name != names[k - 1]]
+    return Animation(
+        time=few["time"].values,
+        shape=_runs(few["shape"], dims),
+        base=_runs(few["shape_base"], dims),
+        bodies=[(names[a], a, b) for a, b in zip(starts, [*starts[1:], len(names)], strict=True)],
+        scenes=[
+            _scene(few.isel(dict(zip(dims, chosen, strict=True))))
+            for chosen in product(*(range(data.sizes[dim]) for dim in dims))
+        ],
         path=path,
     )
 
@@ -116,42 +123,15 @@ def frames_of(samples: int, most: int = MOST_FRAMES) -> NDArray[np.intp]:
     return np.unique(np.rint(np.linspace(0, samples - 1, min(samples, most))).astype(np.intp))
 
 
-def _runs(values: xr.DataArray, dims: Sequence[str]) -> NDArray[np.float64]:
+def _runs(values: xr.DataArray, dims: Sequence[str]) -> Array:
     """Values (runs, ...): the dimensions of runs as one, which a single run does not have."""
     rest = [dim for dim in values.dims if dim not in dims]
     array = np.asarray(values.transpose(*dims, *rest).values, dtype=float)
     return array.reshape(-1, *array.shape[len(dims) :])
 
 
-def _free_point(data: xr.Dataset) -> xr.DataArray | None:
-    """The end-effector's point, or else the one at no joint that goes farthest; None where there is none."""
-    places = data["point_position"].transpose("point", "time", "axis")
-    names = [str(name) for name in data["point"].values]
-    if data.attrs.get("end_effector_point") in names:
-        return places.isel(point=names.index(data.attrs["end_effector_point"]))
-    joints = data["joint_position"].transpose("joint", "time", "axis").values.astype(float)
-    travelled = []
-    for place in places.values:
-        apart = np.linalg.norm(joints - place, axis=-1)
-        held = bool((np.nanmax(apart, axis=1, initial=0.0) < 1e-6).any()) if len(apart) else False
-        way = np.nansum(np.linalg.norm(np.diff(place, axis=0), axis=-1))
-        travelled.append(0.0 if held else float(way))
-    if not travelled or max(travelled) < 1e-6:
+def _scene(run: xr.Dataset) -> Scene | None:
+    try:
+        return scene(run, run["time"].values)
+    except InputError:
         return None
-    return places.isel(point=int(np.argmax(travelled)))
-
-
-def _bodies(station_body: ArrayLike) -> list[tuple[str, int, int]]:
-    names = [str(name) for name in np.asarray(station_body)]
-    starts = [k for k, name in enumerate(names) if k == 0 or name != names[k - 1]]
-    return [(names[a], a, b) for a, b in zip(starts, [*starts[1:], len(names)], strict=True)]
-
-
-def _view(*places: NDArray[np.float64] | None) -> list[float]:
-    """Smallest and largest x, y of what is drawn but for stray samples: a run that comes apart does not rule it."""
-    drawn = [each.reshape(-1, 2) for each in places if each is not None]
-    points = np.concatenate([each[np.isfinite(each).all(axis=1)] for each in drawn])
-    if not points.size:
-        return [-1.0, -1.0, 1.0, 1.0]
-    low, high = np.percentile(points, [0.2, 99.8], axis=0)
-    return [*low.tolist(), *high.tolist()]

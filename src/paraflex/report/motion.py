@@ -8,11 +8,12 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, Unit, followed, look, thinned, unit_for
-from paraflex.report.film import NO_SHAPES, film
+from paraflex.plots.labels import DisplayUnit, display_unit, text_symbol
+from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, followed, look, thinned
+from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
-from paraflex.report.text import count, number, pairs, symbol
+from paraflex.report.text import count, number, pairs
 from paraflex.report.tracking import energies, largest
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import check_kind
@@ -28,7 +29,7 @@ def motion_page(data: xr.Dataset) -> Page:
     """The report of a run from `results.motion_dataset`."""
     check_kind(data, "motion")
     data = data.transpose("time", ...)
-    moving = film(data, ())
+    moving = animation(data, ())
     few = data.isel(time=thinned(data.sizes["time"]))
     status = str(data["status"].item())
     return Page(
@@ -63,7 +64,7 @@ def _table(data: xr.Dataset) -> str:
         ("constraint violation, velocity", f"{number(data['constraint_velocity_max'].item())} m/s"),
         ("imbalance of energy", f"{number(data['energy_balance_max'].item())} J"),
     ]
-    facts += [(f"torque of {symbol(str(name))}", f"{number(float(data['applied_torque'][k]))} N m")
+    facts += [(f"torque of {text_symbol(str(name))}", f"{number(float(data['applied_torque'][k]))} N m")
              for k, name in enumerate(data["motor"].values)]  # fmt: skip
     passed = json.loads(data.attrs.get("singular_positions", "[]"))
     if passed:
@@ -98,7 +99,7 @@ def _panels(data: xr.Dataset) -> list[Panel]:
 
 def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:
     angle, rate = data["angle"].values, data["angular_velocity"].values
-    curves = [Curve(symbol(body), rate[:, b], angle[:, b], run=0, look=look(b)) for b, body in enumerate(bodies)]
+    curves = [Curve(text_symbol(body), rate[:, b], angle[:, b], run=0, look=look(b)) for b, body in enumerate(bodies)]
     return Chart("phases", "Phase diagram", "angular velocity [rad/s]", curves, x="angle [rad]", over_time=False)
 
 
@@ -112,7 +113,7 @@ def _points(data: xr.Dataset) -> Chart | None:
     ][:_MOST]  # fmt: skip
     if not moving:
         return None
-    unit = Unit("mm", 1e3) if largest(places[moving]) < 10.0 else Unit("m", 1.0)
+    unit = DisplayUnit("mm", 1e3) if largest(places[moving]) < 10.0 else DisplayUnit("m", 1.0)
     curves = [
         Curve(names[k], unit.factor * places[k, :, 1], unit.factor * places[k, :, 0], run=0, look=look(i))
         for i, k in enumerate(moving)
@@ -131,7 +132,7 @@ def _joint_forces(data: xr.Dataset) -> Chart:
         parts = (("magnitude", magnitude), ("x", force[j, :, 0]), ("y", force[j, :, 1]))
         curves += [Curve(name, values, run=0, choice=j, look=look(k)) for k, (name, values) in enumerate(parts)]
     return Chart(
-        "forces", "Joint forces", "force [N]", curves, choices=[symbol(name) for name in names], choosing="joint",
+        "forces", "Joint forces", "force [N]", curves, choices=[text_symbol(name) for name in names], choosing="joint",
         note="On the joint's second body, in the ground frame.",
     )  # fmt: skip
 
@@ -143,7 +144,10 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
     curves, choices = [], []
     for body in bodies[:_MOST]:
         own = [k for k, name in enumerate(names) if name.startswith(f"{body}.")]
-        kinds = ((f"{symbol(body)}: x, y [m], φ [rad]", own[:3]), (f"{symbol(body)}: flexible [m √kg]", own[3:]))
+        kinds = (
+            (f"{text_symbol(body)}: x, y [m], φ [rad]", own[:3]),
+            (f"{text_symbol(body)}: flexible [m √kg]", own[3:]),
+        )
         for choice, members in kinds:
             if members:
                 curves += [
@@ -165,14 +169,16 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     name = "deflection" if "deflection" in data else "tip_transverse"
     deflections = np.abs(data[name].transpose("time", "body").values)
     if largest(deflections) > 0.0:
-        unit = unit_for("m", deflections)
+        unit = display_unit("m", deflections)
         body = int(np.argmax([largest(one) for one in deflections.T]))
         value = f"{number(largest(deflections), unit.factor)} {unit.name}"
-        tiles.append(("largest deflection", value, symbol(str(data["body"].values[body]))))
+        tiles.append(("largest deflection", value, text_symbol(str(data["body"].values[body]))))
     force = np.linalg.norm(data["joint_force"].transpose("joint", "time", "axis").values, axis=-1)
     if largest(force) > 0.0:
         joint = int(np.argmax([np.nan_to_num(largest(one)) for one in force]))
-        tiles.append(("largest joint force", f"{number(largest(force))} N", symbol(str(data["joint"].values[joint]))))
+        tiles.append(
+            ("largest joint force", f"{number(largest(force))} N", text_symbol(str(data["joint"].values[joint])))
+        )
     tiles.append(("computed in", f"{number(data['wall_time'].item())} s", f"{count(data['steps'].item())} steps"))
     return tiles
 

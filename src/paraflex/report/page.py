@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from html import escape
@@ -18,9 +17,10 @@ from typing import Any, NamedTuple
 from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.errors import InputError, OutputError
-from paraflex.report.film import Film
+from paraflex.errors import InputError
+from paraflex.report.film import Animation
 from paraflex.report.packing import Series
+from paraflex.writing import write_text
 
 _STYLES = ("page.css",)
 _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
@@ -125,7 +125,7 @@ class Chart:
 
 
 @dataclass(frozen=True)
-class Column:
+class DesignColumn:
     """A number of every design.
 
     Attributes
@@ -156,7 +156,7 @@ class Designs:
 
     Attributes
     ----------
-    columns : sequence of Column
+    columns : sequence of DesignColumn
         Parameters first.
     telling : str
         What runs are told apart by: "mode".
@@ -170,7 +170,7 @@ class Designs:
         Which of the page's runs it is; -1 for most.
     """
 
-    columns: Sequence[Column]
+    columns: Sequence[DesignColumn]
     telling: str
     series: Sequence[tuple[str, Look]]
     member: ArrayLike
@@ -217,7 +217,7 @@ class Page:
         What a run is called in this page: "mode", "model", "design".
     selected : int
         The run selected at first.
-    film : Film, optional
+    film : Animation, optional
         The animation.
     no_film : str
         Why there is none.
@@ -240,7 +240,7 @@ class Page:
     runs: Sequence[str] = ()
     selecting: str = "mode"
     selected: int = 0
-    film: Film | None = None
+    film: Animation | None = None
     no_film: str = ""
     notes: Sequence[str] = ()
 
@@ -278,18 +278,7 @@ def save_page(page: Page, path: str | Path) -> None:
     OutputError
         It cannot be written.
     """
-    path = Path(path)
-    unfinished = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished.write_text(render(page), encoding="utf-8")
-        unfinished.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            unfinished.unlink()
-        raise OutputError(
-            f"cannot be written ({error.strerror or error})", field=str(path), remedy="choose another file"
-        ) from error
+    write_text(Path(path), render(page), remedy="choose another file")
 
 
 @cache

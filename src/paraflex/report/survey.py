@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paraflex.plots.designs import in_conflict
 from paraflex.report.curves import look
 from paraflex.report.designs import Studied
-from paraflex.report.page import Chart, Column, Curve, Designs, Look, Panel, Picker
+from paraflex.report.page import Chart, Curve, DesignColumn, Designs, Look, Panel, Picker
 from paraflex.report.text import count
 
 LOWER = "Less is taken as better in every metric."
@@ -25,7 +25,9 @@ class Step(NamedTuple):
     allowed: bool
 
 
-def survey(studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], history: Sequence[Step]) -> list[Panel]:
+def survey(
+    studied: Studied, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], history: Sequence[Step]
+) -> list[Panel]:
     """What all designs do."""
     parameters = [k for k, column in enumerate(drawn) if column.parameter]
     metrics = [k for k, column in enumerate(drawn) if not column.parameter]
@@ -95,7 +97,7 @@ def _history(steps: Sequence[Step]) -> Chart:
 
 
 def drawn_designs(
-    studied: Studied, rows: NDArray[np.intp], drawn: Sequence[Column], shown: Mapping[int, int]
+    studied: Studied, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], shown: Mapping[int, int]
 ) -> Designs:
     """Drawn rows as the page's charts take them; `shown` tells which of the page's runs a row is."""
     table = studied.table

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from paraflex.report.choice import Picked, drawn_rows
 from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, compared, followed, plane_path, thinned
 from paraflex.report.designs import Studied, columns, metric_name, reasons, shown_unit
-from paraflex.report.film import film
+from paraflex.report.film import animation
 from paraflex.report.page import Page, Panel
 from paraflex.report.survey import LOWER, Step, drawn_designs, survey
 from paraflex.report.text import NOTHING, count, number, table
@@ -23,10 +23,11 @@ _NO_RUN = "None of the best designs was simulated again, so there is no animatio
 _MOST_COLUMNS = 12
 _KEPT = (
     "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
-    "joint_position", "joint_direction", "spring_position",
+    "joint_position", "joint_direction", "spring_position", "point_station", "spring_station",
 )  # fmt: skip
+_STATIONS = ("point_station", "spring_station")
 _COORDINATES = (
-    "time", "axis", "body", "motor", "joint", "end", "station_body", "joint_kind", "joint_grounded",
+    "time", "axis", "body", "motor", "joint", "end", "point", "spring", "station_body", "joint_kind", "joint_grounded",
 )  # fmt: skip
 
 
@@ -110,7 +111,7 @@ def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount
         time=[] if few is None else few["time"].values,
         runs=labels,
         selecting="design",
-        film=None if data is None else film(data),
+        film=None if data is None else animation(data),
         no_film=_NO_RUN,
         notes=[*account.notes, *_unfinished(studied, account), *_not_shown(studied, missing)],
     )
@@ -150,11 +151,20 @@ def _with_as_many_stations(runs: Sequence[xr.Dataset]) -> list[xr.Dataset]:
 
     A parameter that moves a point along a beam changes how many there are between its points.
     """
+    # They differ from run to run.
+    runs = [run.reset_coords([name for name in _STATIONS if name in run.coords]) for run in runs]
     names = [_station_bodies(run) for run in runs]
     if all(np.array_equal(each, names[0]) for each in names):
-        return list(runs)
+        return runs
     most = {name: max(int(np.sum(each == name)) for each in names) for name in dict.fromkeys(names[0])}
-    return [run.isel(station=_spread(each, most)) for run, each in zip(runs, names, strict=True)]
+    return [_taken(run, _spread(each, most)) for run, each in zip(runs, names, strict=True)]
+
+
+def _taken(run: xr.Dataset, stations: NDArray[np.intp]) -> xr.Dataset:
+    """A run drawn by these stations, ascending; points and ends of springs are at the same ones as before."""
+    moved = {name: run[name].copy(data=np.where(run[name] < 0, -1, np.searchsorted(stations, run[name])))
+             for name in _STATIONS if name in run}  # fmt: skip
+    return run.isel(station=stations).assign(moved)
 
 
 def _spread(names: NDArray[np.str_], most: Mapping[str, int]) -> NDArray[np.intp]:

@@ -8,12 +8,8 @@ import re
 from collections.abc import Mapping, Sequence
 from html import escape
 
-_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_GREEK = {
-    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ",
-    "omega": "ω",
-}  # fmt: skip
+from paraflex.plots.labels import raised
+
 # Magnitudes written out; others as powers of ten.
 _SMALLEST, _LARGEST = 1e-3, 1e5
 NOTHING = "–"
@@ -29,7 +25,7 @@ def number(value: float | None, factor: float = 1.0) -> str:
         return "0"
     if not _SMALLEST <= abs(value) < _LARGEST:
         digits, power = f"{value:.2e}".split("e")
-        return f"{digits} × 10{str(int(power)).translate(_RAISED)}".replace("-", "−")
+        return f"{digits} × 10{raised(int(power))}".replace("-", "−")
     # Whole numbers of four or five digits are kept.
     text = f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:#.3g}".rstrip(".")
     return text.replace("-", "−")
@@ -38,17 +34,6 @@ def number(value: float | None, factor: float = 1.0) -> str:
 def count(value: float | None) -> str:
     """A whole number, thousands apart: "43 708"."""
     return NOTHING if value is None or not math.isfinite(value) else f"{int(value):,}".replace(",", "\u2009")
-
-
-def symbol(name: str) -> str:
-    """A name as print shows it: "τ₁" for "tau1", "A₁" for "A1", "link 1" for "link1", others unchanged."""
-    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
-    if parts is None:
-        return name
-    letters, digits = parts.groups()
-    if len(letters) == 1 or letters in _GREEK:
-        return _GREEK.get(letters, letters) + digits.translate(_LOWERED)
-    return f"{letters} {digits}".rstrip()
 
 
 def table(

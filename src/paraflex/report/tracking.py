@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.plots.labels import display_unit, text_symbol
 from paraflex.plots.runs import default_mode
 from paraflex.report.curves import (
     DOTTED,
@@ -20,15 +21,15 @@ from paraflex.report.curves import (
     look,
     plane_path,
     thinned,
-    unit_for,
 )
-from paraflex.report.film import NO_SHAPES, film
+from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
-from paraflex.report.text import NOTHING, count, number, symbol, table
+from paraflex.report.text import NOTHING, count, number, table
 from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.following import headline, ranked_by_motion
+from paraflex.results.formulas import during_motion
 from paraflex.results.kinds import check_kind
-from paraflex.results.metrics import during_motion, headline, ranked_by_motion
 from paraflex.results.validity import validity_line, validity_summary
 
 
@@ -49,7 +50,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     run = asked(data)
     path = run.get("path")
     modes = f"{len(runs)} actuation modes" if len(runs) > 1 else f"actuation mode {runs[0]}"
-    moving = film(data)
+    moving = animation(data)
     few = data.isel(time=thinned(data.sizes["time"]))
     return Page(
         title=data.attrs["mechanism"],
@@ -83,17 +84,17 @@ def torque_unit(data: xr.Dataset) -> str:
 def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     """What every mode came to."""
     runs = [str(name) for name in data["mode"].values]
-    rms, words = headline(data)
+    errors_rms, words = headline(data)
     gaps, deflections = errors(data), _deflections(data)
     ranked = gaps[:, during_motion(data["time"].values, data.attrs["motion_end"])] if ranked_by_motion(data) else gaps
-    length, bend = unit_for("m", gaps), unit_for("m", deflections)
+    length, bend = display_unit("m", gaps), display_unit("m", deflections)
     after = _after_columns(data)
     motors = [str(name) for name in data["motor"].values]
-    torques = data["torque"].transpose("mode", "motor", "time").values
+    efforts = [data[name].transpose("mode", "motor").values for name in ("peak_torque", "rms_torque")]
     heads = [
         ("mode", ""), ("status", ""), ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
         *((name, f"[{unit}]") for name, unit, _ in after),
-        *((symbol(motor), f"[{torque_unit(data)}]") for motor in motors),
+        *((text_symbol(motor), f"[{torque_unit(data)}]") for motor in motors),
         ("deflection", f"largest [{bend.name}]"), ("strain", "energy [J]"), ("imbalance", "[J]"),
         ("steps", "rejected"), ("iterations", "factorisations"), ("wall time", "[s]"),
     ]  # fmt: skip
@@ -102,10 +103,10 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
         one = data.isel(mode=r)
         rows.append((name, [
             str(one["status"].item()),
-            number(rms[r].item(), length.factor),
+            number(errors_rms[r].item(), length.factor),
             number(largest(ranked[r]), length.factor),
             *(number(values[r]) for _, _, values in after),
-            *(f"{number(largest(torque))}\n{number(_rms(torque))}" for torque in torques[r]),
+            *(f"{number(peak)}\n{number(rms)}" for peak, rms in zip(*(each[r] for each in efforts), strict=True)),
             _deflection(deflections[r], data["body"].values, bend.factor),
             number(largest(one["strain_energy"].values)),
             number(one["energy_balance_max"].item()),
@@ -114,12 +115,12 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
             number(one["wall_time"].item()),
         ]))  # fmt: skip
     rows += [(name, ["failed", *[NOTHING] * (len(heads) - 2)]) for name in failed]
-    efforts = "Forces" if torque_unit(data) == "N" else "Torques"
+    kind = "Forces" if torque_unit(data) == "N" else "Torques"
     note = f"Error and largest: {words}. "
     if after:
         note += "Error after: RMS, after the motion; drift: mean speed then; vibration: RMS about the drift. "
     note += (
-        f"{efforts}: peak and, below it, RMS. Deflection: from a link's chord. Strain energy: peak. Imbalance: "
+        f"{kind}: peak and, below it, RMS. Deflection: from a link's chord. Strain energy: peak. Imbalance: "
         "largest, of energy and work."
     )
     if failed or not bool((data["status"] == "complete").all()):
@@ -147,7 +148,7 @@ def _after_columns(data: xr.Dataset) -> list[tuple[str, str, NDArray[np.float64]
     ):
         values = data[key].values
         if np.isfinite(values).any():
-            shown = unit_for(unit, values)
+            shown = display_unit(unit, values)
             columns.append((name, shown.name + ("/s" if key == "drift_speed" else ""), shown.factor * values))
     brakes = data["brake_energy"].values if "brake_energy" in data else np.zeros(1)
     if np.any(brakes > 0.0):
@@ -237,7 +238,7 @@ def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
         ]
     return Chart(
         "phases", "Phase diagram", "angular velocity [rad/s]", curves, x="angle [rad]",
-        choices=[symbol(body) for body in bodies], choosing="link", over_time=False,
+        choices=[text_symbol(body) for body in bodies], choosing="link", over_time=False,
     )  # fmt: skip
 
 
@@ -250,7 +251,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     tiles = []
     if np.isfinite(errors_rms).any():
         best = int(np.nanargmin(errors_rms))
-        unit = unit_for("m", errors_rms[best : best + 1])
+        unit = display_unit("m", errors_rms[best : best + 1])
         value = f"{number(errors_rms[best], unit.factor)} {unit.name}"
         tiles.append((f"{'least ' if several else ''}RMS error {words}", value, _name(data, best)))
     if np.isfinite(peaks).any():
@@ -261,7 +262,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     deflections = np.array([largest(one) for one in _deflections(data)])
     if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
         most = int(np.nanargmax(deflections))
-        unit = unit_for("m", deflections[most : most + 1])
+        unit = display_unit("m", deflections[most : most + 1])
         value = f"{number(deflections[most], unit.factor)} {unit.name}"
         tiles.append(("largest deflection", value, _name(data, most)))
     total = float(np.nansum(data["wall_time"].values))
@@ -299,14 +300,9 @@ def _model(run: Mapping[str, object]) -> str:
     return f"{run.get('geometry', 'linear')} geometry"
 
 
-def _rms(values: NDArray[np.float64]) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
-
-
 def _deflection(values: NDArray[np.float64], bodies: NDArray[np.str_], factor: float) -> str:
     """The largest deflection (samples, bodies), and whose it is."""
     if not np.isfinite(values).any() or np.nanmax(values) == 0.0:
         return NOTHING
     where = int(np.nanargmax(np.nanmax(np.where(np.isfinite(values), values, -1.0), axis=0)))
-    return f"{number(largest(values), factor)}\n{symbol(str(bodies[where]))}"
+    return f"{number(largest(values), factor)}\n{text_symbol(str(bodies[where]))}"

@@ -12,16 +12,17 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.findings import Finding
 from paraflex.plots.agreement import printed
+from paraflex.plots.labels import display_unit, text_symbol
 from paraflex.plots.workspace import round_magnification
-from paraflex.report.curves import TIP_LABEL, TIP_TITLE, look, thinned, unit_for
-from paraflex.report.film import NO_SHAPES, film
+from paraflex.report.curves import TIP_LABEL, TIP_TITLE, look, thinned
+from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, verify_command_line
-from paraflex.report.text import NOTHING, count, number, symbol, table
+from paraflex.report.text import NOTHING, count, number, table
 from paraflex.report.tracking import errors, torque_unit
 from paraflex.results.doubts import doubt_lines
+from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.kinds import check_kind
-from paraflex.results.metrics import SPAN_WORDS, ErrorSpan
 
 _ENGINES = ("exudyn", "mujoco")
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
@@ -71,7 +72,7 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
     check_kind(data, "verification")
     runs, asked_for = _Runs(data), asked(data)
     reference = str(data.attrs["reference"])
-    moving = film(data, ("mode", "model"))
+    moving = animation(data, ("mode", "model"))
     few = data.isel(time=thinned(data.sizes["time"]))
     tables = [(f"Models, mode {name}", _models(mode, reference, runs, name)) for name, mode in figures["modes"].items()]
     more = []
@@ -110,7 +111,7 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
 
 def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str) -> str:
     models = mode["models"]
-    unit = unit_for("m", np.array([one.get("tracking_error") or np.nan for one in models.values()]))
+    unit = display_unit("m", np.array([one.get("tracking_error") or np.nan for one in models.values()]))
     heads = [
         ("model", ""), ("status", ""), ("tracking error", f"RMS [{unit.name}]"),
         (f"from {printed(reference)}", "largest, RMS [m]"), ("finer step", "changes it by [m]"),
@@ -150,7 +151,7 @@ def _differences(mode: Mapping[str, Any], links: Sequence[str], reference: str) 
         name for name, one in mode["models"].items() if name != reference and "angle_difference_rms" in one
     ]  # fmt: skip
     rows = [
-        (symbol(link), [
+        (text_symbol(link), [
             f"{number(mode['models'][name]['angle_difference_rms'][link])}\n"
             f"{number(mode['models'][name]['angular_velocity_difference_rms'][link])}"
             for name in others
@@ -198,7 +199,7 @@ def _panels(data: xr.Dataset, runs: _Runs, reference: str) -> list[Panel]:
 def _one(
     identity: str, title: str, label: str, unit: str, values: NDArray[np.float64], runs: _Runs, *, log: bool = False
 ) -> Chart:
-    shown = unit_for(unit, values)
+    shown = display_unit(unit, values)
     curves = runs.overlaid(values, factor=shown.factor)
     return Chart(identity, title, f"{label} [{shown.name}]", curves, log=log)
 
@@ -211,12 +212,12 @@ def _links(
     values = runs.array(data[variable])
     if datum is not None:
         values = values - values[:, datum : datum + 1]
-    shown, names = unit_for(unit, values), [str(name) for name in data[dim].values]
+    shown, names = display_unit(unit, values), [str(name) for name in data[dim].values]
     curves = [
         curve for p in range(len(names)) for curve in runs.overlaid(values[..., p], choice=p, factor=shown.factor)
     ]
     return Chart(
-        identity, title, f"{label} [{shown.name}]", curves, choices=[symbol(name) for name in names],
+        identity, title, f"{label} [{shown.name}]", curves, choices=[text_symbol(name) for name in names],
         choosing="link" if dim == "body" else dim,
     )  # fmt: skip
 
@@ -247,11 +248,11 @@ def _tiles(figures: Mapping[str, Any], reference: str) -> list[tuple[str, str, s
     for title, pick in (("nearest to the reference", min), ("farthest from it", max)):
         if apart:
             model = pick(apart, key=apart.__getitem__)
-            unit = unit_for("m", np.array([apart[model]]))
+            unit = display_unit("m", np.array([apart[model]]))
             tiles.append((title, f"{number(apart[model], unit.factor)} {unit.name}", f"{printed(model)}, mode {name}"))
     error = mode["models"].get(reference, {}).get("tracking_error")
     if error is not None:
-        unit = unit_for("m", np.array([error]))
+        unit = display_unit("m", np.array([error]))
         span = SPAN_WORDS[ErrorSpan(figures.get("error", ErrorSpan.WHOLE.value))]
         tiles.append((f"RMS error {span}", f"{number(error, unit.factor)} {unit.name}", printed(reference)))
     whole = all(one["status"] == "complete" for by in figures["modes"].values() for one in by["models"].values())

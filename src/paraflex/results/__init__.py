@@ -13,8 +13,8 @@ from paraflex.results.summary import summary
 
 if TYPE_CHECKING:
     from paraflex.results.dataset import tracking_dataset
+    from paraflex.results.following import peak_torque, residual_vibration, rms_torque, tracking_error
     from paraflex.results.kinds import kind_of
-    from paraflex.results.metrics import peak_torque, residual_vibration, rms_torque, tracking_error
     from paraflex.results.motion_data import motion_dataset, motion_summary
     from paraflex.results.storage import load_results, open_results, results_file, save_results
 
@@ -24,13 +24,13 @@ _HOME = {
     "motion_summary": "motion_data",
     "kind_of": "kinds",
     "open_results": "storage",
-    "peak_torque": "metrics",
-    "residual_vibration": "metrics",
+    "peak_torque": "following",
+    "residual_vibration": "following",
     "results_file": "storage",
-    "rms_torque": "metrics",
+    "rms_torque": "following",
     "save_results": "storage",
     "tracking_dataset": "dataset",
-    "tracking_error": "metrics",
+    "tracking_error": "following",
 }
 
 __all__ = [

@@ -7,23 +7,27 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.dynamics import System, material_angle
+from paraflex.errors import InputError
 from paraflex.mechanism import (
     AxisJoint,
     Body,
     Joint,
     Mechanism,
     PointRef,
+    Pose,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     SlidingJoint,
     SlotJoint,
     WeldJoint,
+    placed_poses,
 )
-from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape
+from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape, turned
 
 Array = NDArray[np.float64]
 
@@ -121,6 +125,34 @@ def system_drawing(system: System, q: Array) -> Drawing:
 
     shapes = {one.body: outline_motion(system, one, q) for one in outlines(system.mechanism)}
     return drawing(system.mechanism, shapes, lambda ref: material_angle(system, ref, q), frame)
+
+
+def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
+    """What a mechanism is drawn from in its first assembly, undeformed, as a run of one sample.
+
+    Loops are closed as well as the angles close them; bodies whose places do not follow are NaN. None without an
+    assembly, or where no place follows.
+    """
+    try:
+        poses = placed_poses(mechanism, mechanism.assemblies[0]) if mechanism.assemblies else {}
+    except InputError:
+        poses = {}
+    if not poses:
+        return None
+
+    def frame(name: str) -> tuple[Array, Array]:
+        pose = poses.get(name, Pose(np.nan))
+        return np.array([pose.position or (np.nan, np.nan)]), np.array([pose.angle])
+
+    shapes = {one.body: turned(*frame(one.body), one.places) for one in outlines(mechanism)}
+    one = drawing(mechanism, shapes, lambda ref: frame(ref.body)[1], frame)
+    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+    return xr.Dataset(
+        {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(one).items()},
+        coords={"time": [0.0], "point": points, "joint": [joint.name for joint in mechanism.joints],
+                **drawing_coordinates(mechanism)},
+        attrs={"mechanism": mechanism.name},
+    )  # fmt: skip
 
 
 def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -16,8 +15,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.errors import InputError, OutputError, suggestion
+from paraflex.errors import InputError, suggestion
 from paraflex.results.storage import save_results
+from paraflex.writing import whole_file
 
 FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
@@ -157,7 +157,7 @@ def export_results(
     if to in ("mat", "netcdf"):
         file = output if single else output / f"results{ending}"
         _refuse([file], force)
-        with _whole(file) as unfinished:
+        with whole_file(file) as unfinished:
             if to == "mat":
                 _write_mat({"results": matlab_struct(data)}, unfinished)
             else:
@@ -167,7 +167,7 @@ def export_results(
     files = {name: output if single else output / f"{name}{ending}" for name in ([TIME_SERIES] if single else tables)}
     _refuse(list(files.values()), force)
     for name, file in files.items():
-        with _whole(file) as unfinished:
+        with whole_file(file) as unfinished:
             write_table(tables[name], unfinished, to, {key: _plain(value) for key, value in data.attrs.items()})
     return list(files.values())
 
@@ -278,7 +278,7 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
         raise InputError(
             "damaged or cut short: not a readable table", field=str(source), remedy="run the study again"
         ) from error
-    with _whole(file) as unfinished:
+    with whole_file(file) as unfinished:
         if to == "csv":
             units = [(field.metadata or {}).get(b"unit", b"").decode() for field in table.schema]
             names = [f"{name} [{unit}]" if unit else name for name, unit in zip(table.column_names, units, strict=True)]
@@ -305,22 +305,3 @@ def _refuse(files: Sequence[Path], force: bool) -> None:
     for file in files:
         if file.exists() and not force:
             raise InputError("exists already", field=str(file), remedy="name another, or write over it with --force")
-
-
-@contextmanager
-def _whole(file: Path) -> Iterator[Path]:
-    """A file to write to that takes its place when it is whole."""
-    unfinished = file.with_name(file.name + ".part")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        yield unfinished
-        unfinished.replace(file)
-    except OutputError:
-        raise
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written ({error.strerror or error})", field=str(file), remedy="choose another folder"
-        ) from error
-    finally:
-        with suppress(OSError):
-            unfinished.unlink(missing_ok=True)

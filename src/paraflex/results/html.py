@@ -6,18 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.display import facts, page, sentence, table
+from paraflex.display import facts, page, sentence, table, view
 from paraflex.dynamics.points import point_motion
 from paraflex.integrators import METHODS, Solution
 from paraflex.motion import MotionRun
-from paraflex.results.metrics import during_motion, rms
+from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import deflections
+from paraflex.results.run_traces import run_traces
 from paraflex.simulate import TrackingRun
 
 # Points listed one by one.
 _MOST = 20
 
 
+@view.register(TrackingRun)
 def tracking_run_html(run: TrackingRun) -> str:
     """Status, tracking error, torques and deflection of one mode, and the solver's figures."""
     task, solution = run.task, run.solution
@@ -39,6 +41,7 @@ def tracking_run_html(run: TrackingRun) -> str:
     )
 
 
+@view.register(MotionRun)
 def motion_run_html(run: MotionRun) -> str:
     """Status of a run without a path, where its points are at the end, and the solver's figures."""
     solution, system = run.solution, run.system
@@ -79,20 +82,20 @@ def _ended(solution: Solution) -> str:
 def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
     task, solution = run.task, run.solution
     # The state at an event is a sample more than the task's times.
-    k = solution.t.size - bool(solution.event)
-    effector = task.mechanism.end_effector
-    if effector is None or not k:
+    if task.mechanism.end_effector is None or solution.t.size == bool(solution.event):
         return []
-    place = point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]).position
-    away = np.linalg.norm(place - task.motion.desired.position[:k], axis=1)
-    moving = during_motion(solution.t[:k], task.path.duration)
-    after = [("tracking error after it, RMS", f"{1e3 * rms(away[~moving]):.4g} mm")] if not moving.all() else []
+    traces = run_traces(run)
+
+    def millimetres(metric: str) -> str:
+        return f"{1e3 * METRICS[metric].value(traces):.4g} mm"
+
+    after = [] if traces.moving.all() else [("tracking error after it, RMS", millimetres("tracking_rms_after"))]
     return [
-        ("tracking error during the motion, RMS", f"{1e3 * rms(away[moving]):.4g} mm"),
-        ("tracking error during the motion, largest", f"{1e3 * np.max(away[moving]):.4g} mm"),
+        ("tracking error during the motion, RMS", millimetres("tracking_rms_motion")),
+        ("tracking error during the motion, largest", millimetres("tracking_max_motion")),
         *after,
         ("largest deflection", _deflection(run)),
-        ("condition number, worst", float(np.max(run.condition))),
+        ("condition number, worst", float(METRICS["actuation_condition_max"].value(traces))),
     ]
 
 

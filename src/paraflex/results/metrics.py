@@ -1,238 +1,181 @@
-"""What a run is judged by, one formula for each number.
+"""What a run is judged by: every metric, written once.
 
-Formulas of arrays take real numbers and numbers with a complex step: sums, products and roots alone.
+A formula takes the traces of a run and those of the nominal run near it. Of a run that is its own nominal one it gives
+the metric; of one with a complex step its derivative, where a maximum or a sign is decided by the nominal run. So
+formulas are sums, products and roots alone.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
 import numpy as np
-import xarray as xr
-from numpy.typing import NDArray
 
-from paraflex.arguments import checked_arguments
-from paraflex.findings import Finding
-from paraflex.results.kinds import check_kind
+from paraflex.results.formulas import drift_speed, integral, rms, vibration
+from paraflex.results.traces import Trace, Traces
 
-# A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
-_SAME_TIME = 1e-9
-# Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
-_DRIFT_DEGREE = 2
-# Fewer samples after the motion do not tell a vibration from a drift.
-_FEWEST = 3 * (_DRIFT_DEGREE + 1)
-
-
-class ErrorSpan(Enum):
-    """What of a run its tracking error is taken over, where one number has to stand for it.
-
-    MOTION
-        The motion along the path, from its start to its end.
-    WHOLE
-        All samples, the dwell after the path among them: the paper's index (Eq. 64).
-    """
-
-    MOTION = "motion"
-    WHOLE = "whole"
-
-
-# The metric that ranks runs, and what it is called.
-HEADLINE = {ErrorSpan.MOTION: "tracking_rms_motion", ErrorSpan.WHOLE: "tracking_rms"}
-SPAN_WORDS = {ErrorSpan.MOTION: "during the motion", ErrorSpan.WHOLE: "over the whole run, dwell included"}
-
-
-def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
-    """Which samples at times t (k,) are of the motion, its end among them [s]; the others are after it."""
-    end = np.real(motion_end)
-    return np.real(t) <= end + _SAME_TIME * abs(end)
-
-
-def rms(values: NDArray[Any]) -> Any:
-    """Root mean square over the first axis; NaN of no values."""
-    if len(values) == 0:
-        return np.full(values.shape[1:], np.nan)[()]
-    return np.sqrt(np.mean(values**2, axis=0))
-
-
-def drift_speed(t: NDArray[Any], position: NDArray[Any]) -> Any:
-    """Speed at which positions (k, 2) at times t (k,) move on average [m/s]: of the drift that `vibration` is about.
-
-    The slope of the straight line of least squares. NaN where there are too few samples.
-    """
-    if len(t) < _FEWEST:
-        return np.nan
-    coefficients, half = _drift(t, position)[1:]
-    # The constant and the quadratic part are the same at both ends.
-    return np.sqrt(np.sum(coefficients[1] ** 2)) / half
-
-
-def vibration(t: NDArray[Any], position: NDArray[Any]) -> Any:
-    """Root mean square distance of positions (k, 2) at times t (k,) from their drift [m].
-
-    The drift is the quadratic in time of least squares, which a body has that moves freely, at a speed that changes
-    slowly. Of a steady sinusoid of amplitude A along a line A / sqrt(2), if the samples are of a few periods. NaN where
-    there are too few.
-    """
-    if len(t) < _FEWEST:
-        return np.nan
-    basis, coefficients, _ = _drift(t, position)
-    return np.sqrt(np.mean(np.sum((position - basis @ coefficients) ** 2, axis=1)))
-
-
-def _drift(t: NDArray[Any], position: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], Any]:
-    """Legendre polynomials at the samples (k, 3), their coefficients (3, 2) by least squares, half of the time [s]."""
-    half = 0.5 * (t[-1] - t[0])
-    x = (t - t[0]) / half - 1.0
-    basis = np.stack([np.ones_like(x), x, 1.5 * x**2 - 0.5], axis=1)
-    # Normal equations with a plain transpose: well conditioned for these, and analytic.
-    return basis, np.linalg.solve(basis.T @ basis, basis.T @ position), half
-
-
-@checked_arguments()
-def tracking_error(data: xr.Dataset) -> xr.DataArray:
-    """Root mean square distance of the end-effector from its desired place over the samples (Eq. 64) [m]."""
-    return tracking_variables(data)["tracking_rms"]
-
-
-@checked_arguments()
-def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
-    """Root mean square distance of the end-effector after the motion's end from its drift [m]: see `vibration`.
-
-    NaN where the run has too few samples after it, or did not get to its end.
-    """
-    return tracking_variables(data, motion_end)["residual_vibration"]
-
-
-_MEANINGS = {
-    "tracking_rms": ("RMS tracking error over the whole run", "m"),
-    "tracking_max": ("largest tracking error of the whole run", "m"),
-    "tracking_rms_motion": ("RMS tracking error during the motion", "m"),
-    "tracking_max_motion": ("largest tracking error during the motion", "m"),
-    "tracking_rms_after": ("RMS tracking error after the motion", "m"),
-    "tracking_max_after": ("largest tracking error after the motion", "m"),
-    "residual_vibration": ("RMS residual vibration about the drift after the motion", "m"),
-    "drift_speed": ("mean drift of the end-effector after the motion", "m/s"),
-}
-
-
-FOLLOWING = tuple(_MEANINGS)
-
-
-def tracking_variables(data: xr.Dataset, motion_end: float | None = None) -> dict[str, xr.DataArray]:
-    """How every run of a dataset follows its path: variables by name, NaN over spans that a run did not finish.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-    motion_end : float, optional
-        End of the motion along the path [s]; that of the dataset by default.
-    """
-    check_kind(data, "tracking", "verification")
-    end = float(data.attrs["motion_end"]) if motion_end is None else motion_end
-    place = data["end_effector"].transpose(..., "time", "axis")
-    away = (data["end_effector_desired"] - data["end_effector"]).transpose(*place.dims).values
-    distance = np.linalg.norm(away, axis=-1)
-    runs = [(distance[i], place.values[i]) for i in np.ndindex(distance.shape[:-1])]
-    found = [_of_run(data["time"].values, *one, end) for one in runs]
-    return {
-        name: xr.DataArray(
-            np.array([each[name] for each in found]).reshape(distance.shape[:-1]),
-            dims=place.dims[:-2],
-            attrs={"long_name": meaning, "units": unit},
-        )
-        for name, (meaning, unit) in _MEANINGS.items()
-    }
-
-
-def _of_run(
-    t: NDArray[np.float64], distance: NDArray[np.float64], position: NDArray[np.float64], motion_end: float
-) -> dict[str, float]:
-    moving = during_motion(t, motion_end)
-    after = ~moving
-    return {
-        "tracking_rms": rms(distance),
-        "tracking_max": largest(distance),
-        "tracking_rms_motion": rms(distance[moving]),
-        "tracking_max_motion": largest(distance[moving]),
-        "tracking_rms_after": rms(distance[after]),
-        "tracking_max_after": largest(distance[after]),
-        "residual_vibration": vibration(t[after], position[after]),
-        "drift_speed": drift_speed(t[after], position[after]),
-    }
-
-
-def largest(values: NDArray[np.float64]) -> float:
-    """Largest of distances; NaN of none, or where one is."""
-    return float(np.max(values)) if values.size else float("nan")
-
-
-def headline(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """The tracking error that ranks the runs of a dataset [m], and what it is of, in words.
-
-    Results that earlier versions wrote are ranked by the whole run, as they were then.
-    """
-    span = ErrorSpan.MOTION if ranked_by_motion(data) else ErrorSpan.WHOLE
-    return data[HEADLINE[span]], SPAN_WORDS[span]
-
-
-def ranked_by_motion(data: xr.Dataset) -> bool:
-    """Whether the error of the motion ranks the runs of a dataset; else that of the whole run."""
-    return data.attrs.get("error", ErrorSpan.WHOLE.value) == ErrorSpan.MOTION.value
+# Of the traces of a run and those of the nominal one. What only some traces have (`RunTraces`) is asked for as well.
+Formula = Callable[[Any, Any], Any]
 
 
 @dataclass(frozen=True)
-class Part:
-    """What runs did of a path that they were too short for.
+class Metric:
+    """A number that a run is judged by.
 
     Attributes
     ----------
-    duration, path : float
-        Of the runs, and of the path [s].
-    length : float
-        Of the path's length, the part that was run.
+    name : str
+    meaning, unit : str
+    formula : callable
+        From `Traces`; a metric per motor gives one number each.
+    label : str
+        What it is called in print; its name by default.
+    per_motor : bool
+    smooth : bool
+        Whether the formula has derivatives.
+    kept : bool
+        Whether datasets hold it, as a variable of its name.
+    of_solver : bool
+        Whether it tells of the integration, and not of the design.
+    whole : bool
+        Whether it is a count.
     """
 
-    duration: float
-    path: float
-    length: float
+    name: str
+    meaning: str
+    unit: str
+    formula: Formula
+    label: str = ""
+    per_motor: bool = False
+    smooth: bool = True
+    kept: bool = False
+    of_solver: bool = False
+    whole: bool = False
 
-    def __str__(self) -> str:
-        return (
-            f"only a part of the path was run: {self.duration:.3g} of {self.path:.3g} s, {100.0 * self.length:.3g} % "
-            "of its length; errors are of that part"
-        )
+    def value(self, traces: Traces) -> Any:
+        """The metric of a run; of a metric per motor an array."""
+        return self.formula(traces, traces)
 
-    def finding(self, place: str = "study.duration") -> Finding:
-        """The same, to be kept with results."""
-        return Finding("path-cut-short", place, str(self), f"the path takes {self.path:.4g} s")
-
-    def figures(self) -> dict[str, float | str]:
-        """As plain numbers, and in words."""
-        return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
-
-
-def too_short(end: float, path_duration: float) -> bool:
-    """Whether a run that ends then [s] does not come to the end of its path [s]."""
-    return end < path_duration * (1.0 - _SAME_TIME)
+    def columns(self, motors: Sequence[str]) -> list[str]:
+        """What its numbers are called: NAME, or NAME.MOTOR of each motor."""
+        return [f"{self.name}.{motor}" for motor in motors] if self.per_motor else [self.name]
 
 
-def part_run(data: xr.Dataset) -> Part | None:
-    """What the runs of a dataset were to do of a path that they were too short for; None where they were not."""
-    end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
-    if "path_length_run" not in data.attrs or not too_short(end, path):
-        return None
-    return Part(end, path, float(data.attrs["path_length_run"]))
+def _as_it_is(formula: Callable[[Any], Any]) -> Formula:
+    """A formula in which nothing is decided."""
+    return lambda run, _: formula(run)
 
 
-@checked_arguments()
-def peak_torque(data: xr.Dataset) -> xr.DataArray:
-    """Largest magnitude of each motor's torque [N m]."""
-    return abs(data["torque"]).max("time").assign_attrs(long_name="peak torque", units="N m")
+def _largest(trace: Callable[[Any], Trace]) -> Formula:
+    """The largest of an array, where it is largest in the nominal run; NaN of none, or where one is."""
+
+    def value(run: Any, nominal: Any) -> Any:
+        at_nominal = trace(nominal)
+        return trace(run).flat[int(np.argmax(at_nominal))] if at_nominal.size else np.nan
+
+    return value
 
 
-@checked_arguments()
-def rms_torque(data: xr.Dataset) -> xr.DataArray:
-    """Root mean square of each motor's torque over the run [N m]."""
-    return ((data["torque"] ** 2).mean("time") ** 0.5).assign_attrs(long_name="RMS torque", units="N m")
+def _largest_magnitude(trace: Callable[[Any], Trace]) -> Formula:
+    """As `_largest`, with the sign of the nominal run's; 0 of none, and NaN only where all are."""
+
+    def value(run: Any, nominal: Any) -> Any:
+        at_nominal = trace(nominal)
+        if not np.isfinite(at_nominal).any():
+            return np.nan if at_nominal.size else 0.0
+        at = int(np.nanargmax(np.abs(at_nominal)))
+        return np.sign(at_nominal.flat[at]) * trace(run).flat[at]
+
+    return value
+
+
+def _peak_torques(run: Any, nominal: Any) -> Any:
+    if not len(nominal.torque):
+        return np.full(nominal.torque.shape[1], np.nan)
+    magnitude = _largest_magnitude(lambda torque: torque)
+    return np.array([magnitude(*pair) for pair in zip(run.torque.T, nominal.torque.T, strict=True)])
+
+
+def _motor_energy(run: Any, nominal: Any) -> Any:
+    return integral(run.t, np.sum(np.sign(nominal.power) * run.power, axis=1))
+
+
+def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = False) -> Metric:
+    """What a solution tells under the same name."""
+    formula = _as_it_is(lambda x: getattr(x.run.solution, name))
+    return Metric(name, meaning, unit, formula, smooth=False, of_solver=True, whole=whole)
+
+
+# Kept of every run: numbers of a model that does not hold are not to be taken for others.
+VALIDITY = "validity"
+_AWAY = "distance of the end-effector from its desired place"
+
+# In this order they are columns of tables.
+_ALL = (
+    Metric("tracking_rms_motion", f"root mean square {_AWAY} during the motion", "m",
+           _as_it_is(lambda x: rms(x.distance[x.moving])), "RMS error in the motion", kept=True),
+    Metric("tracking_max_motion", f"largest {_AWAY} during the motion", "m",
+           _largest(lambda x: x.distance[x.moving]), "largest error in the motion", kept=True),
+    Metric("tracking_rms_after", f"root mean square {_AWAY} after the motion", "m",
+           _as_it_is(lambda x: rms(x.distance[~x.moving])), "RMS error after the motion", kept=True),
+    Metric("tracking_max_after", f"largest {_AWAY} after the motion", "m",
+           _largest(lambda x: x.distance[~x.moving]), "largest error after the motion", kept=True),
+    Metric("tracking_rms", f"root mean square {_AWAY} over the whole run, dwell included", "m",
+           _as_it_is(lambda x: rms(x.distance)), "RMS tracking error", kept=True),
+    Metric("tracking_max", f"largest {_AWAY} over the whole run", "m",
+           _largest(lambda x: x.distance), "largest tracking error", kept=True),
+    Metric("residual_vibration", "root mean square distance of the end-effector from its drift after the motion", "m",
+           _as_it_is(lambda x: vibration(*x.after)), "residual vibration", kept=True),
+    Metric("drift_speed", "mean speed of the end-effector's drift after the motion", "m/s",
+           _as_it_is(lambda x: drift_speed(*x.after)), "drift after the motion", kept=True),
+    Metric("deflection_max", "largest deflection of any body from its chord, the line between its ends", "m",
+           _largest_magnitude(lambda x: x.deflection), "largest deflection"),
+    Metric("peak_torque_max", "largest magnitude of any motor's torque", "N m",
+           _largest_magnitude(lambda x: x.torque), "peak torque"),
+    Metric("rms_torque_norm", "root mean square of the torques' Euclidean norm", "N m",
+           _as_it_is(lambda x: np.sqrt(np.mean(np.sum(x.torque**2, axis=1)))), "RMS torque"),
+    Metric("peak_torque", "largest magnitude of each motor's torque", "N m",
+           _peak_torques, "peak torque", per_motor=True, kept=True),
+    Metric("rms_torque", "root mean square of each motor's torque", "N m",
+           _as_it_is(lambda x: rms(x.torque)), "RMS torque", per_motor=True, kept=True),
+    Metric("work", "work done on the mechanism until the end, less what dampers take", "J",
+           _as_it_is(lambda x: x.run.solution.work[-1])),
+    Metric("motor_energy", "integral of the magnitudes of all motors' powers, from the samples", "J",
+           _motor_energy, "energy of the motors"),
+    Metric("motor_power_max", "largest magnitude of any motor's power", "W",
+           _largest_magnitude(lambda x: x.power), "largest motor power"),
+    Metric("strain_energy_max", "largest strain energy", "J",
+           _largest(lambda x: x.run.solution.strain_energy), "largest strain energy"),
+    Metric("kinetic_energy_max", "largest kinetic energy", "J",
+           _largest(lambda x: x.run.solution.kinetic_energy), "largest kinetic energy"),
+    Metric("total_mass", "mass of all bodies", "kg",
+           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.run.task.system.bodies])), "mass"),
+    Metric("actuation_condition_max", "largest condition number of the actuation matrix", "1",
+           _largest(lambda x: x.condition), "largest condition number"),
+    _of_the_solver("constraint_position_max", "largest constraint violation in position", "m"),
+    _of_the_solver("energy_balance_max", "largest imbalance of energy and work", "J"),
+    Metric(VALIDITY, "what the model leaves out, over its limit: it holds up to 1, and 0 where nothing bends", "1",
+           _as_it_is(lambda x: 0.0 if x.run.validity is None else x.run.validity.ratio), smooth=False),
+    _of_the_solver("steps", "accepted steps", whole=True),
+    _of_the_solver("rejected", "rejected steps", whole=True),
+    _of_the_solver("newton_iterations", "Newton iterations", whole=True),
+)  # fmt: skip
+
+METRICS: Mapping[str, Metric] = {metric.name: metric for metric in _ALL}
+
+
+def metric_label(column: str, motor: Callable[[str], str] = str) -> str:
+    """What a column of a table is called in print: "RMS tracking error"; "peak torque of tau1" of one motor's.
+
+    Parameters
+    ----------
+    column : str
+        NAME or NAME.MOTOR; another name than those of `METRICS` stands for itself.
+    motor : callable
+        How a motor's name is printed.
+    """
+    name, dot, whose = column.partition(".")
+    printed = METRICS[name].label if name in METRICS else ""
+    return (printed or name.replace("_", " ")) + (f" of {motor(whose)}" if dot else "")

@@ -4,37 +4,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.dynamics.points import point_motion, tip_deflection
+from paraflex.dynamics.points import point_motion
 from paraflex.findings import Finding
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
-from paraflex.results.dataset import UNITS, describe, end_effector_point
 from paraflex.results.doubts import keep_findings, verdict_of
-from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
-from paraflex.results.joint_loads import joint_loads
 from paraflex.results.kinds import check_kind
-from paraflex.results.outlines import chord_deflections
+from paraflex.results.labelled import Variables, label, link_coordinates, link_variables, padded, provenance
+from paraflex.results.links import system_links
 from paraflex.results.record import FIGURES
-from paraflex.results.storage import SCHEMA
 from paraflex.results.summary import finite_or_none
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
-
-_OWN_UNITS = {
-    "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
-    "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
-    "point_velocity": ("velocity of a named point", "m/s"),
-    "applied_torque": ("constant motor torque", "N m"),
-}
 
 
 @checked_arguments()
@@ -67,69 +55,32 @@ def motion_dataset(
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v, a = solution.q, solution.v, solution.a
-    points = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
-    joints = [joint.name for joint in mechanism.joints]
-    motions = [point_motion(system, point, q, v, a) for point in points]
-    angles = [body.angle for body in system.bodies]
-    tips = np.stack([tip_deflection(system, body.name, q) for body in system.bodies], axis=1)
-    torques = np.tile(np.array(list(run.torques.values())), (len(q), 1))
-    loads = joint_loads(system, joints, q, solution.multipliers, torques)
-    values: dict[str, tuple[tuple[str, ...], NDArray[np.float64]]] = {
+    torques = np.array(list(run.torques.values()))
+    links = system_links(system, solution, np.tile(torques, (len(q), 1)), len(q))
+    named = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
+    velocities = [point_motion(system, point, q, v, a).velocity for point in named]
+    values: Variables = {
         "coordinate_value": (("coordinate",), q),
         "coordinate_rate": (("coordinate",), v),
-        "angle": (("body",), q[:, angles]),
-        "angular_velocity": (("body",), v[:, angles]),
-        "angular_acceleration": (("body",), a[:, angles]),
-        "tip_axial": (("body",), tips[:, :, 0]),
-        "tip_transverse": (("body",), tips[:, :, 1]),
-        "tip_slope": (("body",), tips[:, :, 2]),
-        "point_position": (("point", "axis"), _stacked([motion.position for motion in motions], len(q))),
-        "point_velocity": (("point", "axis"), _stacked([motion.velocity for motion in motions], len(q))),
-        "joint_force": (("joint", "axis"), loads.force),
-        "joint_moment": (("joint",), loads.moment),
-        "multiplier": (("row",), solution.multipliers),
-        "kinetic_energy": ((), solution.kinetic_energy),
-        "strain_energy": ((), solution.strain_energy),
-        "work": ((), solution.work),
+        "point_velocity": (
+            ("point", "axis"), np.stack(velocities, axis=1) if velocities else np.zeros((len(q), 0, 2)),
+        ),
+        **link_variables(links, mechanism),
+    }  # fmt: skip
+    data: dict[str, Any] = {
+        name: (("time", *dims), padded(each, run.times.size)) for name, (dims, each) in values.items()
     }
-    data: dict[str, Any] = {name: (("time", *dims), _full(array, run)) for name, (dims, array) in values.items()}
-    drawn = system_drawing(system, q)
-    data["deflection"] = (("time", "body"), _full(chord_deflections(mechanism, drawn.shape), run))
-    for name, (dims, array) in drawing_variables(drawn).items():
-        data[name] = (("time", *dims), _full(array, run).astype(np.float32))
     data |= {name: getattr(solution, name) for name in FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
-    data["applied_torque"] = (("motor",), np.array(list(run.torques.values())))
-    out = xr.Dataset(
-        data,
-        coords={
-            "time": run.times,
-            "coordinate": _coordinate_names(run),
-            "body": [body.name for body in system.bodies],
-            "point": [str(point) for point in points],
-            "joint": joints,
-            "row": list(system.rows),
-            "axis": ["x", "y"],
-            "motor": list(run.torques),
-            **drawing_coordinates(mechanism),
-        },
-    )
-    units = UNITS | _OWN_UNITS
-    for name in out.variables:
-        if name in units:
-            describe(out, str(name), *units[str(name)])
-    options = options or IntegrationOptions()
-    out.attrs = {
-        "mechanism": mechanism.name,
+    data["applied_torque"] = (("motor",), torques)
+    coordinates = {"time": run.times, "coordinate": _coordinate_names(run), **link_coordinates(system)}
+    out = xr.Dataset(data, coords=coordinates)
+    out["motor_power"] = out["motor_speed"] * out["applied_torque"]
+    label(out, mechanism)
+    method = METHODS[solution.method].title
+    out.attrs = provenance(mechanism, method, options or IntegrationOptions(), parameters) | {
         "kind": "motion",
-        **end_effector_point(mechanism),
-        "tolerance": options.tolerance,
-        "method": METHODS[solution.method].title,
-        **options.told(),
         "singular_positions": json.dumps(solution.singular_positions),
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
-        "schema": SCHEMA,
     }
     beyond = [] if run.validity is None or run.validity.holds else [run.validity.finding()]
     keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *run.doubts])
@@ -169,16 +120,6 @@ def _coordinate_names(run: MotionRun) -> list[str]:
         for body in run.system.bodies
         for part in ("x", "y", "phi", *(f"eta{k + 1}" for k in range(body.nf)))
     ]
-
-
-def _stacked(parts: list[NDArray[np.float64]], samples: int) -> NDArray[np.float64]:
-    return np.stack(parts, axis=1) if parts else np.zeros((samples, 0, 2))
-
-
-def _full(array: NDArray[np.float64], run: MotionRun) -> NDArray[np.float64]:
-    out = np.full((run.times.size, *array.shape[1:]), np.nan)
-    out[: array.shape[0]] = array
-    return out
 
 
 def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:

@@ -76,7 +76,7 @@ def outline(body: Body) -> Outline:
     distinct = _distinct(named)
     if len(distinct) < 2:
         distinct = _distinct(np.vstack([named, body.centre_of_mass]))
-    order = _round(distinct)
+    order = figure_order(distinct)
     places = distinct[order]
     return Outline(
         body.name,
@@ -132,7 +132,7 @@ def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
     local = drawn.places + np.einsum("kn,sin->ksi", u, _rows(system, body, drawn))
     if body.points is not None and body.mesh is not None:
         local[:, :, 0] -= 0.5 * slope_squares(body.mesh, body.integrals.D, drawn.places[:, 0], u)
-    return _turned(q[:, body.position], q[:, body.angle], local)
+    return turned(q[:, body.position], q[:, body.angle], local)
 
 
 def segment_motion(system: System, names: Sequence[str], starts: Sequence[float], drawn: Outline, q: Array) -> Array:
@@ -143,7 +143,7 @@ def segment_motion(system: System, names: Sequence[str], starts: Sequence[float]
     for i, (name, start) in enumerate(zip(names, starts, strict=True)):
         body, own = system.body(name), owners == i
         local = np.broadcast_to(drawn.places[own] - [start, 0.0], (q.shape[0], int(own.sum()), 2))
-        out[:, own] = _turned(q[:, body.position], q[:, body.angle], local)
+        out[:, own] = turned(q[:, body.position], q[:, body.angle], local)
     return out
 
 
@@ -239,7 +239,8 @@ def _axis(z: NDArray[np.complex128], size: float) -> complex | None:
     return complex(direction) if np.max(np.abs(across)) <= _SAME * max(size, abs(far)) else None
 
 
-def _turned(position: Array, angle: Array, local: Array) -> Array:
+def turned(position: Array, angle: Array, local: Array) -> Array:
+    """Places (k, s, 2) in a frame at positions (k, 2) and angles (k,), in the ground frame."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y = local[..., 0], local[..., 1]
     return position[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
@@ -279,7 +280,7 @@ def _distinct(places: Array) -> Array:
     return np.array(kept).reshape(-1, 2)
 
 
-def _round(places: Array) -> NDArray[np.int64]:
+def figure_order(places: Array) -> NDArray[np.int64]:
     """Order in which places make a figure: along their line, or round their hull and back to the first, then others."""
     z = places[:, 0] + 1j * places[:, 1]
     if len(z) < 3:

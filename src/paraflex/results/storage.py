@@ -7,8 +7,9 @@ from pathlib import Path
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.errors import InputError, OutputError, suggestion
-from paraflex.results.metrics import tracking_variables
+from paraflex.errors import InputError, suggestion
+from paraflex.results.following import metric_variables
+from paraflex.writing import whole_file
 
 # Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from. 3:
 # errors during the motion and after it, vibration about the drift, deflections from the chord; joint forces are whole
@@ -35,16 +36,8 @@ def save_results(data: xr.Dataset, path: str | Path) -> None:
     OutputError
         The folder cannot be written.
     """
-    path = Path(path)
-    unfinished = path.with_name(path.name + ".part")
-    try:
+    with whole_file(Path(path), parents=False) as unfinished:
         data.to_netcdf(unfinished, engine="netcdf4", encoding=_encoding(data))
-        unfinished.replace(path)
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        raise OutputError(
-            f"cannot be written ({error.strerror or error})", field=str(path), remedy="choose another folder"
-        ) from error
 
 
 def _encoding(data: xr.Dataset) -> dict[str, dict[str, object]]:
@@ -156,5 +149,5 @@ def _checked(data: xr.Dataset, file: Path) -> xr.Dataset:
             remedy="update paraflex",
         )
     if schema < _FOLLOWING and "end_effector" in data:
-        return data.assign(tracking_variables(data))
+        return data.assign(metric_variables(data))
     return data

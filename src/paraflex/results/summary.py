@@ -6,13 +6,14 @@ import json
 import math
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.results.doubts import verdict_of
+from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import check_kind
-from paraflex.results.metrics import FOLLOWING, ErrorSpan, part_run
+from paraflex.results.metrics import METRICS
+from paraflex.results.traces import data_traces
 from paraflex.results.validity import validity_summary
 
 _COUNTS = ("steps", "rejected", "newton_iterations", "factorisations")
@@ -57,13 +58,14 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
             figures |= {"event": str(run["event"].item()), "event_time": run["event_time"].item()}
         # Results of earlier versions lack some.
         figures |= {key: finite_or_none(run[key].item()) for key in _FIGURES if key in run}
+        traces = data_traces(run)
         if "deflection" in run:
-            figures["deflection_max"] = finite_or_none(run["deflection"].max().item())
+            figures["deflection_max"] = finite_or_none(METRICS["deflection_max"].value(traces))
         figures |= {key: int(run[key].item()) for key in _COUNTS}
         for key in ("peak_torque", "rms_torque"):
             figures[key] = {str(m): finite_or_none(run[key].sel(motor=m).item()) for m in run["motor"].values}
         figures["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
-        figures["actuation_condition_max"] = finite_or_none(np.max(run["actuation_condition"].values))
+        figures["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
         figures["validity"] = validity_summary(run)
         modes[str(name)] = figures
     for name, reason in (failed or {}).items():

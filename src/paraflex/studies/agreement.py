@@ -12,8 +12,11 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import as_enum
 from paraflex.findings import Finding, Verdict
 from paraflex.results.dataset import part_of
-from paraflex.results.metrics import ErrorSpan, Part, during_motion
+from paraflex.results.following import HEADLINE, ErrorSpan, Part
+from paraflex.results.formulas import rms
+from paraflex.results.metrics import METRICS
 from paraflex.results.record import Record
+from paraflex.results.traces import Traces
 from paraflex.simulate import TrackingTask
 from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model
 from paraflex.validity import doubtful_numbers
@@ -82,14 +85,14 @@ def _of_model(task: TrackingTask, span: ErrorSpan, runs: ModelRuns, reference: R
         out[name] = value if np.isfinite(value) else None
     if reference is not None:
         gaps = _gaps(base.end_effector.position, reference.end_effector.position)
-        out["distance_max"], out["distance_rms"] = float(gaps.max()), _rms(gaps)
+        out["distance_max"], out["distance_rms"] = float(gaps.max()), float(rms(gaps))
         links = [body.name for body in task.mechanism.bodies]
         for key, one, other in (
             ("angle", base.chord, reference.chord),
             ("angular_velocity", base.chord_rate, reference.chord_rate),
         ):
             apart = np.abs(one - other)
-            out[f"{key}_difference_rms"] = {link: _rms(apart[:, i]) for i, link in enumerate(links)}
+            out[f"{key}_difference_rms"] = {link: float(rms(apart[:, i])) for i, link in enumerate(links)}
             out[f"{key}_difference_max"] = {link: float(apart[:, i].max()) for i, link in enumerate(links)}
     return out
 
@@ -103,8 +106,10 @@ def _tracking_error(task: TrackingTask, span: ErrorSpan, run: Record | None) -> 
     """Root mean square distance from the desired path during the motion, or over all samples (Eq. 64) [m]."""
     if run is None:
         return None
-    gaps, t = _gaps(run.end_effector.position, task.motion.desired.position), task.motion.t
-    return _rms(gaps if span is ErrorSpan.WHOLE else gaps[during_motion(t, task.path.duration)])
+    position, motion = run.end_effector.position, task.motion
+    distance = _gaps(position, motion.desired.position)
+    traces = Traces(motion.t, task.path.duration, position, distance, run.torque)
+    return float(METRICS[HEADLINE[span]].value(traces))
 
 
 def _distance(a: Record, b: Record) -> float:
@@ -114,7 +119,3 @@ def _distance(a: Record, b: Record) -> float:
 
 def _gaps(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.linalg.norm(a - b, axis=1)
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.dynamics import State, System, build_system
 from paraflex.dynamics.points import point_motion
-from paraflex.errors import InputError, IntegrationError
-from paraflex.integrators import IntegrationOptions, Solution
+from paraflex.errors import IntegrationError
+from paraflex.integrators import IntegrationOptions, Solution, check_times
 from paraflex.mechanism import ActuationMode, Mechanism, PointRef
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
@@ -97,10 +97,7 @@ def motion_case(
     InputError
         A duration or number of samples that makes no sense.
     """
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
-    if samples < 2:
-        raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+    check_times(duration, samples)
     effector = mechanism.end_effector
     every = tuple(PointRef(body.name, point) for body in mechanism.bodies for point in body.points)
 

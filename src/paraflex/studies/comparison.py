@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from paraflex.display import Shown
 from paraflex.integrators import DEFAULT_METHOD, METHODS
 
 # Errors at which times are compared [m], and the one in the table.
@@ -89,7 +90,7 @@ class Measurement:
 
 
 @dataclass(frozen=True)
-class MethodComparison:
+class MethodComparison(Shown):
     """Wall time against error of several methods on one motion.
 
     Attributes
@@ -172,12 +173,6 @@ class MethodComparison:
             "machine": machine(),
             "versions": _versions(),
         }
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        from paraflex.studies.html import comparison_html
-
-        return comparison_html(self)
 
     def _of_method(self, name: str) -> dict[str, Any]:
         method = METHODS[name]

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from paraflex.display import facts, page, sentence, table
+from paraflex.display import facts, page, sentence, table, view
 from paraflex.results import summary
 from paraflex.results.doubts import doubt_lines, verdict_of
-from paraflex.results.metrics import HEADLINE, SPAN_WORDS, ErrorSpan
+from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 from paraflex.results.validity import validity_line
-
-if TYPE_CHECKING:
-    from paraflex.studies.comparison import MethodComparison
-    from paraflex.studies.optimisation import IdentificationResult, IndicesResult, OptimisationResult
-    from paraflex.studies.sensitivities import Sensitivities
-    from paraflex.studies.sweeps import SweepResult
-    from paraflex.studies.tracking import StudyResult
-    from paraflex.studies.verification import Verification
+from paraflex.studies.agreement import agreement
+from paraflex.studies.comparison import MethodComparison
+from paraflex.studies.optimisation import IdentificationResult, IndicesResult, OptimisationResult, SearchResult
+from paraflex.studies.sensitivities import Sensitivities
+from paraflex.studies.sweeps import SweepResult
+from paraflex.studies.tracking import StudyResult
+from paraflex.studies.verification import Verification
 
 # Rows of tables that could be long.
 _MOST = 60
 
 
+@view.register(StudyResult)
 def study_html(result: StudyResult) -> str:
     """Every mode's status, errors, torques and the solver's figures; why modes failed."""
     if result.data is None:
@@ -54,6 +54,7 @@ def study_html(result: StudyResult) -> str:
     return page(title, *map(sentence, doubt_lines(verdict_of(result.data))), table(heads, rows), *why)
 
 
+@view.register(SweepResult)
 def sweep_html(result: SweepResult) -> str:
     """How many runs are done and how they ended, and where the table is."""
     rate = f"{result.fresh} runs in {result.seconds:.3g} s" if result.fresh else None
@@ -66,6 +67,7 @@ def sweep_html(result: SweepResult) -> str:
     return page(f"sweep: {_state(result.finished, result.interrupted)}", facts(told))
 
 
+@view.register(OptimisationResult)
 def optimisation_html(result: OptimisationResult) -> str:
     """The best design beside the start: parameters, objective, metrics."""
     numbers = [(name, result.start[name], value, result.bounds.get(name, "")) for name, value in result.values.items()]
@@ -81,6 +83,7 @@ def optimisation_html(result: OptimisationResult) -> str:
     )
 
 
+@view.register(IdentificationResult)
 def identification_html(result: IdentificationResult) -> str:
     """The parameters found, with deviations, and what becomes of every target."""
     found = result.confidence
@@ -109,6 +112,7 @@ def identification_html(result: IdentificationResult) -> str:
     )
 
 
+@view.register(IndicesResult)
 def indices_html(result: IndicesResult) -> str:
     """First-order and total indices of every parameter, a row each."""
     rows = [
@@ -121,6 +125,7 @@ def indices_html(result: IndicesResult) -> str:
     return page(f"Sobol indices: {_state(result.sweep.finished, result.sweep.interrupted)}", shown, _more(len(rows)))
 
 
+@view.register(Sensitivities)
 def sensitivities_html(found: Sensitivities) -> str:
     """Elasticities of every metric by every parameter, a row a metric, path and mode."""
     relative = found.relative
@@ -135,10 +140,9 @@ def sensitivities_html(found: Sensitivities) -> str:
                 _more(len(rows)))  # fmt: skip
 
 
+@view.register(Verification)
 def verification_html(verification: Verification) -> str:
     """Every model in every mode: tracking error, distance from the reference, time."""
-    from paraflex.studies.agreement import agreement
-
     figures = agreement(verification)
     rows = [
         (mode, name, told["status"], _millimetres(told.get("tracking_error")), _millimetres(told.get("distance_max")),
@@ -157,6 +161,7 @@ def verification_html(verification: Verification) -> str:
     return page(f"{figures['mechanism']}, models compared: {state}", table(heads, rows), *why)
 
 
+@view.register(MethodComparison)
 def comparison_html(comparison: MethodComparison) -> str:
     """Every run of every method: error, time, steps."""
     figures = comparison.figures()
@@ -176,7 +181,7 @@ def comparison_html(comparison: MethodComparison) -> str:
     )
 
 
-def _search_facts(result: OptimisationResult | IdentificationResult) -> list[tuple[str, Any]]:
+def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:
     return [
         ("designs", f"{result.evaluations}, {result.failed} of them not running"),
         ("one that does not run", result.reasons[0] if result.reasons else None),

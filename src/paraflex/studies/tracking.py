@@ -12,12 +12,13 @@ from typing import Protocol
 import xarray as xr
 
 from paraflex.arguments import checked_arguments, refused
+from paraflex.display import Shown
 from paraflex.errors import IntegrationError, NumericalError
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import tracking_dataset
-from paraflex.results.metrics import ErrorSpan
+from paraflex.results.following import ErrorSpan
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
 
 
@@ -32,7 +33,7 @@ class Simulator(Protocol):
 
 
 @dataclass(frozen=True)
-class StudyResult:
+class StudyResult(Shown):
     """What became of the modes of a study.
 
     Attributes
@@ -55,12 +56,6 @@ class StudyResult:
         return (
             not self.failed and self.data is not None and bool(self.data["status"].isin(["complete", "stopped"]).all())
         )
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        from paraflex.studies.html import study_html
-
-        return study_html(self)
 
 
 @checked_arguments()

@@ -10,6 +10,7 @@ from functools import partial
 import xarray as xr
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.display import Shown
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
@@ -26,7 +27,7 @@ from paraflex.mechanism import (
     proportional_segments,
 )
 from paraflex.results import tracking_dataset
-from paraflex.results.metrics import ErrorSpan
+from paraflex.results.following import ErrorSpan
 from paraflex.results.record import Record, record
 from paraflex.simulate import TrackingTask, simulate
 
@@ -98,7 +99,7 @@ class ModelRuns:
 
 @given_as("a verification", "what verify returns")
 @dataclass(frozen=True)
-class Verification:
+class Verification(Shown):
     """Runs of all models in all modes.
 
     Attributes
@@ -122,12 +123,6 @@ class Verification:
         return not self.interrupted and not any(
             runs.failure for by_model in self.runs.values() for runs in by_model.values()
         )
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        from paraflex.studies.html import verification_html
-
-        return verification_html(self)
 
     def dataset(self, *, parameters: dict | None = None, error: ErrorSpan | str = ErrorSpan.MOTION) -> xr.Dataset:
         """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
@@ -266,7 +261,7 @@ def run_model(
 
 @checked_arguments()
 def check_model(name: str, mechanism: Mechanism) -> None:
-    """Nothing, if a mechanism can be run in a model.
+    """Check that a mechanism can be run in a model.
 
     Raises
     ------

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from paraflex.errors import IntegrationError, SliderOffBeamError
+from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.mechanism import Mechanism
 from paraflex.validity.numbers import doubtful_numbers
@@ -24,9 +26,13 @@ def to_blame(mechanism: Mechanism, text: str = "") -> str:
         Of the error: numbers of a body that it names come first.
     """
     found = [one for one in doubtful_numbers(mechanism) if one.code in _CODES]
-    named = [body.name for body in mechanism.bodies if f" {body.name} " in f" {text} "]
-    of_body = [one for one in found if any(one.place.startswith(f"body.{name}.") for name in named)]
-    for one in [*of_body, *found]:
+    return most_likely(found, [body.name for body in mechanism.bodies if f" {body.name} " in f" {text} "])
+
+
+def most_likely(found: Sequence[Finding], bodies: Sequence[str] = ()) -> str:
+    """The first of the numbers found to be doubtful, those of the named bodies before others; empty for none."""
+    of_bodies = [one for one in found if any(f"{one.place}.".startswith(f"body.{name}.") for name in bodies)]
+    for one in [*of_bodies, *found]:
         return f"most likely because of {one.place}: {one.text}"
     return ""
 

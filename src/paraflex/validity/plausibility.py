@@ -17,12 +17,13 @@ from paraflex.integrators import Solution
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import AxisJoint, Mechanism, PointForce
 from paraflex.validity.bending import bending_of
+from paraflex.validity.blame import most_likely
 from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
 
 Array = NDArray[np.float64]
 
 # Slope of a link in its frame beyond which it is a spring rather than a link [rad].
-BENT = 0.7
+STEEP = 0.7
 # Tracking error over the diagonal of the path: the library's worst mode, RAParM-I's +-+-, has 0.34, dwell included.
 LOST = 0.5
 # A motor's effort over that of the whole mass at the acceleration of the path and under gravity, with all loads: the
@@ -77,7 +78,10 @@ class _Where(NamedTuple):
 
     place: str
     mechanism: Mechanism
-    numbers: list[Finding]
+
+    def blame(self, *bodies: str) -> str:
+        """The number of the model that is most likely to blame, of the named bodies first; empty for none."""
+        return most_likely(doubtful_numbers(self.mechanism), bodies)
 
 
 def doubtful_results(
@@ -103,8 +107,12 @@ def doubtful_results(
     if not solution.t.size:
         return []
     mechanism = mechanism or system.mechanism
-    where = _Where("" if driven is None else f"mode {driven.mode}", mechanism, doubtful_numbers(mechanism))
-    found = [*_bent(where, system, solution), *_fast(where, system, solution), *_large_forces(where, system, solution)]
+    where = _Where("" if driven is None else f"mode {driven.mode}", mechanism)
+    found = [
+        *_large_slopes(where, system, solution),
+        *_fast(where, system, solution),
+        *_large_forces(where, system, solution),
+    ]
     if driven is not None:
         found += [*_lost(where, driven), *_large_efforts(where, system, driven)]
     return found
@@ -112,19 +120,17 @@ def doubtful_results(
 
 def doubtful_efforts(system: System, driven: Driven) -> list[Finding]:
     """Findings about the torques and forces of a plan, before anything runs."""
-    mechanism = system.mechanism
-    where = _Where(f"mode {driven.mode}", mechanism, doubtful_numbers(mechanism))
-    return list(_large_efforts(where, system, driven))
+    return list(_large_efforts(_Where(f"mode {driven.mode}", system.mechanism), system, driven))
 
 
-def _bent(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
     slopes = {body.name: bending_of(system, body.name, solution).slope for body in system.bodies if body.nf}
     if not slopes:
         return
     worst = max(slopes, key=lambda name: np.max(slopes[name]))
     k = int(np.argmax(slopes[worst]))
-    if slopes[worst][k] > BENT:
-        blame = _blame(where, worst) or (
+    if slopes[worst][k] > STEEP:
+        blame = where.blame(worst) or (
             f"look at section and Young's modulus of {worst}, and at what moves and loads it"
             + _moving(where.mechanism, solution)
         )
@@ -142,7 +148,7 @@ def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding
         yield Finding(
             "speed-large", where.place,
             f"{system.bodies[b].name} moves at {speeds[k, b]:.3g} m/s at t = {solution.t[k]:.4g} s",
-            _blame(where) or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
+            where.blame() or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
         )  # fmt: skip
 
 
@@ -158,7 +164,7 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
         yield Finding(
             "error-large", where.place,
             f"the tracking error is {error:.3g} m on a path that is {extent:.3g} m large: it is not followed",
-            _blame(where) or (f"{others}; {soft}" if others else soft),
+            where.blame() or (f"{others}; {soft}" if others else soft),
         )  # fmt: skip
 
 
@@ -174,7 +180,7 @@ def _large_efforts(where: _Where, system: System, driven: Driven) -> Iterator[Fi
                 "torque-large", where.place,
                 f"motor {motor} gives up to {peak:.3g} {unit}, where mass, size, acceleration and loads come to "
                 f"{expected:.2g} {unit}",
-                _resisting(mechanism) or _blame(where) or _singular(driven),
+                _resisting(mechanism) or where.blame() or _singular(driven),
             )  # fmt: skip
 
 
@@ -206,7 +212,7 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
             "force-large", where.place,
             f"{joint} takes {forces[k]:.3g} N for a tenth of the time or more, where mass, acceleration and loads come "
             f"to {expected + turning / size:.2g} N",
-            _blame(where) or _resisting(where.mechanism) or "look at masses (kg), stiffnesses and prescribed motions",
+            where.blame() or _resisting(where.mechanism) or "look at masses (kg), stiffnesses and prescribed motions",
         )  # fmt: skip
 
 
@@ -236,11 +242,3 @@ def _singular(driven: Driven) -> str:
     if driven.condition > _NEAR_SINGULAR:
         return f"the path passes near a singular position of the motors (condition number {driven.condition:.3g})"
     return "look at masses (kg) and the path's acceleration (m/s^2)"
-
-
-def _blame(where: _Where, body: str = "") -> str:
-    """The number of the model that is most likely to blame, if one is doubtful."""
-    of_body = [one for one in where.numbers if body and one.place.startswith(f"body.{body}")]
-    for one in [*of_body, *where.numbers]:
-        return f"most likely because of {one.place}: {one.text}"
-    return ""

@@ -2,75 +2,113 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from paraflex.errors import InputError
 
 # What a command runs of which no model is named.
 DEFAULT_MODEL = "raparm_i"
 
-Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
+Json = Annotated[bool, Option("--json", help="Print JSON instead of tables.")]
 PathOption = Annotated[
     str | None,
-    typer.Option(
+    Option(
         "--path", metavar="NAME|FILE", help="A path of the model (square, line, circle, ...) or a TOML file with one."
     ),
 ]
-ModelArgument = Annotated[
-    str | None,
-    typer.Argument(metavar="NAME|FILE", help=f"A library mechanism or a TOML file. Default: {DEFAULT_MODEL}."),
-]
-MechanismOption = Annotated[
-    str | None, typer.Option("--mechanism", "-m", metavar="NAME|FILE", help="The same, named by an option.")
-]
-DurationOption = Annotated[float | None, typer.Option(metavar="S", help="Duration, dwell included.")]
-SamplesOption = Annotated[int | None, typer.Option(metavar="N", help="Samples kept.")]
-MethodOption = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Method of integration: paraflex methods lists them.")
-]
-AssemblyOption = Annotated[str | None, typer.Option(metavar="NAME", help="Which way the mechanism is put together.")]
-StudyArgument = Annotated[
-    str, typer.Argument(metavar="STUDY.toml", help="What is free within which bounds, what is run.")
-]
+MethodOption = Annotated[str | None, Option(metavar="NAME", help="Method of integration: paraflex methods lists them.")]
+AssemblyOption = Annotated[str | None, Option(metavar="NAME", help="Which way the mechanism is put together.")]
+StudyArgument = Annotated[str, Argument(metavar="STUDY.toml", help="What is free within which bounds, what is run.")]
 OutputOption = Annotated[
-    str | None, typer.Option("--output", "--out", metavar="DIR", help="Folder for results. Default: results/STUDY.")
+    str | None, Option("--output", "--out", metavar="DIR", help="Folder for results. Default: results/STUDY.")
 ]
-EngineOption = Annotated[
-    str, typer.Option("--engine", metavar="threads|processes|dask", help="Who computes; results are the same.")
-]
-WorkersOption = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="How many. Default: one a processor.")
-]
-ClusterOption = Annotated[
-    str | None,
-    typer.Option(
-        "--cluster", metavar="ADDRESS", help="Of a Dask scheduler, tcp://host:8786. Default: one on this machine."
-    ),
-]
-ReportOption = Annotated[bool, typer.Option("--report/--no-report", help="Write report.html, or leave it out.")]
-ReferenceOption = Annotated[
-    str | None,
-    typer.Option(metavar="pinned|cantilever|free", help="How frames are fixed to beams. Default: the model's."),
-]
-CurvatureOption = Annotated[
-    str | None,
-    typer.Option(metavar="separate|shared", help="Curvature of beams at lumped inertias. Default: the model's."),
-]
+ReportOption = Annotated[bool, Option("--report/--no-report", help="Write report.html, or leave it out.")]
 
 
-def model_named(argument: str | None, option: str | None) -> str | None:
-    """The model that a command line names, by its argument or by --mechanism; None where it names none.
+@dataclass(frozen=True)
+class ModelChoice:
+    """A model, named by an argument or by --mechanism.
 
     Raises
     ------
     InputError
         Both name one, and not the same.
     """
-    if argument is not None and option is not None and argument != option:
-        raise InputError(
-            f"two models are named, {argument!r} and --mechanism {option!r}", field="--mechanism",
-            remedy="name one of them",
-        )  # fmt: skip
-    return option if argument is None else argument
+
+    source: Annotated[
+        str | None, Argument(metavar="NAME|FILE", help=f"A library mechanism or a TOML file. Default: {DEFAULT_MODEL}.")
+    ] = None
+    mechanism: Annotated[
+        str | None, Option("--mechanism", "-m", metavar="NAME|FILE", help="The same, named by an option.")
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.source is not None and self.mechanism is not None and self.source != self.mechanism:
+            raise InputError(
+                f"two models are named, {self.source!r} and --mechanism {self.mechanism!r}", field="--mechanism",
+                remedy="name one of them"
+            )  # fmt: skip
+
+    @property
+    def given(self) -> str | None:
+        """Its name, where one is given."""
+        return self.mechanism if self.source is None else self.source
+
+    @property
+    def name(self) -> str:
+        """Its name, or that of the model run by default."""
+        return self.given or DEFAULT_MODEL
+
+
+@dataclass(frozen=True)
+class PlanChoice:
+    """What `Model.plan` takes of the command line; None takes the model's."""
+
+    duration: Annotated[float | None, Option(metavar="S", help="Duration, dwell included.")] = None
+    samples: Annotated[int | None, Option(metavar="N", help="Samples kept.")] = None
+    assembly: AssemblyOption = None
+
+
+@dataclass(frozen=True)
+class FramesChoice:
+    """Frames and curvature of all beams; None takes the model's."""
+
+    reference: Annotated[
+        str | None,
+        Option(metavar="pinned|cantilever|free", help="How frames are fixed to beams. Default: the model's."),
+    ] = None
+    curvature: Annotated[
+        str | None,
+        Option(metavar="separate|shared", help="Curvature of beams at lumped inertias. Default: the model's."),
+    ] = None
+
+
+@dataclass(frozen=True)
+class WorkersChoice:
+    """Who computes the runs of a study."""
+
+    engine: Annotated[
+        str, Option("--engine", metavar="threads|processes|dask", help="Who computes; results are the same.")
+    ] = "threads"
+    workers: Annotated[int | None, Option("--workers", metavar="N", help="How many. Default: one a processor.")] = None
+    cluster: Annotated[
+        str | None,
+        Option(
+            "--cluster", metavar="ADDRESS", help="Of a Dask scheduler, tcp://host:8786. Default: one on this machine."
+        ),
+    ] = None
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """As functions of studies take it; a cluster is Dask's."""
+        engine = "dask" if self.cluster is not None and self.engine == "threads" else self.engine
+        return {"engine": engine, "workers": self.workers, "cluster": self.cluster}
+
+
+def study_folder(study: str, output: str | None) -> Path:
+    """Where results of a study file go: where it is said, else results/ and the file's name."""
+    return Path("results") / Path(study).stem if output is None else Path(output)

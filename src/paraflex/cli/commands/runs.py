@@ -1,236 +1,145 @@
-"""Runs of a mechanism."""
+"""Requests for runs of a mechanism."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from paraflex.cli.commands.options import (
-    DEFAULT_MODEL,
-    AssemblyOption,
-    CurvatureOption,
-    DurationOption,
+    FramesChoice,
     Json,
-    MechanismOption,
     MethodOption,
-    ModelArgument,
+    ModelChoice,
     PathOption,
-    ReferenceOption,
+    PlanChoice,
     ReportOption,
-    SamplesOption,
-    model_named,
 )
 
 
-def run(
-    source: ModelArgument = None,
-    mechanism: MechanismOption = None,
-    path: PathOption = None,
-    mode: Annotated[
-        list[str] | None,
-        typer.Option(
+@dataclass(frozen=True, kw_only=True)
+class RunRequest:
+    """What `paraflex run` is asked for; None takes the model's or the program's default."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    path: PathOption = None
+    modes: Annotated[
+        list[str],
+        Option(
+            "--mode",
             metavar="MODE",
             help="Actuation mode: signs (+-+-) or motor names (tau1,tau5); repeatable. Default: the study's.",
         ),
-    ] = None,
-    tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance; the study's, else 1e-5.")] = None,
-    duration: DurationOption = None,
-    samples: SamplesOption = None,
-    assembly: AssemblyOption = None,
-    alpha: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient alpha.")] = None,
-    beta: Annotated[float | None, typer.Option(metavar="1/S", help="Baumgarte coefficient beta.")] = None,
+    ] = field(default_factory=list)
+    tolerance: Annotated[float | None, Option("--tol", metavar="METRES", help="Tolerance; the study's, else 1e-5.")] = (
+        None
+    )
+    plan: PlanChoice = field(default_factory=PlanChoice)
+    alpha: Annotated[float | None, Option(metavar="1/S", help="Baumgarte coefficient alpha.")] = None
+    beta: Annotated[float | None, Option(metavar="1/S", help="Baumgarte coefficient beta.")] = None
     max_steps: Annotated[
-        int | None, typer.Option(metavar="N", help="Steps before a run is given up. Default: ten million.")
-    ] = None,
-    method: MethodOption = None,
-    method_parameter: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="A parameter of the method; repeatable.")
-    ] = None,
+        int | None, Option(metavar="N", help="Steps before a run is given up. Default: ten million.")
+    ] = None
+    method: MethodOption = None
+    parameters: Annotated[
+        list[str], Option("--method-parameter", metavar="NAME=VALUE", help="A parameter of the method; repeatable.")
+    ] = field(default_factory=list)
     step: Annotated[
-        float | None, typer.Option(metavar="S", help="A fixed step. Default: steps are chosen by their errors.")
-    ] = None,
+        float | None, Option(metavar="S", help="A fixed step. Default: steps are chosen by their errors.")
+    ] = None
     constraints: Annotated[
         str | None,
-        typer.Option(metavar="baumgarte|projection|ggl", help="What keeps the constraints. Default: the method's."),
-    ] = None,
+        Option(metavar="baumgarte|projection|ggl", help="What keeps the constraints. Default: the method's."),
+    ] = None
     automatic_gains: Annotated[
-        bool, typer.Option("--automatic-gains", help="Baumgarte coefficients that follow the step.")
-    ] = False,
+        bool, Option("--automatic-gains", help="Baumgarte coefficients that follow the step.")
+    ] = False
     stop_at: Annotated[
-        list[str] | None,
-        typer.Option(
+        list[str],
+        Option(
             metavar="EVENT",
             help="Where the run ends: joint:NAME=LOW..HIGH, deflection:BODY=METRES, singular=DISTANCE, "
             "singular:MOTOR,...=DISTANCE; repeatable.",
         ),
-    ] = None,
-    rigid: Annotated[bool, typer.Option("--rigid", help="Take all bodies as rigid.")] = False,
+    ] = field(default_factory=list)
+    rigid: Annotated[bool, Option("--rigid", help="Take all bodies as rigid.")] = False
     geometry: Annotated[
-        str | None, typer.Option(metavar="second-order|linear", help="Shape of the beams. Default: the model's.")
-    ] = None,
-    reference: ReferenceOption = None,
-    curvature: CurvatureOption = None,
+        str | None, Option(metavar="second-order|linear", help="Shape of the beams. Default: the model's.")
+    ] = None
+    frames: FramesChoice = field(default_factory=FramesChoice)
     segments: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Cut beams into finite segments, so many the longest (the paper's: 8)."),
-    ] = None,
-    ked: Annotated[
-        bool, typer.Option("--ked", help="Kineto-elastodynamics: active motors held on the rigid motion.")
-    ] = False,
+        int | None, Option(metavar="N", help="Cut beams into finite segments, so many the longest (the paper's: 8).")
+    ] = None
+    ked: Annotated[bool, Option("--ked", help="Kineto-elastodynamics: active motors held on the rigid motion.")] = False
     balanced: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--balanced", help="Start balanced, active motors held, or moving as drives prescribe; else undeformed."
         ),
-    ] = False,
+    ] = False
     after: Annotated[
         str | None,
-        typer.Option(metavar="free|hold", help="The active motors after the path: hold is by brakes. Default: free."),
-    ] = None,
-    out: Annotated[str, typer.Option(metavar="DIR", help="Folder for results and figures.")] = "results",
-    report: ReportOption = True,
-    json: Json = False,
-) -> None:
-    """Simulate a path in several actuation modes, or a model without a path on its own.
-
-    Writes report.html, summary.json, results.nc and figures/.
-    """
-    from paraflex.cli.integration import IntegrationRequest
-    from paraflex.cli.run import RunRequest, run_command
-
-    integration = IntegrationRequest(
-        tolerance=tol,
-        alpha=alpha,
-        beta=beta,
-        max_steps=max_steps,
-        method=method,
-        parameters=method_parameter or [],
-        step=step,
-        constraints=constraints,
-        automatic_gains=automatic_gains,
-        stop_at=stop_at or [],
-    )
-    request = RunRequest(
-        mechanism=model_named(source, mechanism) or DEFAULT_MODEL,
-        path=path,
-        modes=mode or [],
-        duration=duration,
-        samples=samples,
-        assembly=assembly,
-        out=out,
-        json=json,
-        integration=integration,
-        rigid=rigid,
-        geometry=geometry,
-        reference=reference,
-        curvature=curvature,
-        segments=segments,
-        ked=ked,
-        balanced=balanced,
-        after=after,
-        report=report,
-    )
-    raise typer.Exit(run_command(request))
+        Option(metavar="free|hold", help="The active motors after the path: hold is by brakes. Default: free."),
+    ] = None
+    out: Annotated[str, Option(metavar="DIR", help="Folder for results and figures.")] = "results"
+    report: ReportOption = True
+    json: Json = False
 
 
-def verify(
-    source: ModelArgument = None,
-    mechanism: MechanismOption = None,
-    path: PathOption = None,
-    mode: Annotated[
-        list[str] | None,
-        typer.Option(metavar="MODE", help="Actuation mode; repeatable. Default: the study's with most motors."),
-    ] = None,
-    engine: Annotated[
-        list[str] | None, typer.Option(metavar="exudyn|mujoco", help="Another engine to compare with; repeatable.")
-    ] = None,
-    model: Annotated[
-        list[str] | None,
-        typer.Option(
+@dataclass(frozen=True, kw_only=True)
+class VerifyRequest:
+    """What `paraflex verify` is asked for."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    path: PathOption = None
+    modes: Annotated[
+        list[str],
+        Option("--mode", metavar="MODE", help="Actuation mode; repeatable. Default: the study's with most motors."),
+    ] = field(default_factory=list)
+    engines: Annotated[
+        list[str], Option("--engine", metavar="exudyn|mujoco", help="Another engine to compare with; repeatable.")
+    ] = field(default_factory=list)
+    fidelities: Annotated[
+        list[str],
+        Option(
+            "--model",
             metavar="NAME",
             help="Fidelity: rigid, ked, linear, second-order, segments; repeatable. Default: all of them.",
         ),
-    ] = None,
-    tol: Annotated[float | None, typer.Option(metavar="METRES", help="Tolerance of runs with error control.")] = None,
-    method: MethodOption = None,
-    segments: Annotated[int | None, typer.Option(metavar="N", help="Finite segments on the longest beam.")] = None,
-    reference: ReferenceOption = None,
-    curvature: CurvatureOption = None,
-    duration: DurationOption = None,
-    samples: SamplesOption = None,
-    assembly: AssemblyOption = None,
-    out: Annotated[str, typer.Option(metavar="DIR", help="Folder for numbers and figures.")] = "verification",
-    report: ReportOption = True,
-    json: Json = False,
-) -> None:
-    """Run a mechanism at every fidelity and in other engines.
-
-    Writes report.html, verify.json, verify.nc and figures/.
-    """
-    from paraflex.cli.verify import VerifyRequest, verify_command
-
-    request = VerifyRequest(
-        mechanism=model_named(source, mechanism) or DEFAULT_MODEL,
-        path=path,
-        modes=mode or [],
-        tolerance=tol,
-        duration=duration,
-        samples=samples,
-        assembly=assembly,
-        out=out,
-        json=json,
-        engines=engine or [],
-        fidelities=model or [],
-        segments=segments,
-        method=method,
-        reference=reference,
-        curvature=curvature,
-        report=report,
-    )
-    raise typer.Exit(verify_command(request))
+    ] = field(default_factory=list)
+    tolerance: Annotated[
+        float | None, Option("--tol", metavar="METRES", help="Tolerance of runs with error control.")
+    ] = None
+    method: MethodOption = None
+    segments: Annotated[int | None, Option(metavar="N", help="Finite segments on the longest beam.")] = None
+    frames: FramesChoice = field(default_factory=FramesChoice)
+    plan: PlanChoice = field(default_factory=PlanChoice)
+    out: Annotated[str, Option(metavar="DIR", help="Folder for numbers and figures.")] = "verification"
+    report: ReportOption = True
+    json: Json = False
 
 
-def compare_methods(
-    source: ModelArgument = None,
-    mechanism: MechanismOption = None,
-    path: PathOption = None,
+@dataclass(frozen=True, kw_only=True)
+class CompareRequest:
+    """What `paraflex compare-methods` is asked for."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    path: PathOption = None
     mode: Annotated[
-        str | None, typer.Option(metavar="MODE", help="Actuation mode. Default: the study's with most motors.")
-    ] = None,
-    method: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Method of integration; repeatable. Default: all of them.")
-    ] = None,
-    tol: Annotated[
-        list[float] | None,
-        typer.Option(metavar="METRES", help="Tolerance; repeatable. Default: 1e-3, 1e-4, 1e-5, 1e-6."),
-    ] = None,
-    step: Annotated[
-        list[float] | None,
-        typer.Option(metavar="S", help="Fixed step; repeatable. Without --tol fixed steps are all there is."),
-    ] = None,
-    limit: Annotated[float | None, typer.Option(metavar="S", help="Wall time of a run. Default: 60.")] = None,
-    duration: DurationOption = None,
-    samples: SamplesOption = None,
-    assembly: AssemblyOption = None,
-    out: Annotated[str, typer.Option(metavar="DIR", help="Folder for numbers and figure.")] = "comparison",
-    json: Json = False,
-) -> None:
-    """Time every method of integration against its error; write compare-methods.json and figures/."""
-    from paraflex.cli.compare import CompareRequest, compare_command
-
-    request = CompareRequest(
-        mechanism=model_named(source, mechanism) or DEFAULT_MODEL,
-        path=path,
-        modes=[] if mode is None else [mode],
-        duration=duration,
-        samples=samples,
-        assembly=assembly,
-        out=out,
-        json=json,
-        methods=method or [],
-        tolerances=tol or [],
-        steps=step or [],
-        limit=limit,
-    )
-    raise typer.Exit(compare_command(request))
+        str | None, Option(metavar="MODE", help="Actuation mode. Default: the study's with most motors.")
+    ] = None
+    methods: Annotated[
+        list[str], Option("--method", metavar="NAME", help="Method of integration; repeatable. Default: all of them.")
+    ] = field(default_factory=list)
+    tolerances: Annotated[
+        list[float], Option("--tol", metavar="METRES", help="Tolerance; repeatable. Default: 1e-3, 1e-4, 1e-5, 1e-6.")
+    ] = field(default_factory=list)
+    steps: Annotated[
+        list[float],
+        Option("--step", metavar="S", help="Fixed step; repeatable. Without --tol fixed steps are all there is."),
+    ] = field(default_factory=list)
+    limit: Annotated[float | None, Option(metavar="S", help="Wall time of a run. Default: 60.")] = None
+    plan: PlanChoice = field(default_factory=PlanChoice)
+    out: Annotated[str, Option(metavar="DIR", help="Folder for numbers and figure.")] = "comparison"
+    json: Json = False

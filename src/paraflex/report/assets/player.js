@@ -1,4 +1,4 @@
-// The animation: bodies at base + m (shape - base), joints, path and trail on a canvas.
+// The animation: bodies at base + m (shape - base), symbols, path and trail of the scenes of all runs on a canvas.
 const player = (() => {
   const { told, state, element } = report;
   const MAGNIFICATIONS = [1, 2, 5, 10, 20, 50, 100, 200];
@@ -47,21 +47,21 @@ const player = (() => {
   // The screen: metres to pixels, the same scale both ways, y upwards.
   function fit() {
     const ratio = devicePixelRatio || 1;
-    const tall = (film.view[3] - film.view[1]) / Math.max(film.view[2] - film.view[0], 1e-9);
+    const tall = (film.view[3] - film.view[1]) / (film.view[2] - film.view[0]);
     canvas.style.height = `${Math.round(Math.min(Math.max(tall * canvas.clientWidth + 60, 240), 620))}px`;
     width = canvas.clientWidth; height = canvas.clientHeight;
     canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     const [x0, y0, x1, y1] = film.view;
-    const edge = Math.min(34, 0.08 * width);
-    const scale = Math.min((width - 2 * edge) / Math.max(x1 - x0, 1e-9), (height - 2 * edge - 26) / Math.max(y1 - y0, 1e-9));
+    const scale = Math.min(width / (x1 - x0), (height - 26) / (y1 - y0));
     place = { scale, x: width / 2 - scale * (x0 + x1) / 2, y: (height - 26) / 2 + 18 + scale * (y0 + y1) / 2 };
   }
   const px = (x) => place.x + place.scale * x;
   const py = (y) => place.y - place.scale * y;
 
-  // Values of an array (runs, frames, wide) at a time: between frames, as motion is.
+  // Values of an array (runs, frames, wide) at a time: between frames, as motion is; what stands still has one frame.
   function at(array, run, before, share) {
+    if (array.frames === 1) before = share = 0;
     const start = (run * array.frames + before) * array.wide;
     const out = array.values.slice(start, start + array.wide);
     if (share > 0) for (let k = 0; k < out.length; k++) out[k] += share * (array.values[start + array.wide + k] - out[k]);
@@ -77,7 +77,7 @@ const player = (() => {
     return -1;
   }
 
-  function line(points, from, to) {
+  function trace(points, from, to) {
     pen.beginPath();
     let begun = false;
     for (let k = from; k < to; k++) {
@@ -86,8 +86,8 @@ const player = (() => {
       if (begun) pen.lineTo(px(x), py(y)); else pen.moveTo(px(x), py(y));
       begun = true;
     }
-    pen.stroke();
   }
+  const line = (points, from, to) => { trace(points, from, to); pen.stroke(); };
 
   function drawPath() {
     if (!arrays.path) return;
@@ -97,51 +97,31 @@ const player = (() => {
     pen.setLineDash([]); pen.globalAlpha = 1;
   }
 
-  function drawTrail(before, tip) {
-    if (!arrays.tip || !byId("trail").checked) return;
-    const start = state.run * arrays.tip.frames * 2;
-    const points = arrays.tip.values.subarray(start, start + 2 * (before + 1));
+  function drawTrail(before, drawn, tip) {
+    if (!byId("trail").checked) return;
+    const points = [];
+    for (let frame = 0; frame <= before; frame++) {
+      const start = (state.run * arrays.base.frames + frame) * arrays.base.wide + 2 * tip;
+      for (const k of [start, start + 1]) points.push(arrays.base.values[k] + state.magnify * arrays.bend.values[k]);
+    }
+    points.push(drawn[2 * tip], drawn[2 * tip + 1]);
     pen.lineWidth = 2; pen.strokeStyle = colours.mark; pen.lineJoin = "round";
-    line([...points, ...tip], 0, before + 2);
+    line(points, 0, before + 2);
   }
 
-  function drawGround(x, y) {
-    const size = 13;
-    pen.strokeStyle = colours.soft; pen.lineWidth = 1.4;
-    pen.beginPath();
-    pen.moveTo(x, y); pen.lineTo(x - size * 0.75, y + size); pen.lineTo(x + size * 0.75, y + size); pen.closePath();
-    pen.fillStyle = colours.card; pen.fill(); pen.stroke();
-    pen.beginPath();
-    pen.moveTo(x - size * 1.15, y + size); pen.lineTo(x + size * 1.15, y + size);
-    for (let k = -3; k <= 2; k++) { pen.moveTo(x + k * 5 + 4, y + size); pen.lineTo(x + k * 5 - 1, y + size + 5); }
-    pen.stroke();
+  // Symbols: lines, closed or not, and dots.
+  function drawMarks({ pieces }, points) {
+    for (const [look, , from, to] of pieces) {
+      const [fill, stroke, width] = film.looks[look];
+      pen.lineWidth = 1.3 * width; pen.strokeStyle = colours[stroke];
+      if (to - from > 1) trace(points, from, to);
+      else { pen.beginPath(); pen.arc(px(points[2 * from]), py(points[2 * from + 1]), 4.2, 0, 2 * Math.PI); }
+      if (fill) { pen.fillStyle = colours[fill]; pen.fill(); }
+      pen.stroke();
+    }
   }
 
-  function drawJoints(joints, directions) {
-    // The direction of a joint is told as a unit vector, NaN where it has none.
-    const along = (k) => Math.atan2(directions[2 * k + 1], directions[2 * k]);
-    film.jointKinds.forEach((kind, k) => {
-      const x = px(joints[2 * k]), y = py(joints[2 * k + 1]), direction = along(k);
-      if (!Number.isFinite(x)) return;
-      if (Number.isFinite(direction)) drawRail(x, y, direction, film.grounded[k] ? 2 * Math.max(width, height) : 26);
-      else if (film.grounded[k]) drawGround(x, y);
-    });
-    film.jointKinds.forEach((kind, k) => {
-      const x = px(joints[2 * k]), y = py(joints[2 * k + 1]), direction = along(k);
-      if (!Number.isFinite(x)) return;
-      pen.lineWidth = 1.8; pen.strokeStyle = colours.text; pen.fillStyle = colours.card;
-      pen.save();
-      pen.translate(x, y);
-      pen.beginPath();
-      if (Number.isFinite(direction)) { pen.rotate(-direction); pen.rect(-10, -6, 20, 12); }
-      else if (kind === "weld") pen.rect(-3.5, -3.5, 7, 7);
-      else pen.arc(0, 0, 4.2, 0, 2 * Math.PI);
-      pen.fill(); pen.stroke();
-      pen.restore();
-    });
-  }
-
-  function drawNames(drawn, joints) {
+  function drawNames(drawn, { pieces }, points) {
     pen.font = `600 11.5px ${getComputedStyle(document.body).fontFamily}`;
     pen.textBaseline = "middle"; pen.lineJoin = "round"; pen.lineWidth = 4; pen.strokeStyle = colours.card;
     const write = (text, x, y, colour) => {
@@ -151,7 +131,8 @@ const player = (() => {
       const middle = (from + to - 1) / 2, a = Math.floor(middle), b = Math.ceil(middle);
       write(name, px((drawn[2 * a] + drawn[2 * b]) / 2) + 7, py((drawn[2 * a + 1] + drawn[2 * b + 1]) / 2), colours.bodies[k % colours.bodies.length]);
     });
-    film.jointNames.forEach((name, k) => write(name, px(joints[2 * k]) + 8, py(joints[2 * k + 1]) - 9, colours.soft));
+    const written = new Set([""]);
+    for (const [, name, k] of pieces) if (!written.has(name)) { written.add(name); write(name, px(points[2 * k]) + 8, py(points[2 * k + 1]) - 9, colours.soft); }
   }
 
   function drawScale() {
@@ -188,61 +169,34 @@ const player = (() => {
     drawPath();
     if (farthest >= 0) {
       const base = at(arrays.base, state.run, before, share), bend = at(arrays.bend, state.run, before, share);
-      const joints = at(arrays.joints, state.run, before, share);
-      const directions = at(arrays.directions, state.run, before, share);
-      const drawn = base.map((value, k) => value + state.magnify * bend[k]);
-      const tip = arrays.tip ? at(arrays.tip, state.run, before, share) : null;
+      const [still, moving] = film.marks[state.run], [ground, points] = arrays.marks[state.run].map((one) => at(one, 0, before, share));
+      const drawn = base.map((value, k) => value + state.magnify * bend[k]), tip = film.tips[state.run];
       pen.lineCap = pen.lineJoin = "round";
-      if (arrays.springs) {
-        const springs = at(arrays.springs, state.run, before, share);
-        for (let k = 0; k < springs.length; k += 4) drawSpring(springs.subarray(k, k + 4));
-      }
+      drawMarks(still, ground);
       pen.globalAlpha = stopped ? 0.45 : 1;
       if (byId("ghost").checked && state.magnify > 1) {
         pen.strokeStyle = colours.soft; pen.lineWidth = 1.2; pen.setLineDash([3, 4]);
         for (const [, from, to] of film.bodies) line(base, from, to);
         pen.setLineDash([]);
       }
-      film.bodies.forEach(([, from, to], k) => {
+      film.bodies.forEach(([, from, to, plate], k) => {
         pen.strokeStyle = colours.card; pen.lineWidth = 7; line(drawn, from, to);
-        pen.strokeStyle = colours.bodies[k % colours.bodies.length]; pen.lineWidth = 3.6; line(drawn, from, to);
+        pen.strokeStyle = pen.fillStyle = colours.bodies[k % colours.bodies.length];
+        if (plate) { pen.save(); pen.globalAlpha *= 0.25; pen.fill(); pen.restore(); }
+        pen.lineWidth = 3.6; line(drawn, from, to);
       });
       // Over the links: they often lie along it.
-      if (tip) drawTrail(before, tip);
-      drawJoints(joints, directions);
-      if (tip && Number.isFinite(tip[0])) {
+      if (tip !== null) drawTrail(before, drawn, tip);
+      drawMarks(moving, points);
+      if (tip !== null) {
         pen.fillStyle = colours.mark; pen.strokeStyle = colours.card; pen.lineWidth = 1.5;
-        pen.beginPath(); pen.arc(px(tip[0]), py(tip[1]), 5, 0, 2 * Math.PI); pen.fill(); pen.stroke();
+        pen.beginPath(); pen.arc(px(drawn[2 * tip]), py(drawn[2 * tip + 1]), 5, 0, 2 * Math.PI); pen.fill(); pen.stroke();
       }
-      if (byId("names").checked) drawNames(drawn, joints);
+      if (byId("names").checked) drawNames(drawn, moving, points);
       pen.globalAlpha = 1;
     }
     drawScale();
     drawCaption(stopped ? (farthest < 0 ? times[0] : times[farthest]) : null);
-  }
-
-  // A line along which something slides.
-  function drawRail(x, y, direction, long) {
-    pen.strokeStyle = colours.soft; pen.lineWidth = 1.6;
-    pen.beginPath();
-    pen.moveTo(x - long * Math.cos(direction), y + long * Math.sin(direction));
-    pen.lineTo(x + long * Math.cos(direction), y - long * Math.sin(direction));
-    pen.stroke();
-  }
-
-  // A spring as a zigzag between its ends, whatever its length.
-  function drawSpring(ends) {
-    const [x0, y0, x1, y1] = [px(ends[0]), py(ends[1]), px(ends[2]), py(ends[3])];
-    const length = Math.hypot(x1 - x0, y1 - y0);
-    if (!(length > 1)) return;
-    const [ex, ey] = [(x1 - x0) / length, (y1 - y0) / length], turns = 12, wide = 5;
-    pen.strokeStyle = colours.soft; pen.lineWidth = 1.6;
-    pen.beginPath(); pen.moveTo(x0, y0);
-    for (let k = 0; k <= turns; k++) {
-      const along = length * (0.12 + 0.76 * k / turns), side = k === 0 || k === turns ? 0 : k % 2 ? wide : -wide;
-      pen.lineTo(x0 + along * ex - side * ey, y0 + along * ey + side * ex);
-    }
-    pen.lineTo(x1, y1); pen.stroke();
   }
 
   // One painting a frame of the screen, however much changes in it.
@@ -255,6 +209,7 @@ const player = (() => {
   function recolour() {
     colours = { bodies: report.palette() };
     for (const name of ["text", "soft", "card", "mark"]) colours[name] = report.colour(name);
+    Object.assign(colours, { ground: colours.card, ink: colours.text, earth: colours.soft });
     repaint();
   }
 
@@ -311,10 +266,12 @@ const player = (() => {
       for (const name of ["tools", "canvas", "key-magnify"]) byId(name).hidden = true;
       return;
     }
-    byId("has-trail").hidden = !film.tip;
-    const names = ["base", "bend", "joints", "directions", "springs", "tip", "path"];
+    byId("has-trail").hidden = film.tips.every((tip) => tip === null);
+    const names = ["base", "bend", "path"];
     const read = await Promise.all(names.map((name) => (film[name] ? report.unpacked(film[name]) : null)));
-    arrays = Object.fromEntries(names.map((name, k) => [name, read[k]]));
+    const marks = await Promise.all(film.marks.map((sets) => Promise.all((sets || []).map((set) => report.unpacked(set.places)))));
+    // At once and last: from here on the page may paint.
+    arrays = { ...Object.fromEntries(names.map((name, k) => [name, read[k]])), marks };
     recolour();
   }
 

@@ -11,6 +11,7 @@ from paraflex.studies.optimisation.indices import (
 )
 from paraflex.studies.optimisation.objective import Objective, Target
 from paraflex.studies.optimisation.optimise import OptimisationResult, optimise
+from paraflex.studies.optimisation.result import SearchResult
 from paraflex.studies.optimisation.session import Progress
 from paraflex.studies.optimisation.study import DesignStudy, Search, load_identification, load_optimisation
 
@@ -25,6 +26,7 @@ __all__ = [
     "Progress",
     "Reached",
     "Search",
+    "SearchResult",
     "SobolIndices",
     "Target",
     "identify",

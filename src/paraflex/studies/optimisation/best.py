@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from paraflex.designs.overlay import overlaid
 from paraflex.studies.optimisation.study import DesignStudy
-from paraflex.studies.sweeps.overlay import overlaid
-from paraflex.studies.sweeps.table import whole_file
+from paraflex.writing import write_text
 
 BEST = "best.toml"
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
@@ -28,8 +28,7 @@ def write_best(folder: Path, study: DesignStudy, design: tuple[float, ...]) -> P
     data = overlaid(dict(setting.data), setting.numbers(design))
     lines = [f"# {setting.source}, with the numbers that the study {json.dumps(study.name)} found:"]
     lines += [f"#   {json.dumps(name)}: {value!r}" for name, value in zip(setting.names, design, strict=True)]
-    with whole_file(folder / BEST) as unfinished:
-        unfinished.write_text("\n".join([*lines, "", toml_text(data)]), encoding="utf-8")
+    write_text(folder / BEST, "\n".join([*lines, "", toml_text(data)]))
     return folder / BEST
 
 

@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.studies.optimisation.record import Record
+from paraflex.campaign import Engine, Journal, LostWorker, Row, outcomes
+from paraflex.designs.run import COMPLETE, Outcome, Task, lost, run_id, run_task
+from paraflex.designs.setting import Setting
 from paraflex.studies.optimisation.study import DesignStudy
-from paraflex.studies.sweeps.engines import Engine, LostWorker, outcomes
-from paraflex.studies.sweeps.run import COMPLETE, Outcome, Row, Task, lost, run_id, run_task
-from paraflex.studies.sweeps.study import Setting
 
 Array = NDArray[np.float64]
 Design = tuple[float, ...]
@@ -74,7 +73,8 @@ class Evaluate:
     Parameters
     ----------
     study : DesignStudy
-    record : Record
+    journal : Journal
+        What has rows there is read.
     engine : Engine
     run : callable
         What is done for a task: `run_task` but in tests.
@@ -87,16 +87,17 @@ class Evaluate:
     def __init__(
         self,
         study: DesignStudy,
-        record: Record,
+        journal: Journal,
         engine: Engine,
         run: RunTask = run_task,
         on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
         run_slopes: RunTask | None = None,
     ) -> None:
-        self.study, self.record, self.engine, self.run, self.on_evaluated = study, record, engine, run, on_evaluated
+        self.study, self.journal, self.engine, self.run, self.on_evaluated = study, journal, engine, run, on_evaluated
         self.run_slopes = run_slopes
         self.known: dict[Design, Evaluated] = {}
         self.fresh = 0
+        self._rows = {row["id"]: row for row in journal.rows()}
         self._numbers: dict[Design, int] = {}
         self._single = {mode: replace(study.setting, modes=(mode,)) for mode in study.setting.modes}
 
@@ -119,7 +120,7 @@ class Evaluate:
         within = [design for design in dict.fromkeys(designs) if self._numbers[design] < limit]
         lacking = [design for design in within if design not in self.known and not self._read(design)]
         for design, rows in self._compute(lacking, self.run):
-            self.record.add(rows)
+            self.journal.add(rows)
             self.fresh += 1
             self._keep(design, rows)
         if len(within) < len(set(designs)):
@@ -131,17 +132,18 @@ class Evaluate:
         assert self.run_slopes is not None
         for _, found in self._compute([at.design], self.run_slopes):
             rows = tuple(row | more for row, more in zip(at.rows, found, strict=True))
-            self.record.add(rows)
+            self.journal.add(rows)
             self.known[at.design] = replace(at, rows=rows)
         return self.known[at.design]
 
     def _read(self, design: Design) -> bool:
         setting = self.study.setting
         tasks = [Task(0, 0, design, path) for path in setting.paths]
-        rows = self.record.find([run_id(setting, task, mode) for task in tasks for mode in setting.modes])
-        if rows is not None:
-            self._keep(design, rows)
-        return rows is not None
+        ids = [run_id(setting, task, mode) for task in tasks for mode in setting.modes]
+        found = all(each in self._rows for each in ids)
+        if found:
+            self._keep(design, tuple(self._rows[each] for each in ids))
+        return found
 
     def _keep(self, design: Design, rows: tuple[Row, ...]) -> None:
         done = Evaluated(self._numbers[design], design, rows, self.study.columns)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from paraflex.arguments import checked_arguments
+from paraflex.campaign import THREADS, Engine, open_engine
 from paraflex.studies.optimisation.best import write_best
 from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
@@ -15,12 +17,11 @@ from paraflex.studies.optimisation.fit import closest, fit, residual_slopes, roo
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.optimise import at_bounds, failures
 from paraflex.studies.optimisation.problem import running_start
-from paraflex.studies.optimisation.record import RESULT
-from paraflex.studies.optimisation.session import INTERRUPTED, Progress, Session, Workers, sampled_start, search
+from paraflex.studies.optimisation.result import SearchResult
+from paraflex.studies.optimisation.session import RESULT, Progress, Session, sampled_start, search
 from paraflex.studies.optimisation.slopes import ExactSlopes, no_exact_slopes, slopes_of
 from paraflex.studies.optimisation.study import DesignStudy, load_identification
-from paraflex.studies.sweeps.engines import THREADS, Engine
-from paraflex.studies.sweeps.table import write_json
+from paraflex.writing import GO_ON, write_json
 
 
 @dataclass(frozen=True)
@@ -46,16 +47,12 @@ class Reached:
         return self.target.told() | {"reached": self.reached, "start": self.start, "residual": self.residual}
 
 
-@dataclass(frozen=True)
-class IdentificationResult:
-    """Where an identification stands after a session.
+@dataclass(frozen=True, kw_only=True)
+class IdentificationResult(SearchResult):
+    """Where an identification stands after a session: see `SearchResult`; its history tells root mean square residuals.
 
     Attributes
     ----------
-    folder, table : Path
-        Where all is, and all runs as pandas reads them.
-    values, start : mapping of str to float
-        The numbers found, and those of the start.
     residual, start_residual : float or None
         Root mean square of all residuals; None before the start has run.
     targets : tuple of Reached
@@ -63,56 +60,20 @@ class IdentificationResult:
         None where the search ended before derivatives at the best design were known.
     derivatives : str
         "exact", or "differences" and why.
-    bounds : mapping of str to str
-        "low" or "high" for parameters at a bound.
-    evaluations, fresh, failed : int
-        Designs, of these in this session, and those that do not run.
-    reasons : tuple of str
-        Why some of them do not.
-    stopped : str
-        Why it ended.
-    interrupted : bool
-        Whether the user stopped it.
-    seconds : float
-        The session took.
-    history : tuple of (int, float or None, bool)
-        Number, root mean square residual (None where it failed) and True, of every design.
     """
 
-    folder: Path
-    table: Path
-    values: Mapping[str, float]
-    start: Mapping[str, float]
     residual: float | None
     start_residual: float | None
     targets: tuple[Reached, ...]
     confidence: Confidence | None
     derivatives: str
-    bounds: Mapping[str, str]
-    evaluations: int
-    fresh: int
-    failed: int
-    reasons: tuple[str, ...]
-    stopped: str
-    interrupted: bool
-    seconds: float
-    history: tuple[tuple[int, float | None, bool], ...] = field(repr=False, default=())
 
     def figures(self) -> dict[str, Any]:
         """In plain values; without times and counts of a session, which are no results."""
-        out = {name: value for name, value in vars(self).items() if name not in ("fresh", "seconds", "folder", "table")}
-        return out | {
+        return super().figures() | {
             "targets": [each.told() for each in self.targets],
             "confidence": None if self.confidence is None else self.confidence.figures(),
-            "history": [list(each) for each in self.history],
-            "reasons": list(self.reasons),
         }
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        from paraflex.studies.html import identification_html
-
-        return identification_html(self)
 
 
 @checked_arguments()
@@ -152,9 +113,10 @@ def identify(
     study = study if isinstance(study, DesignStudy) else load_identification(study)
     solution = _Solution(study)
     watch = None if on_progress is None else _watch(study, on_progress)
-    session = search(study, Path(folder), Workers(engine, workers, cluster, run), solution.solve, watch)
+    opened = partial(open_engine, engine, workers, cluster)
+    session = search(study, Path(folder), opened, solution.solve, watch, run=run)
     result = _result(study, Path(folder), session, solution)
-    write_json(Path(folder) / RESULT, {"kind": "identification", "name": study.name} | result.figures())
+    write_json(Path(folder) / RESULT, {"kind": "identification", "name": study.name} | result.figures(), remedy=GO_ON)
     if result.residual is not None:
         write_best(Path(folder), study, tuple(result.values.values()))
     return result
@@ -217,7 +179,7 @@ def _result(study: DesignStudy, folder: Path, session: Session, solution: _Solut
         failed=failed,
         reasons=reasons,
         stopped=session.stopped,
-        interrupted=session.stopped == INTERRUPTED,
+        interrupted=session.interrupted,
         seconds=session.seconds,
         history=tuple(
             (each.number, root_mean_square(study.targets, each) if each.complete else None, each.complete)

@@ -11,16 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.campaign import THREADS, Engine
+from paraflex.designs.run import COMPLETE, Outcome, run_task
+from paraflex.designs.samples import RANDOM
+from paraflex.designs.schema import SamplingTable, study_table
+from paraflex.designs.session import SweepProgress, SweepResult, sweep
+from paraflex.designs.study import SweepStudy, make_study
+from paraflex.display import Shown
 from paraflex.errors import InputError, suggestion
-from paraflex.studies.optimisation.study import read_study
-from paraflex.studies.sweeps.engines import THREADS, Engine
-from paraflex.studies.sweeps.metrics import METRICS
-from paraflex.studies.sweeps.run import COMPLETE, Outcome, run_task
-from paraflex.studies.sweeps.samples import RANDOM
-from paraflex.studies.sweeps.schema import SamplingTable
-from paraflex.studies.sweeps.session import SweepProgress, SweepResult, sweep
-from paraflex.studies.sweeps.study import SweepStudy, make_study
-from paraflex.studies.sweeps.table import whole_file, write_json
+from paraflex.results.metrics import METRICS
+from paraflex.results.summary import finite_or_none
+from paraflex.studies.optimisation.schema import StudyTable
+from paraflex.writing import GO_ON, whole_file, write_json
 
 Array = NDArray[np.float64]
 INDICES, TABLE = "indices.json", "indices.parquet"
@@ -88,10 +90,10 @@ class SobolIndices:
                 "mode": self.mode,
                 "metric": self.metric,
                 "parameter": name,
-                "first": _plain(self.first[k]),
-                "first_confidence": _plain(self.first_confidence[k]),
-                "total": _plain(self.total[k]),
-                "total_confidence": _plain(self.total_confidence[k]),
+                "first": finite_or_none(self.first[k]),
+                "first_confidence": finite_or_none(self.first_confidence[k]),
+                "total": finite_or_none(self.total[k]),
+                "total_confidence": finite_or_none(self.total_confidence[k]),
                 "samples": self.samples,
                 "dropped": self.dropped,
             }
@@ -100,7 +102,7 @@ class SobolIndices:
 
 
 @dataclass(frozen=True)
-class IndicesResult:
+class IndicesResult(Shown):
     """Where a study of indices stands after a session.
 
     Attributes
@@ -120,12 +122,6 @@ class IndicesResult:
     def figures(self) -> dict[str, Any]:
         """In plain values."""
         return {"kind": "indices", "indices": [row for each in self.indices for row in each.rows()]}
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        from paraflex.studies.html import indices_html
-
-        return indices_html(self)
 
 
 @checked_arguments()
@@ -150,15 +146,12 @@ def load_indices(
     InputError
         See `load_optimisation`; or SALib is not installed.
     """
-    table, source = read_study(file), str(file)
-    number = samples if samples is not None else table.sampling.number or _SAMPLES
-    chosen = table.sampling.seed if seed is None else seed
-    _check_samples(number)
-    try:
+    with study_table(StudyTable, file) as (table, folder):
+        chosen = table.sampling.seed if seed is None else seed
         sampling = SamplingTable(kind=RANDOM, number=1, seed=chosen)
-        base = make_study(table.model_copy(update={"sampling": sampling}), Path(file).parent)
-    except InputError as error:
-        raise (error if error.source else error.in_file(source)) from None
+        base = make_study(table.model_copy(update={"sampling": sampling}), folder)
+    number = samples if samples is not None else table.sampling.number or _SAMPLES
+    _check_samples(number)
     wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].per_motor]
     columns = _columns(wanted, base)
     points = _salib_sample(base.setting.names, number, chosen)
@@ -209,8 +202,8 @@ def sobol_indices(
         return IndicesResult(done, (), table)
     found = tuple(_indices(study, done.table))
     result = IndicesResult(done, found, table)
-    write_json(Path(folder) / INDICES, result.figures() | {"name": study.sweep.name})
-    with whole_file(table) as unfinished:
+    write_json(Path(folder) / INDICES, result.figures() | {"name": study.sweep.name}, remedy=GO_ON)
+    with whole_file(table, remedy=GO_ON) as unfinished:
         pq.write_table(pa.Table.from_pylist(result.figures()["indices"]), unfinished)
     return result
 
@@ -261,9 +254,7 @@ def _analysed(
 
 
 def _columns(names: list[str], base: SweepStudy) -> tuple[str, ...]:
-    known = []
-    for name in base.setting.metrics:
-        known += [f"{name}.{motor}" for motor in base.motors] if METRICS[name].per_motor else [name]
+    known = [column for name in base.setting.metrics for column in METRICS[name].columns(base.motors)]
     for name in names:
         if name not in known:
             raise InputError("not a metric of the study", field="--metric", value=name, remedy=suggestion(name, known))
@@ -302,7 +293,3 @@ def _salib() -> Any:
             "global indices need SALib", field="indices", remedy="pip install 'paraflex[indices]'"
         ) from None
     return SALib
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

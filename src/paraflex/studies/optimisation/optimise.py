@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from paraflex.arguments import checked_arguments
+from paraflex.campaign import THREADS, Engine, open_engine
 from paraflex.studies.optimisation.best import write_best
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, minimise
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.problem import Problem, best_of, holds_limits
-from paraflex.studies.optimisation.record import RESULT
-from paraflex.studies.optimisation.session import Progress, Session, Workers, sampled_start, search
+from paraflex.studies.optimisation.result import SearchResult
+from paraflex.studies.optimisation.session import RESULT, Progress, Session, sampled_start, search
 from paraflex.studies.optimisation.slopes import slopes_of
 from paraflex.studies.optimisation.study import DesignStudy, load_optimisation
-from paraflex.studies.sweeps.engines import THREADS, Engine
-from paraflex.studies.sweeps.table import write_json
+from paraflex.writing import GO_ON, write_json
 
 # So near a bound, as a share of the range, a parameter is at it.
 _AT_BOUND = 1e-4
@@ -27,67 +27,25 @@ _AT_BOUND = 1e-4
 _REASONS = 5
 
 
-@dataclass(frozen=True)
-class OptimisationResult:
-    """Where an optimisation stands after a session.
+@dataclass(frozen=True, kw_only=True)
+class OptimisationResult(SearchResult):
+    """Where an optimisation stands after a session: see `SearchResult`; its history tells objectives.
 
     Attributes
     ----------
-    folder, table : Path
-        Where all is, and all runs as pandas reads them.
-    values, start : mapping of str to float
-        The best design's numbers, and those of the start.
     objective, start_objective : float or None
         None before the start has run.
     metrics, start_metrics : mapping of str to float
         Worst or mean of all runs, as the study says.
     holds_limits : bool
         Whether the best design passes no limit.
-    bounds : mapping of str to str
-        "low" or "high" for parameters at a bound.
-    evaluations, fresh, failed : int
-        Designs, of these in this session, and those that do not run.
-    reasons : tuple of str
-        Why some of them do not.
-    stopped : str
-        Why it ended.
-    interrupted : bool
-        Whether the user stopped it.
-    seconds : float
-        The session took.
-    history : tuple of (int, float or None, bool)
-        Number, objective (None where it failed) and whether limits hold, of every design.
     """
 
-    folder: Path
-    table: Path
-    values: Mapping[str, float]
-    start: Mapping[str, float]
     objective: float | None
     start_objective: float | None
     metrics: Mapping[str, float]
     start_metrics: Mapping[str, float]
     holds_limits: bool
-    bounds: Mapping[str, str]
-    evaluations: int
-    fresh: int
-    failed: int
-    reasons: tuple[str, ...]
-    stopped: str
-    interrupted: bool
-    seconds: float
-    history: tuple[tuple[int, float | None, bool], ...] = field(repr=False, default=())
-
-    def figures(self) -> dict[str, Any]:
-        """In plain values; without times and counts of a session, which are no results."""
-        out = {name: value for name, value in vars(self).items() if name not in ("fresh", "seconds", "folder", "table")}
-        return out | {"history": [list(each) for each in self.history], "reasons": list(self.reasons)}
-
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        from paraflex.studies.html import optimisation_html
-
-        return optimisation_html(self)
 
 
 @checked_arguments()
@@ -135,10 +93,14 @@ def optimise(
     study = study if isinstance(study, DesignStudy) else load_optimisation(study)
     assert study.objective is not None
     watch = _Watch(study, study.objective, on_progress)
-    asked = Workers(engine, workers, cluster, run)
-    session = search(study, Path(folder), asked, partial(_solve, study, study.objective), watch)
+    opened = partial(open_engine, engine, workers, cluster)
+    session = search(study, Path(folder), opened, partial(_solve, study, study.objective), watch, run=run)
     result = _result(study, study.objective, Path(folder), session)
-    write_json(Path(folder) / RESULT, {"kind": "optimisation", "name": study.name} | _said(study) | result.figures())
+    write_json(
+        Path(folder) / RESULT,
+        {"kind": "optimisation", "name": study.name} | _said(study) | result.figures(),
+        remedy=GO_ON,
+    )
     if result.objective is not None:
         write_best(Path(folder), study, tuple(result.values.values()))
     return result

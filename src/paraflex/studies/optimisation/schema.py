@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from paraflex.designs.schema import SweepTable, Table, VaryTable, Yes
 from paraflex.files.schema import Count, Number, Text
-from paraflex.studies.sweeps.schema import SweepTable, VaryTable
 
-Yes = Annotated[bool, Field(strict=True)]
 MethodName = Literal["slsqp", "trust-constr", "l-bfgs-b", "nelder-mead", "differential-evolution", "optuna"]
 GradientsName = Literal["differences", "exact"]
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class ParameterTable(VaryTable):
@@ -24,14 +19,14 @@ class ParameterTable(VaryTable):
     start: Number | None = Field(default=None, description="where the search starts; the file's number by default")
 
 
-class AtMostTable(_Table):
+class AtMostTable(Table):
     """A metric with a limit."""
 
     metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
     value: Number = Field(description="its limit, in the metric's unit")
 
 
-class ObjectiveTable(_Table):
+class ObjectiveTable(Table):
     """What is to be least."""
 
     minimise: dict[str, Number] = Field(description="metrics and their weights")
@@ -42,7 +37,7 @@ class ObjectiveTable(_Table):
     at_most: list[AtMostTable] = Field(default=[], description="limits, [[objective.at_most]]")
 
 
-class TargetTable(_Table):
+class TargetTable(Table):
     """A number that is to be reproduced."""
 
     metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
@@ -53,7 +48,7 @@ class TargetTable(_Table):
     relative: Yes = Field(default=True, description="false for the difference itself, not divided by the value")
 
 
-class SearchTable(_Table):
+class SearchTable(Table):
     """How it is looked for."""
 
     method: MethodName | None = Field(

@@ -7,46 +7,30 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from paraflex.campaign import Engine, open_campaign, write_table
 from paraflex.compilation import compile_kernels_for
+from paraflex.designs.reopen import study_account
+from paraflex.designs.run import run_task, table_schema
+from paraflex.designs.samples import SOBOL, designs
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, WITH_SLOPES
-from paraflex.studies.optimisation.record import Record, record_schema
-from paraflex.studies.optimisation.slopes import DIFFERENCES, EXACT, no_exact_slopes, run_slopes
+from paraflex.studies.optimisation.slopes import (
+    DIFFERENCES,
+    EXACT,
+    NO_SLOPES,
+    no_exact_slopes,
+    run_slopes,
+    slope_column,
+)
 from paraflex.studies.optimisation.study import DesignStudy
-from paraflex.studies.sweeps.engines import THREADS, Engine, open_engine
-from paraflex.studies.sweeps.folder import claim_for, forget_unfinished, held, ranges_of
-from paraflex.studies.sweeps.run import run_task
-from paraflex.studies.sweeps.samples import SOBOL, designs
 
-INTERRUPTED = "interrupted"
+if TYPE_CHECKING:
+    import pyarrow as pa
 
-
-@dataclass(frozen=True)
-class Workers:
-    """Who computes.
-
-    Attributes
-    ----------
-    engine : str or Engine
-        "threads", "processes" or "dask".
-    number : int, optional
-        As many as there are processors by default.
-    cluster : str, optional
-        Address of a Dask scheduler.
-    run : callable, optional
-        What is done for a task: `run_task` but in tests.
-    """
-
-    engine: str | Engine = THREADS
-    number: int | None = None
-    cluster: str | None = None
-    run: RunTask | None = None
-
-    def open(self) -> Engine:
-        """The engine."""
-        return open_engine(self.engine, self.number, self.cluster) if isinstance(self.engine, str) else self.engine
+RESULT = "result.json"
 
 
 @dataclass(frozen=True)
@@ -94,9 +78,11 @@ class Session:
 def search(
     study: DesignStudy,
     folder: Path,
-    workers: Workers,
+    open_workers: Callable[[], Engine],
     solve: Callable[[Evaluate], str],
     on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
+    *,
+    run: RunTask | None = None,
 ) -> Session:
     """Solve a study in a folder, which is held while it lasts.
 
@@ -105,11 +91,14 @@ def search(
     study : DesignStudy
     folder : Path
         One that another session left is gone on with: what it has rows of is read.
-    workers : Workers
+    open_workers : callable
+        Gives who computes.
     solve : callable
         Asks for designs; tells why it ended.
     on_evaluated : callable, optional
         Called with each design as it is done.
+    run : callable, optional
+        What is done for a task: `run_task` but in tests.
 
     Raises
     ------
@@ -118,20 +107,29 @@ def search(
     OutputError
         The folder cannot be written any more; what was written stays, and the same call goes on from there.
     """
-    with held(folder):
-        told = {"name": study.name, "ranges": ranges_of(study.parameters)}
-        claim_for(folder, study.content(), study.setting.versions, told)
-        forget_unfinished(folder)
-        began = time.perf_counter()
-        exact = _slopes_run(study, workers)
-        record = Record(folder, record_schema(study, slopes=exact is not None))
+    began = time.perf_counter()
+    exact = _slopes_run(study, run)
+    account = study_account(study.base, study.content())
+    with open_campaign(folder, account, record_schema(study, slopes=exact is not None)) as journal:
         compile_kernels_for(study.base.model().mechanism)
-        engine = workers.open()
-        evaluate = Evaluate(study, record, engine, workers.run or run_task, on_evaluated, exact)
-        stopped = _solved(evaluate, solve)
-        if stopped != INTERRUPTED:
-            record.finish()
-        return Session(evaluate, stopped, stopped == INTERRUPTED, time.perf_counter() - began, record.table)
+        evaluate = Evaluate(study, journal, open_workers(), run or run_task, on_evaluated, exact)
+        try:
+            stopped, interrupted = _solved(evaluate, solve), False
+        except KeyboardInterrupt:
+            stopped, interrupted = "interrupted", True
+        table = write_table(folder, journal, finished=not interrupted)
+    return Session(evaluate, stopped, interrupted, time.perf_counter() - began, table)
+
+
+def record_schema(study: DesignStudy, *, slopes: bool) -> pa.Schema:
+    """Columns of the table: a sweep's, and derivatives of the metrics that count where they are exact."""
+    import pyarrow as pa
+
+    schema = table_schema(study.setting, study.base.motors)
+    names = [slope_column(column, name) for column in study.columns for name in study.setting.names] if slopes else []
+    for name in names:
+        schema = schema.append(pa.field(name, pa.float64()))
+    return schema.append(pa.field(NO_SLOPES, pa.string())) if slopes else schema
 
 
 def sampled_start(
@@ -147,24 +145,14 @@ def sampled_start(
 
 
 def _solved(evaluate: Evaluate, solve: Callable[[Evaluate], str]) -> str:
-    abandon = True
-    try:
-        stopped = solve(evaluate)
-        abandon = False
-        return stopped
-    except LimitReached:
-        abandon = False
-        return f"evaluations = {evaluate.study.search.evaluations} are done"
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    finally:
+    with evaluate.engine:
         try:
-            evaluate.engine.close(abandon=abandon)
-        finally:
-            evaluate.record.write()
+            return solve(evaluate)
+        except LimitReached:
+            return f"evaluations = {evaluate.study.search.evaluations} are done"
 
 
-def _slopes_run(study: DesignStudy, workers: Workers) -> RunTask | None:
+def _slopes_run(study: DesignStudy, run: RunTask | None) -> RunTask | None:
     """What is done for exact derivatives; None where differences are taken.
 
     Raises
@@ -173,7 +161,7 @@ def _slopes_run(study: DesignStudy, workers: Workers) -> RunTask | None:
         They are asked for, and there are none.
     """
     asked = study.search.gradients
-    if asked == DIFFERENCES or (asked is None and (study.objective is not None or workers.run is not None)):
+    if asked == DIFFERENCES or (asked is None and (study.objective is not None or run is not None)):
         return None
     method = study.search.method or DEFAULT_METHOD
     if study.objective is not None and method not in WITH_SLOPES:

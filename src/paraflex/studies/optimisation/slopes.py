@@ -9,18 +9,25 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.campaign import Row
+from paraflex.designs.run import Outcome, Task, trouble
+from paraflex.designs.setting import Setting
 from paraflex.errors import InputError, NumericalError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
 from paraflex.studies.optimisation.noise import NOISE_POINTS, noise_of
-from paraflex.studies.optimisation.record import NO_SLOPES, slope_column
 from paraflex.studies.optimisation.study import DesignStudy
-from paraflex.studies.sweeps.run import Outcome, Row, Task, trouble
-from paraflex.studies.sweeps.study import Setting
 
 Array = NDArray[np.float64]
 EXACT, DIFFERENCES = "exact", "differences"
+# Column that says why a run has no exact derivatives.
+NO_SLOPES = "slope.reason"
 # Bounds of a step that is chosen against noise, as a share of the ranges: what is curved is no straight line beyond.
 _LEAST_STEP, _MOST_STEP = 1e-3, 0.05
+
+
+def slope_column(column: str, parameter: str) -> str:
+    """Column of a metric's exact derivative by a parameter."""
+    return f"slope.{column}.{parameter}"
 
 
 class Slopes(Protocol):
@@ -133,7 +140,7 @@ def _has_slopes(study: DesignStudy, at: Evaluated) -> bool:
 
 def no_exact_slopes(study: DesignStudy) -> str:
     """Why a study has no exact derivatives; empty where it has."""
-    from paraflex.studies.sensitivities import check_differentiable_study
+    from paraflex.designs.derivatives.plans import check_differentiable_study
 
     try:
         check_differentiable_study(study.setting, study.start, study.columns)
@@ -159,7 +166,7 @@ def run_slopes(
     setting, task, watch
         See `run_task`.
     """
-    from paraflex.studies.sensitivities import metric_gradients
+    from paraflex.designs.derivatives.gradient import metric_gradients
 
     single = {mode: replace(setting, modes=(mode,)) for mode in setting.modes}
     chosen = [size if value == 0.0 else None for size, value in zip(sizes, task.values, strict=True)]

@@ -11,8 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
+from paraflex.designs.measure import check_metric, metric_of
+from paraflex.designs.overlay import Place, number_at
+from paraflex.designs.samples import RANDOM, Varied
+from paraflex.designs.schema import SamplingTable, study_table
+from paraflex.designs.setting import Setting
+from paraflex.designs.study import SweepStudy, make_study
 from paraflex.errors import InputError, suggestion
-from paraflex.files.read import read_toml, validate
 from paraflex.mechanism import quantities
 from paraflex.studies.optimisation.objective import Objective, Target
 from paraflex.studies.optimisation.schema import (
@@ -24,11 +29,6 @@ from paraflex.studies.optimisation.schema import (
     StudyTable,
     TargetTable,
 )
-from paraflex.studies.sweeps.metrics import METRICS
-from paraflex.studies.sweeps.overlay import Place, number_at
-from paraflex.studies.sweeps.samples import RANDOM, Varied
-from paraflex.studies.sweeps.schema import SamplingTable
-from paraflex.studies.sweeps.study import Setting, SweepStudy, make_study
 
 Array = NDArray[np.float64]
 # Step of differences in an optimisation, as a share of a range.
@@ -161,32 +161,15 @@ def load_optimisation(file: str | FilePath) -> DesignStudy:
     InputError
         Anything in it that does not fit the file or the mechanism: it names file, field, value and remedy.
     """
-    return _load(file, _optimisation)
+    with study_table(StudyTable, file) as (table, folder):
+        return _optimisation(table, folder)
 
 
 @checked_arguments()
 def load_identification(file: str | FilePath) -> DesignStudy:
     """Read the study file of an identification; see `load_optimisation`."""
-    return _load(file, _identification)
-
-
-def read_study(file: str | FilePath) -> StudyTable:
-    """A study file as the schema has it.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or a field does not fit.
-    """
-    return validate(StudyTable, read_toml(FilePath(file), str(file)), str(file))
-
-
-def _load(file: str | FilePath, make: Any) -> DesignStudy:
-    table = read_study(file)
-    try:
-        return make(table, FilePath(file).parent)
-    except InputError as error:
-        raise (error if error.source else error.in_file(str(file))) from None
+    with study_table(StudyTable, file) as (table, folder):
+        return _identification(table, folder)
 
 
 def _optimisation(table: StudyTable, folder: FilePath) -> DesignStudy:
@@ -220,10 +203,9 @@ def _base(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> Sw
     for name, entry in table.vary.items():
         _check_range(f"vary.{name}", entry)
     for field, column in columns.items():
-        name = _metric(column)
-        if name not in METRICS:
-            raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(METRICS)))
-    metrics = list(dict.fromkeys([*table.metrics, *map(_metric, columns.values())])) if table.metrics else []
+        check_metric(column, field)
+    counting = [metric_of(column).name for column in columns.values()]
+    metrics = list(dict.fromkeys([*table.metrics, *counting])) if table.metrics else []
     sampling = SamplingTable(kind=RANDOM, number=1)
     base = make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
     for field, column in columns.items():
@@ -248,23 +230,18 @@ def _check_range(field: str, entry: ParameterTable) -> None:
         raise InputError("low and high are equal", field=f"{field}.high", value=entry.high, remedy="leave it out")
 
 
-def _metric(column: str) -> str:
-    return column.partition(".")[0]
-
-
 def _check_column(field: str, column: str, motors: tuple[str, ...]) -> None:
-    """Nothing, if a metric is one number of each run."""
-    name, _, motor = column.partition(".")
-    known = [f"{name}.{each}" for each in motors]
-    if METRICS[name].per_motor and column not in known:
+    """None if a metric is one number of each run."""
+    metric, known = metric_of(column), metric_of(column).columns(motors)
+    if metric.per_motor and column not in known:
         raise InputError(
             "this metric is one of each motor, and no motor is named",
             field=field,
             value=column,
             remedy=suggestion(column, known),
         )
-    if motor and not METRICS[name].per_motor:
-        raise InputError("not a metric per motor", field=field, value=column, remedy=f'say "{name}"')
+    if column not in known:
+        raise InputError("not a metric per motor", field=field, value=column, remedy=f'say "{metric.name}"')
 
 
 def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given: float | None) -> float:

@@ -1,8 +1,8 @@
 """Sensitivities: derivatives of what runs are judged by, by any numbers of the mechanism's file."""
 
-from paraflex.studies.sensitivities.gradient import ModeGradients, metric_gradients, mode_gradients
-from paraflex.studies.sensitivities.metrics import SMOOTH
-from paraflex.studies.sensitivities.plans import check_differentiable_study, nominal_values
+from paraflex.designs.derivatives.gradient import ModeGradients, metric_gradients, mode_gradients
+from paraflex.designs.derivatives.plans import check_differentiable_study, nominal_values
+from paraflex.designs.measure import SMOOTH
 from paraflex.studies.sensitivities.study import (
     Sensitivities,
     SensitivityStudy,

@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
+from paraflex.designs.derivatives.plans import nominal_values
+from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
+from paraflex.designs.run import Task
+from paraflex.designs.samples import Varied
+from paraflex.designs.schema import SweepTable, study_table
+from paraflex.designs.setting import Setting, make_setting
+from paraflex.display import Shown
 from paraflex.errors import InputError, suggestion
-from paraflex.files.read import read_toml, validate
-from paraflex.studies.sensitivities.gradient import ModeGradients, mode_gradients
-from paraflex.studies.sensitivities.metrics import SMOOTH, check_smooth
-from paraflex.studies.sensitivities.plans import nominal_values
-from paraflex.studies.sweeps.metrics import METRICS
-from paraflex.studies.sweeps.run import Task
-from paraflex.studies.sweeps.samples import Varied
-from paraflex.studies.sweeps.schema import SweepTable
-from paraflex.studies.sweeps.study import Setting, make_setting
+from paraflex.results.summary import finite_or_none
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +46,7 @@ class SensitivityStudy:
 
 
 @dataclass(frozen=True)
-class Sensitivities:
+class Sensitivities(Shown):
     """Metrics of runs and their derivatives by parameters.
 
     Attributes
@@ -118,19 +118,13 @@ class Sensitivities:
             ],
         }
 
-    def _repr_html_(self) -> str:
-        """In notebooks."""
-        from paraflex.studies.html import sensitivities_html
-
-        return sensitivities_html(self)
-
     def _metric(self, i: int, j: int) -> dict[str, Any]:
         arrays = {"derivatives": self.derivatives, "relative": self.relative, "errors": self.errors}
         told = {
-            kind: {name: _plain(value) for name, value in zip(self.parameters, array[i, j], strict=True)}
+            kind: {name: finite_or_none(value) for name, value in zip(self.parameters, array[i, j], strict=True)}
             for kind, array in arrays.items()
         }
-        return {"value": _plain(self.values[i, j]), **told}
+        return {"value": finite_or_none(self.values[i, j]), **told}
 
     def _lines(self):
         relative = self.relative
@@ -167,23 +161,19 @@ def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> Sensiti
     InputError
         Anything in it that does not fit the file or the mechanism: it names file, field, value and remedy.
     """
-    source = str(file)
-    table = validate(SweepTable, read_toml(Path(file), source), source)
-    chosen = list(metrics) or table.metrics
-    try:
+    with study_table(SweepTable, file) as (table, folder):
+        chosen = list(metrics) or table.metrics
         _check_names(chosen)
-        setting, parameters, _ = make_setting(table.model_copy(update={"metrics": chosen}), Path(file).parent)
+        setting, parameters, _ = make_setting(table.model_copy(update={"metrics": chosen}), folder)
         if not chosen:
-            setting = replace(setting, metrics=tuple(name for name in setting.metrics if name in SMOOTH))
+            setting = replace(setting, metrics=smooth_metrics(setting.metrics))
         if not parameters:
             raise InputError(
                 "no parameters to differentiate by",
                 field="vary",
                 remedy="give each a table: [vary.NAME] fields = [...]",
             )
-    except InputError as error:
-        raise (error if error.source else error.in_file(source)) from None
-    return SensitivityStudy(table.name, setting, parameters)
+        return SensitivityStudy(table.name, setting, parameters)
 
 
 @checked_arguments()
@@ -217,8 +207,7 @@ def sensitivities(study: SensitivityStudy | str | Path, *, at: Mapping[str, floa
 
 def _check_names(names: Sequence[str]) -> None:
     for name in names:
-        if name not in METRICS:
-            raise InputError("unknown metric", field="metrics", value=name, remedy=suggestion(name, list(SMOOTH)))
+        check_metric(name, known=SMOOTH)
     check_smooth(tuple(names))
 
 
@@ -255,13 +244,9 @@ def _gathered(
         nominal=np.array(values),
         fields=tuple(parameter.fields for parameter in study.parameters),
         metrics=columns,
-        units=tuple(METRICS[name.split(".")[0]].unit for name in columns),
+        units=tuple(metric_of(name).unit for name in columns),
         values=np.array([[each.values[name] for name in columns] for each in found]),
         derivatives=np.array([[each.gradients[name] for name in columns] for each in found]),
         errors=np.array([[each.errors[name] for name in columns] for each in found]),
         unsettled=np.array([each.unsettled for each in found]),
     )
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -1,11 +1,12 @@
 """Sweeps: thousands of runs of a mechanism whose numbers vary, as one table."""
 
-from paraflex.studies.sweeps.engines import ENGINES, Engine, LostCluster, open_engine
-from paraflex.studies.sweeps.metrics import METRICS, Metric
-from paraflex.studies.sweeps.run import Outcome, Task, run_task
-from paraflex.studies.sweeps.samples import Varied
-from paraflex.studies.sweeps.session import SweepProgress, SweepResult, sweep
-from paraflex.studies.sweeps.study import Setting, SweepStudy, load_sweep
+from paraflex.campaign import ENGINES, Engine, LostCluster, open_engine
+from paraflex.designs.run import Outcome, Task, run_task
+from paraflex.designs.samples import Varied
+from paraflex.designs.session import SweepProgress, SweepResult, sweep
+from paraflex.designs.setting import Setting
+from paraflex.designs.study import SweepStudy, load_sweep
+from paraflex.results.metrics import METRICS, Metric
 
 __all__ = [
     "ENGINES",

@@ -13,7 +13,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from paraflex.campaign import tables_of
 from paraflex.compilation import compile_kernels_for
+from paraflex.designs.measure import beyond_limits
+from paraflex.designs.reopen import StudyFolder, open_study, run_again
+from paraflex.designs.run import Abandoned
+from paraflex.designs.units import unit_of
 from paraflex.errors import InputError, ParaflexError
 from paraflex.files import model_from
 from paraflex.report import Page
@@ -22,11 +27,7 @@ from paraflex.report.designs import Studied, read_studied
 from paraflex.report.survey import Step
 from paraflex.report.sweep import Parameter, StudyAccount, sweep_page
 from paraflex.results.doubts import doubt_lines
-from paraflex.studies.sweeps.metrics import VALIDITY, beyond_limits
-from paraflex.studies.sweeps.reopen import StudyFolder, open_study, reason_of, run_again
-from paraflex.studies.sweeps.run import Abandoned
-from paraflex.studies.sweeps.table import RESULTS, parts
-from paraflex.studies.sweeps.units import unit_of
+from paraflex.results.metrics import VALIDITY
 
 _FOUND = "result.json"
 # So much a metric may differ from its row's before the reader is warned: other machines round otherwise.
@@ -51,10 +52,10 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
         It holds no study of ours, or has no rows yet.
     """
     study = open_study(folder)
-    files = [study.folder / RESULTS] if (study.folder / RESULTS).is_file() else parts(study.folder)
-    if not files:
+    files = tables_of(study.folder)
+    studied = read_studied(files) if files else None
+    if studied is None or not studied.run.size:
         raise InputError("no run is done yet", field=str(folder), remedy="run the study first")
-    studied = read_studied(files)
     found = _found(study.folder / _FOUND)
     picked = best_runs(studied)
     if found:
@@ -99,7 +100,7 @@ def _again(
         try:
             data, metrics = run_again(study.setting, values, path, mode, watch)
         except ParaflexError as error:
-            return reason_of(error)
+            return " ".join(str(error).split())
         told = {name: table.metrics[name][row] for name in metrics if name in table.metrics}
         return data, all(np.isclose(metrics[name], told[name], rtol=_SAME, equal_nan=True) for name in told)
 

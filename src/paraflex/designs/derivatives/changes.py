@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 from paraflex.actuation import Effort, FeedForward, required_effort
 from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
+from paraflex.designs.derivatives.plans import Given
+from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
+from paraflex.designs.derivatives.steps import Stepped, complex_step, part, stepped, with_fields
+from paraflex.designs.run import Task
+from paraflex.designs.setting import Setting
 from paraflex.dynamics import (
     InputSignals,
     System,
@@ -33,11 +38,6 @@ from paraflex.kinematics.closure import PathClosure, with_marker
 from paraflex.kinematics.variation import MotionChange, Nearby, vary_motion
 from paraflex.mechanism import Mechanism, RigidBody
 from paraflex.simulate import TrackingTask, path_knots
-from paraflex.studies.sensitivities.plans import Given
-from paraflex.studies.sensitivities.stencil import STENCILS, Difference, Stencil
-from paraflex.studies.sensitivities.steps import Stepped, complex_step, part, stepped, with_fields
-from paraflex.studies.sweeps.run import Task
-from paraflex.studies.sweeps.study import Setting
 
 Array = NDArray[np.float64]
 
@@ -128,7 +128,7 @@ class Change:
             self.system = build_system(self.there.mechanism, planned.system)
             self._check_layout()
         except InputError as error:
-            raise InputError(error.problem, field=f"vary.{self.name}", value=error.value, remedy=error.remedy) from None
+            raise error.at(f"vary.{self.name}") from None
         self.closure = PathClosure(planned.mechanism.rigid(), here.orientation, here.end)
         self.end = here.end
 
@@ -386,7 +386,7 @@ def _condition(values: Array, planned: _Planned, torques: FeedForward) -> NDArra
 def _described(setting: Setting, task: Task, mechanism: Mechanism | None = None) -> Described:
     model, options = setting.design(task.values)
     path = model.path(task.path)
-    end = model.duration(task.path, path) if setting.duration is None else setting.duration
+    end = model.duration(path, setting.duration)
     gains = (options.alpha, options.beta)
     return Described(mechanism or model.mechanism, path, end, model.study.orientation, gains)
 

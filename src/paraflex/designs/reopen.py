@@ -9,14 +9,16 @@ from typing import Any
 
 import xarray as xr
 
-from paraflex.errors import InputError, ParaflexError
+from paraflex.campaign import STUDY, read_study
+from paraflex.designs.measure import measure
+from paraflex.designs.overlay import Place
+from paraflex.designs.run import Abandoned, Task, plan_task
+from paraflex.designs.samples import Varied
+from paraflex.designs.setting import Setting, digest, versions
+from paraflex.designs.study import SweepStudy
+from paraflex.errors import InputError
 from paraflex.results import tracking_dataset
 from paraflex.simulate import simulate
-from paraflex.studies.sweeps.folder import STUDY, read_told
-from paraflex.studies.sweeps.metrics import measure
-from paraflex.studies.sweeps.overlay import Place
-from paraflex.studies.sweeps.run import Abandoned, Task, plan_task
-from paraflex.studies.sweeps.study import Setting, versions
 
 _AGAIN = "run the study again, in a new folder"
 
@@ -54,6 +56,22 @@ class StudyFolder:
         return all(versions()[name] == had for name, had in self.versions.items() if name in versions())
 
 
+def study_account(study: SweepStudy, content: Mapping[str, Any], **told: Any) -> dict[str, Any]:
+    """What the `study.json` of a folder is to say.
+
+    Parameters
+    ----------
+    study : SweepStudy
+        What is run.
+    content : mapping
+        What the results depend on, in plain values.
+    **told
+        More of `StudyFolder`.
+    """
+    said = {"content": digest(content), "versions": dict(study.setting.versions), "format": 1, "name": study.name}
+    return said | told | {"ranges": {each.name: _range(each) for each in study.parameters}, "study": content}
+
+
 def open_study(folder: str | Path) -> StudyFolder:
     """The study whose results a folder holds.
 
@@ -63,7 +81,7 @@ def open_study(folder: str | Path) -> StudyFolder:
         `study.json` cannot be read, or is not that of a study.
     """
     folder = Path(folder)
-    told = read_told(folder / STUDY)
+    told = read_study(folder / STUDY)
     try:
         return StudyFolder(
             folder=folder,
@@ -110,9 +128,11 @@ def run_again(
     return tracking_dataset([run], options=options), measure(run, setting.metrics)
 
 
-def reason_of(error: ParaflexError) -> str:
-    """Why a run cannot be made again, in one line."""
-    return " ".join(str(error).split())
+def _range(parameter: Varied) -> list[Any]:
+    """Its lowest and highest value, and "log", "linear" or "values"."""
+    if parameter.values is not None:
+        return [min(parameter.values), max(parameter.values), "values"]
+    return [parameter.low, parameter.high, "log" if parameter.log else "linear"]
 
 
 def _setting(content: Mapping[str, Any], had: Mapping[str, str]) -> Setting:

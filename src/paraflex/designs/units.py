@@ -9,9 +9,9 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 
+from paraflex.designs.overlay import Place
+from paraflex.designs.schema import IntegrationTable, SweepTable
 from paraflex.files.schema import ModelTable
-from paraflex.studies.sweeps.overlay import Place
-from paraflex.studies.sweeps.schema import IntegrationTable, SweepTable
 
 _UNITS = (
     "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad", "N s/m", "N m", "N/m", "m/s^2", "m^4", "m^2", "m/s",

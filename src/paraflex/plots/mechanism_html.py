@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from paraflex.display import facts, page, sentence, table
-from paraflex.mechanism.joints import PrismaticJoint, RevoluteJoint, SlidingJoint, SlotJoint, WeldJoint
-from paraflex.mechanism.loops import loops
-from paraflex.mechanism.sketch import sketch
-
-if TYPE_CHECKING:
-    from paraflex.mechanism.mechanism import Mechanism
+from paraflex.display import facts, page, sentence, table, view
+from paraflex.mechanism import Mechanism, PrismaticJoint, RevoluteJoint, SlidingJoint, SlotJoint, WeldJoint, loops
+from paraflex.plots.svg import sketch
 
 # Constraint rows of a joint.
 _ROWS = {RevoluteJoint: 2, WeldJoint: 3, PrismaticJoint: 2, SlotJoint: 1, SlidingJoint: 1}
@@ -19,6 +15,7 @@ _ROWS = {RevoluteJoint: 2, WeldJoint: 3, PrismaticJoint: 2, SlotJoint: 1, Slidin
 _MOST = 40
 
 
+@view.register(Mechanism)
 def mechanism_html(mechanism: Mechanism) -> str:
     """Bodies, joints, motors, freedoms and a sketch of the first assembly."""
     rows = [(body.name, _words(type(body).__name__, body), getattr(body, "length", None), ", ".join(body.points))

@@ -8,6 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.designs.derivatives.changes import Change, ModeChange
+from paraflex.designs.derivatives.plans import Given, given, size_of
+from paraflex.designs.derivatives.stencil import STENCILS
+from paraflex.designs.derivatives.steps import part, stepped
+from paraflex.designs.measure import measure, metric_columns, metric_values, smooth_metrics
+from paraflex.designs.run import Task, plan_task
+from paraflex.designs.setting import Setting
 from paraflex.dynamics import numbers_of, with_numbers
 from paraflex.errors import InputError, Moment, NumericalError
 from paraflex.integrators.solution import Solution
@@ -19,15 +26,9 @@ from paraflex.integrators.variation import (
     energies,
     run_derivatives,
 )
+from paraflex.results.run_traces import run_traces
+from paraflex.results.traces import Traces
 from paraflex.simulate import TrackingRun, simulate
-from paraflex.studies.sensitivities.changes import Change, ModeChange
-from paraflex.studies.sensitivities.metrics import columns, smooth_traces, smooth_values
-from paraflex.studies.sensitivities.plans import Given, given, size_of
-from paraflex.studies.sensitivities.stencil import STENCILS
-from paraflex.studies.sensitivities.steps import part, stepped
-from paraflex.studies.sweeps.metrics import Traces, measure
-from paraflex.studies.sweeps.run import Task, plan_task
-from paraflex.studies.sweeps.study import Setting
 
 Array = NDArray[np.float64]
 
@@ -110,8 +111,8 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Chan
         )
     of_mode = [change.of_mode(nominal) for change in changes]
     found = run_derivatives(nominal.problem, nominal.options, [each.direction for each in of_mode])
-    names = columns(run, setting.metrics)
-    here = smooth_traces(_with_motion(run, nominal, found.motion))
+    names = metric_columns(run, smooth_metrics(setting.metrics))
+    here = run_traces(_with_motion(run, nominal, found.motion))
     slopes = [_slopes(setting, run, here, nominal, found, k, each) for k, each in enumerate(of_mode)]
     sizes = np.array([change.size for change in changes])
     values = np.array(slopes).reshape(len(changes), len(names)).T / sizes
@@ -148,7 +149,7 @@ def _slopes(
         kinetic_energy=energy[:, 0], strain_energy=energy[:, 1], work=work + energy[:, 2] - energy[0, 2],
     )  # fmt: skip
     moved = TrackingRun(change.task, change.torques, change.condition, solution, run.method)
-    values = smooth_values(smooth_traces(moved), here, setting.metrics)
+    values = metric_values(run_traces(moved), here, smooth_metrics(setting.metrics))
     # A metric without a value has no derivative either.
     return np.where(np.isnan(np.real(values)), np.nan, part(values))
 

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import xarray as xr
 
+from paraflex.campaign import Row
 from paraflex.compilation import compile_kernels_for
+from paraflex.designs.measure import measure
+from paraflex.designs.setting import Setting, digest, versions
 from paraflex.errors import InputError, NumericalError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.results import tracking_dataset
-from paraflex.simulate import TrackingRun, TrackingTask, plan_tracking, simulate
-from paraflex.studies.sweeps.metrics import measure
-from paraflex.studies.sweeps.study import Setting, digest, versions
+from paraflex.results.metrics import METRICS
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+from paraflex.simulate import TrackingRun, TrackingTask, simulate
 
 COMPLETE, FAILED, INVALID = "complete", "failed", "invalid"
 STATUSES = (COMPLETE, FAILED, INVALID)
 _ID_DIGITS = 16
-
-Row = dict[str, Any]
 
 
 class Task(NamedTuple):
@@ -108,18 +111,28 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
     """
     model, options = setting.design(task.values)
     _compile(model.mechanism)
-    path = model.path(task.path)
-    planned = plan_tracking(
-        model.mechanism,
-        path,
-        duration=model.duration(task.path, path) if setting.duration is None else setting.duration,
-        samples=model.study.samples if setting.samples is None else setting.samples,
-        assembly=setting.assembly or model.study.assembly,
-        orientation=model.study.orientation,
-        after=model.study.after,
-        warning=False,
+    planned = model.plan(
+        task.path, duration=setting.duration, samples=setting.samples, assembly=setting.assembly, warning=False
     )
     return planned, options
+
+
+def table_schema(setting: Setting, motors: Sequence[str]) -> pa.Schema:
+    """Columns of rows: runs, parameters, how they ended, metrics; with units in the fields' metadata."""
+    import pyarrow as pa
+
+    whole, real, text = pa.int64(), pa.float64(), pa.string()
+    columns = [("run", whole), ("id", text), ("design", whole), ("path", text), ("mode", text)]
+    columns += [(name, whole if each else real) for name, each in zip(setting.names, setting.whole, strict=True)]
+    columns += [("status", text), ("reason", text)]
+    fields = [pa.field(*column) for column in columns]
+    fields.append(pa.field("time_reached", real, metadata={"unit": "s"}))
+    for name in setting.metrics:
+        metric = METRICS[name]
+        told = {"unit": metric.unit, "meaning": metric.meaning}
+        called = [f"{name}.{motor}" for motor in motors] if metric.per_motor else [name]
+        fields += [pa.field(each, whole if metric.whole else real, metadata=told) for each in called]
+    return pa.schema(fields)
 
 
 def trouble(error: Exception) -> Row:

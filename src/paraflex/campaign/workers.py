@@ -1,6 +1,6 @@
 """Who computes: threads of this process, other processes, or the workers of a Dask cluster.
 
-Each engine runs the same function on the same tasks; what comes back does not depend on which it is.
+Each runs any function of a task, and what comes back does not depend on which of them it was.
 """
 
 from __future__ import annotations
@@ -24,11 +24,16 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
-from typing import Any, Protocol, TypeVar
+from functools import partial
+from importlib import import_module
+from itertools import islice
+from typing import Any, TypeVar
 
 from paraflex.errors import InputError, ParaflexError, suggestion
 
-THREADS, PROCESSES, DASK = "threads", "processes", "dask"
+THREADS = "threads"
+PROCESSES = "processes"
+DASK = "dask"
 ENGINES = (THREADS, PROCESSES, DASK)
 # Tasks given out for each worker: one it works on and one that waits, so that memory does not grow with the sweep.
 _AHEAD = 2
@@ -51,49 +56,59 @@ class LostCluster(ParaflexError):
     """The cluster went away; what is written stays."""
 
 
-class Engine(Protocol):
-    """Takes calls and gives futures for them."""
+class Engine:
+    """Takes calls and gives futures for them; itself from a pool of this machine.
+
+    As a context it is closed at the end, and its workers do not finish what they have if that was an error or Ctrl-C.
+    """
+
+    _pool: Any
+
+    def __init__(self, workers: int) -> None:
+        self._workers = workers
+
+    def __enter__(self) -> Engine:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.close(abandon=kind is not None)
 
     @property
     def workers(self) -> int:
         """How many tasks run at once."""
-        ...
+        return self._workers
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
         """Call a function with arguments elsewhere."""
-        ...
+        return self._pool.submit(function, *arguments)
 
     def restart(self) -> None:
         """Be ready again after a worker died and took the others with it."""
-        ...
 
     def close(self, *, abandon: bool = False) -> None:
         """Let go of the workers; abandon tells them not to finish what they have."""
-        ...
+        self._pool.shutdown(cancel_futures=True)
 
 
-class Threads:
+class Threads(Engine):
     """Threads of this process: the kernels release the GIL."""
 
     def __init__(self, workers: int) -> None:
-        self.workers = workers
+        super().__init__(workers)
         self._stop = threading.Event()
         self._pool = ThreadPoolExecutor(workers)
         self._switching = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
-        """See `Engine`."""
-        return self._pool.submit(function, *arguments, self._watch)
-
-    def restart(self) -> None:
-        """See `Engine`; threads do not die."""
+        """See `Engine`; the function is given what it tells the time reached, too."""
+        return super().submit(function, *arguments, self._watch)
 
     def close(self, *, abandon: bool = False) -> None:
         """See `Engine`."""
         if abandon:
             self._stop.set()
-        self._pool.shutdown(cancel_futures=True)
+        super().close()
         sys.setswitchinterval(self._switching)
 
     def _watch(self, _: float) -> None:
@@ -101,16 +116,12 @@ class Threads:
             raise KeyboardInterrupt
 
 
-class Processes:
+class Processes(Engine):
     """Processes on this machine."""
 
     def __init__(self, workers: int) -> None:
-        self.workers = workers
+        super().__init__(workers)
         self._pool = self._start()
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
-        """See `Engine`."""
-        return self._pool.submit(function, *arguments)
 
     def restart(self) -> None:
         """See `Engine`."""
@@ -119,32 +130,41 @@ class Processes:
 
     def close(self, *, abandon: bool = False) -> None:
         """See `Engine`."""
-        processes = list((self._pool._processes or {}).values())
-        if abandon:
-            for process in processes:
-                process.terminate()
-        self._pool.shutdown(cancel_futures=True)
+        for process in list((self._pool._processes or {}).values()) if abandon else []:
+            process.terminate()
+        super().close()
 
     def _start(self) -> ProcessPoolExecutor:
         # Not forked: threads of this process may hold locks.
         context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(self.workers, mp_context=context, initializer=_leave_interrupts_to_parent)
+        deaf = partial(signal.signal, signal.SIGINT, signal.SIG_IGN)
+        return ProcessPoolExecutor(self.workers, mp_context=context, initializer=deaf)
 
 
-class Dask:
+class Dask(Engine):
     """Workers of a Dask cluster, which gives the tasks of one that died to others."""
 
     def __init__(self, workers: int, address: str | None) -> None:
-        distributed = _distributed()
+        super().__init__(1)
+        try:
+            distributed: Any = import_module("distributed")
+        except ImportError:
+            remedy = "pip install 'paraflex[cluster]'"
+            raise InputError("Dask is not installed", field="--engine", value=DASK, remedy=remedy) from None
         self._cluster = None
         if address is None:
             with _deaf_to_interrupts():
                 self._cluster = distributed.LocalCluster(
                     n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
                 )
-        self._client = _connect(distributed, address, self._cluster)
+        try:
+            self._client = distributed.Client(address or self._cluster, timeout=_REACHED_WITHIN, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            reason = str(error).partition("\n")[0] or type(error).__name__
+            remedy = "start it with dask scheduler, and give the address it prints"
+            raise InputError(f"cannot be reached ({reason})", field="--cluster", value=address, remedy=remedy) from None
         self._pool = self._client.get_executor(pure=False)
-        self._counted, self._workers = -math.inf, 1
+        self._counted = -math.inf
 
     @property
     def workers(self) -> int:
@@ -153,10 +173,6 @@ class Dask:
         if now - self._counted > _RECOUNT:
             self._counted, self._workers = now, max(1, sum(self._client.nthreads().values()))
         return self._workers
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
-        """See `Engine`."""
-        return self._pool.submit(function, *arguments)
 
     def restart(self) -> None:
         """See `Engine`."""
@@ -170,13 +186,13 @@ class Dask:
             self._cluster.close(timeout=5)
 
 
-def open_engine(name: str, workers: int | None = None, cluster: str | None = None) -> Engine:
+def open_engine(engine: str | Engine, workers: int | None = None, cluster: str | None = None) -> Engine:
     """An engine by name.
 
     Parameters
     ----------
-    name : str
-        "threads", "processes" or "dask".
+    engine : str or Engine
+        "threads", "processes" or "dask"; an engine is given back.
     workers : int, optional
         As many as there are processors by default.
     cluster : str, optional
@@ -187,25 +203,22 @@ def open_engine(name: str, workers: int | None = None, cluster: str | None = Non
     InputError
         Unknown name, no workers, a cluster that does not answer, or a package that is missing.
     """
-    if name not in ENGINES:
-        raise InputError("unknown engine", field="--engine", value=name, remedy=suggestion(name, ENGINES))
-    if cluster is not None and name != DASK:
-        raise InputError(
-            "only the engine dask takes a cluster",
-            field="--cluster",
-            value=cluster,
-            remedy="say --engine dask, or leave it out",
-        )
+    if isinstance(engine, Engine):
+        return engine
+    if engine not in ENGINES:
+        raise InputError("unknown engine", field="--engine", value=engine, remedy=suggestion(engine, ENGINES))
+    if cluster is not None and engine != DASK:
+        remedy = "say --engine dask, or leave it out"
+        raise InputError("only the engine dask takes a cluster", field="--cluster", value=cluster, remedy=remedy)
     if cluster is not None and workers is not None:
-        raise InputError(
-            "the cluster has workers of its own", field="--workers", value=workers, remedy="leave it out with --cluster"
-        )
+        remedy = "leave it out with --cluster"
+        raise InputError("the cluster has workers of its own", field="--workers", value=workers, remedy=remedy)
     if workers is not None and workers < 1:
         raise InputError("must be positive", field="--workers", value=workers, remedy="say 2")
     count = workers or _processors()
-    if name == THREADS:
+    if engine == THREADS:
         return Threads(count)
-    return Processes(count) if name == PROCESSES else Dask(count, cluster)
+    return Processes(count) if engine == PROCESSES else Dask(count, cluster)
 
 
 def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> Iterator[tuple[T, R | LostWorker]]:
@@ -225,14 +238,11 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
         The result is a LostWorker where every worker that took the task died.
     """
     waiting, running = iter(tasks), {}
-    more = True
-    while more or running:
-        while more and len(running) < _AHEAD * engine.workers:
-            task = next(waiting, None)
-            if task is None:
-                more = False
-            else:
-                running[_submit(engine, function, task)] = task
+    while True:
+        more = islice(waiting, max(0, _AHEAD * engine.workers - len(running)))
+        running |= {_submit(engine, function, task): task for task in more}
+        if not running:
+            return
         # Short waits, for Ctrl-C to be heard everywhere.
         done, _ = wait(running, timeout=1.0, return_when=FIRST_COMPLETED)
         suspects = []
@@ -244,7 +254,8 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
                 suspects.append(task)
                 continue
             except Exception as error:
-                if not _is_death(error):
+                # Dask gives a task up because its workers died.
+                if type(error).__name__ != "KilledWorker":
                     raise
                 result = LostWorker(f"every worker that took it died: {error}")
             yield task, result
@@ -282,11 +293,6 @@ def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Futur
         return broken
 
 
-def _is_death(error: Exception) -> bool:
-    """Whether Dask gave a task up because its workers died."""
-    return type(error).__name__ == "KilledWorker"
-
-
 @contextmanager
 def _deaf_to_interrupts() -> Iterator[None]:
     """Processes started within ignore Ctrl-C, which reaches all of a terminal: this one stops them."""
@@ -298,28 +304,3 @@ def _deaf_to_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _leave_interrupts_to_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _distributed() -> Any:
-    try:
-        import distributed
-    except ImportError:
-        raise InputError(
-            "Dask is not installed", field="--engine", value=DASK, remedy="pip install 'paraflex[cluster]'"
-        ) from None
-    return distributed
-
-
-def _connect(distributed: Any, address: str | None, cluster: Any) -> Any:
-    try:
-        return distributed.Client(address or cluster, timeout=_REACHED_WITHIN, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(
-            f"cannot be reached ({reason})", field="--cluster", value=address,
-            remedy="start it with dask scheduler, and give the address it prints",
-        ) from None  # fmt: skip

@@ -14,8 +14,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.designs.derivatives.stencil import Stencil
 from paraflex.errors import InputError
-from paraflex.studies.sensitivities.stencil import Stencil
 
 T = TypeVar("T")
 

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.designs.measure import check_smooth
+from paraflex.designs.overlay import Place, number_at
+from paraflex.designs.run import Task
+from paraflex.designs.setting import INTEGRATION, Setting
 from paraflex.dynamics import pack_signals
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
 from paraflex.integrators.variation import check_differentiable
 from paraflex.simulate import TrackingTask
-from paraflex.studies.sensitivities.metrics import check_smooth
-from paraflex.studies.sweeps.overlay import Place, number_at
-from paraflex.studies.sweeps.run import Task
-from paraflex.studies.sweeps.study import INTEGRATION, Setting
 
 Array = NDArray[np.float64]
 

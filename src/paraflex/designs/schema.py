@@ -1,19 +1,28 @@
-"""The study file of a sweep as pydantic sees it."""
+"""The study file of a sweep as pydantic sees it, and how study files are read."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from paraflex.files.read import naming, read_toml, validate
 from paraflex.files.schema import Count, Number, Text
 
+T = TypeVar("T", bound=BaseModel)
+Yes = Annotated[bool, Field(strict=True)]
 
-class _Table(BaseModel):
+
+class Table(BaseModel):
+    """A table of a study file."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class VaryTable(_Table):
+class VaryTable(Table):
     """A parameter that varies."""
 
     fields: list[Text] = Field(default=[], description="fields of the mechanism's file, all given the same number")
@@ -22,10 +31,10 @@ class VaryTable(_Table):
     high: Number | None = Field(default=None, description="the largest value")
     number: Count | None = Field(default=None, description="how many values of a grid from low to high")
     scale: Literal["linear", "log"] = Field(default="linear", description='"linear" or "log"')
-    whole: Annotated[bool, Field(strict=True)] = Field(default=False, description="true for whole numbers only")
+    whole: Yes = Field(default=False, description="true for whole numbers only")
 
 
-class SamplingTable(_Table):
+class SamplingTable(Table):
     """How designs are taken from the ranges of the parameters."""
 
     kind: Literal["grid", "list", "random", "sobol"] = Field(
@@ -35,7 +44,7 @@ class SamplingTable(_Table):
     seed: Count = Field(default=0, description="a whole number from 0 on")
 
 
-class IntegrationTable(_Table):
+class IntegrationTable(Table):
     """How runs are integrated; the mechanism's [study] and the program's defaults where nothing is said."""
 
     method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
@@ -44,12 +53,12 @@ class IntegrationTable(_Table):
     constraints: Text | None = Field(default=None, description='"baumgarte", "projection" or "ggl"')
     alpha: Number | None = Field(default=None, description="Baumgarte's coefficient alpha in 1/s")
     beta: Number | None = Field(default=None, description="Baumgarte's coefficient beta in 1/s")
-    automatic_gains: Annotated[bool, Field(strict=True)] | None = Field(default=None, description="true or false")
+    automatic_gains: Yes | None = Field(default=None, description="true or false")
     max_steps: Count | None = Field(default=None, description="steps before a run is given up")
     parameters: dict[str, Number] = Field(default={}, description="the method's own parameters")
 
 
-class SweepTable(_Table):
+class SweepTable(Table):
     """A study file."""
 
     name: Text = Field(default="sweep", description="a name for the study")
@@ -60,9 +69,22 @@ class SweepTable(_Table):
     samples: Count | None = Field(default=None, description="the number of samples of each run")
     assembly: Text | None = Field(default=None, description="the name of an assembly")
     metrics: list[Text] = Field(default=[], description="names of the metrics to keep, validity always; all by default")
-    trajectories: Annotated[bool, Field(strict=True)] = Field(
-        default=False, description="true to keep every run as a netCDF file"
-    )
+    trajectories: Yes = Field(default=False, description="true to keep every run as a netCDF file")
     sampling: SamplingTable = SamplingTable()
     integration: IntegrationTable = IntegrationTable()
     vary: dict[str, VaryTable] = Field(default={}, description="a [vary.NAME] table for each parameter")
+
+
+@contextmanager
+def study_table(kind: type[T], file: str | Path) -> Iterator[tuple[T, Path]]:
+    """A study file as its schema has it, and its folder; errors of what is made of them name the file.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or a field does not fit.
+    """
+    source = str(file)
+    table = validate(kind, read_toml(Path(file), source), source)
+    with naming(source):
+        yield table, Path(file).parent

@@ -1,10 +1,10 @@
-"""A sweep, read from its file and checked against the mechanism it varies."""
+"""What all runs of a study have in common: a mechanism, which of its numbers vary, and how it is run."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.metadata import version
@@ -12,23 +12,19 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arguments import checked_arguments, given_as
-from paraflex.errors import InputError, as_enum, suggestion
+from paraflex.designs.measure import metrics_of
+from paraflex.designs.overlay import Place, find_place, overlaid
+from paraflex.designs.samples import Varied
+from paraflex.designs.schema import SweepTable, VaryTable
+from paraflex.errors import InputError, suggestion
 from paraflex.files import Model, library_names, load_data, model_from
 from paraflex.files.generators import is_generated
-from paraflex.files.read import read_toml, validate
 from paraflex.findings import Verdict
-from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import parse_mode
+from paraflex.integrators import IntegrationOptions, check_times
 from paraflex.results.dataset import part_of
-from paraflex.results.metrics import HEADLINE, ErrorSpan, Part
-from paraflex.studies.sweeps.metrics import METRICS, VALIDITY
-from paraflex.studies.sweeps.overlay import Place, find_place, overlaid
-from paraflex.studies.sweeps.samples import Varied, check_varied, designs
-from paraflex.studies.sweeps.schema import SweepTable, VaryTable
-from paraflex.studies.sweeps.table import FIXED_COLUMNS
+from paraflex.results.following import Part
+from paraflex.results.metrics import METRICS
 from paraflex.validity import doubtful_numbers
 
 # Attempted steps before a run is given up, unless the study says: a design that flails about must not hold up the rest.
@@ -36,6 +32,8 @@ MOST_STEPS = 200_000
 # A field of this table is one of the study's own [integration], and may be one of these.
 INTEGRATION = "integration"
 INTEGRATION_NUMBERS = ("tolerance", "step", "alpha", "beta")
+# Columns of every table of designs that are neither parameters nor metrics.
+FIXED_COLUMNS = ("run", "id", "design", "path", "mode", "status", "reason", "time_reached")
 # What results depend on besides the study.
 _PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
@@ -121,7 +119,7 @@ class Setting:
         found = {}
         for name in self.paths:
             path = model.path(name)
-            found[name] = part_of(path, model.duration(name, path) if self.duration is None else self.duration)
+            found[name] = part_of(path, model.duration(path, self.duration))
         return {name: part for name, part in found.items() if part is not None}
 
     def verdict(self) -> Verdict:
@@ -138,106 +136,7 @@ class Setting:
         InputError
             They do not go together.
         """
-        study = model.study
-        wanted = dict(self.integration) | dict(chosen or {})
-        given: dict[str, Any] = {"method": study.method, "tolerance": study.tolerance, "step": study.step}
-        given |= wanted
-        # A step goes with a method: naming another method leaves the mechanism's step out.
-        if "step" not in wanted and given["method"] != study.method:
-            given["step"] = None
-        return IntegrationOptions(**{name: value for name, value in given.items() if value is not None})
-
-
-@given_as("a sweep", "a SweepStudy")
-@dataclass(frozen=True)
-class SweepStudy:
-    """A sweep: a mechanism, what varies in it, what is run and what is kept.
-
-    Attributes
-    ----------
-    name : str
-    setting : Setting
-    parameters : tuple of Varied
-    kind : str
-        Of sampling.
-    designs : (k, parameters) array
-    motors : tuple of str
-        Of the mechanism.
-    """
-
-    name: str
-    setting: Setting
-    parameters: tuple[Varied, ...]
-    kind: str
-    designs: NDArray[np.float64]
-    motors: tuple[str, ...]
-
-    @property
-    def runs(self) -> int:
-        """Number of runs: designs times paths times modes."""
-        return len(self.designs) * len(self.setting.paths) * len(self.setting.modes)
-
-    def model(self) -> Model:
-        """The mechanism as its file has it."""
-        return model_from(dict(self.setting.data), self.setting.source)
-
-    def content(self) -> dict[str, Any]:
-        """What the results depend on, in plain values: the same content gives the same table."""
-        setting = self.setting
-        return {
-            "mechanism": dict(setting.data),
-            "paths": list(setting.paths),
-            "modes": list(setting.modes),
-            "duration": setting.duration,
-            "samples": setting.samples,
-            "assembly": setting.assembly,
-            "integration": dict(setting.integration),
-            "metrics": list(setting.metrics),
-            "trajectories": setting.trajectories,
-            "parameters": [
-                {"name": p.name, "places": [list(place) for place in places], "whole": p.whole}
-                for p, places in zip(self.parameters, setting.places, strict=True)
-            ],
-            "designs": hashlib.sha256(np.ascontiguousarray(self.designs, dtype="<f8").tobytes()).hexdigest(),
-        }
-
-
-@checked_arguments()
-def load_sweep(file: str | FilePath) -> SweepStudy:
-    """Read a study file.
-
-    Parameters
-    ----------
-    file : str or Path
-        TOML; see docs/sweeps.md.
-
-    Raises
-    ------
-    InputError
-        Anything in it that does not fit the file or the mechanism: it names file, field, value and remedy.
-    """
-    source = str(file)
-    table = validate(SweepTable, read_toml(FilePath(file), source), source)
-    try:
-        return make_study(table, FilePath(file).parent)
-    except InputError as error:
-        raise (error if error.source else error.in_file(source)) from None
-
-
-def make_study(table: SweepTable, folder: FilePath) -> SweepStudy:
-    """A study as a file in a folder says it; see `load_sweep`."""
-    setting, parameters, model = make_setting(table, folder)
-    for parameter in parameters:
-        check_varied(parameter, table.sampling.kind)
-    sampling = table.sampling
-    return SweepStudy(
-        name=table.name,
-        setting=setting,
-        parameters=parameters,
-        kind=sampling.kind,
-        designs=designs(parameters, sampling.kind, sampling.number, sampling.seed),
-        motors=tuple(motor.name for motor in model.mechanism.motors),
-    )
+        return model.study.integration(dict(self.integration) | dict(chosen or {}))
 
 
 def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Varied, ...], Model]:
@@ -329,8 +228,7 @@ def _place(data: Mapping[str, Any], field: str) -> Place:
 
 def _paths(model: Model, names: list[str]) -> tuple[str, ...]:
     if not names:
-        path = model.path()
-        return (next(name for name, each in model.paths.items() if each is path),)
+        return (model.path_name(),)
     for name in names:
         if name not in model.paths:
             raise InputError("unknown path", field="paths", value=name, remedy=suggestion(name, list(model.paths)))
@@ -338,27 +236,13 @@ def _paths(model: Model, names: list[str]) -> tuple[str, ...]:
 
 
 def _modes(model: Model, names: list[str]) -> tuple[str, ...]:
-    wanted = names or list(model.study.modes) or [mode.name for mode in model.mechanism.modes]
-    if not wanted:
-        raise InputError("no actuation mode to run", field="modes", remedy="name one")
     try:
-        return tuple(dict.fromkeys(parse_mode(model.mechanism, name).name for name in wanted))
+        modes = model.modes(names)
     except InputError as error:
-        raise InputError(error.problem, field="modes", value=error.value, remedy=error.remedy) from None
-
-
-def metrics_of(names: Sequence[str], error: ErrorSpan | str) -> tuple[str, ...]:
-    """Metrics in the order asked for; all where none is, that error first.
-
-    Raises
-    ------
-    InputError
-        An unknown name.
-    """
-    for name in names:
-        if name not in METRICS:
-            raise InputError("unknown metric", field="metrics", value=name, remedy=suggestion(name, list(METRICS)))
-    return tuple(dict.fromkeys([*(names or [HEADLINE[as_enum(ErrorSpan, error, "error")], *METRICS]), VALIDITY]))
+        raise error.at("modes") from None
+    if not modes:
+        raise InputError("no actuation mode to run", field="modes", remedy="name one")
+    return tuple(mode.name for mode in modes)
 
 
 def _integration(table: SweepTable) -> dict[str, Any]:
@@ -367,20 +251,13 @@ def _integration(table: SweepTable) -> dict[str, Any]:
 
 
 def _check(setting: Setting, model: Model) -> None:
-    """Nothing, if what every run has in common can be."""
-    if model.start is not None:
-        raise InputError(
-            "a path says where and how the mechanism starts", field="start", source=model.source,
-            remedy="drop the [start] table",
-        )  # fmt: skip
+    """Check that what every run has in common can be."""
+    model.check_start()
     try:
         setting.options(model)
     except InputError as error:
         raise error.within("integration") from None
-    if setting.duration is not None and not setting.duration > 0.0:
-        raise InputError("must be positive", field="duration", value=setting.duration, remedy="give it in s")
-    if setting.samples is not None and setting.samples < 2:
-        raise InputError("too few samples", field="samples", value=setting.samples, remedy="ask for at least 2")
+    check_times(setting.duration, setting.samples)
     model.mechanism.assembly(setting.assembly)
 
 

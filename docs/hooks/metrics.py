@@ -1,0 +1,25 @@
+"""The table of metrics on the page of sweeps, from the table in the code."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from paraflex.results.metrics import METRICS, Metric
+
+MARK = "<!-- metrics -->"
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Put the table where the page marks it."""
+    return markdown.replace(MARK, table()) if page.file.src_uri == "sweeps.md" else markdown
+
+
+def table() -> str:
+    """Names of all metrics, what they mean, their units, and whether they have derivatives."""
+    return "\n".join(["| Metric | | Unit | Derivatives |", "|---|---|---|---|", *map(_row, METRICS.values())])
+
+
+def _row(metric: Metric) -> str:
+    meaning = metric.meaning + (f": columns `{metric.name}.tau1`, ..." if metric.per_motor else "")
+    unit = "" if metric.unit == "1" else metric.unit
+    return f"| `{metric.name}` | {meaning} | {unit} | {'yes' if metric.smooth else 'none'} |"

@@ -1,0 +1,105 @@
+"""The study that a model proposes: what a run of it does unless asked otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from paraflex.errors import InputError, suggestion
+from paraflex.integrators import IntegrationOptions, check_times
+from paraflex.kinematics import Path
+from paraflex.mechanism import Mechanism, parse_mode
+
+
+@dataclass(frozen=True)
+class StudyDefaults:
+    """What a study of the model does unless asked otherwise.
+
+    Attributes
+    ----------
+    path : str or None
+        The name of one of the model's paths.
+    modes : tuple of str
+    duration : float or None
+        [s]; the path's own where None.
+    samples : int
+    assembly : str or None
+        The first of the mechanism where None.
+    torques : mapping of str to float
+        Constant motor torques of a run without a path [N m].
+    orientation : float
+        Angle of the end-effector along the path, where it is a task coordinate [rad].
+    method : str or None
+        Of integration; the program's own where None.
+    tolerance : float or None
+        Of the integration [m].
+    step : float or None
+        Fixed [s].
+    after : str
+        What the active motors do after the path: "free" or "hold".
+    error : str
+        Which tracking error ranks modes: that of the "motion", or of the "whole" run.
+    """
+
+    path: str | None = None
+    modes: tuple[str, ...] = ()
+    duration: float | None = None
+    samples: int = 701
+    assembly: str | None = None
+    torques: Mapping[str, float] = field(default_factory=dict)
+    orientation: float = 0.0
+    method: str | None = None
+    tolerance: float | None = None
+    step: float | None = None
+    after: str = "free"
+    error: str = "motion"
+
+    def filled(self, **chosen: Any) -> StudyDefaults:
+        """The study with what a caller chooses of it; what is None stays as the study says."""
+        return replace(self, **{name: value for name, value in chosen.items() if value not in (None, "")})
+
+    def integration(self, chosen: Mapping[str, Any] | None = None) -> IntegrationOptions:
+        """How runs are integrated: as a caller chooses, then as the study says, else as `IntegrationOptions` has it.
+
+        A step goes with a method: where another method is chosen the study's step is left out.
+
+        Raises
+        ------
+        InputError
+            Options that do not go together.
+        """
+        given = {name: value for name, value in (chosen or {}).items() if value is not None}
+        own = {"method": self.method, "tolerance": self.tolerance, "step": self.step}
+        if given.get("method", self.method) != self.method:
+            own["step"] = None
+        return IntegrationOptions(**{name: value for name, value in own.items() if value is not None} | given)
+
+
+def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
+    """Check that a study names what the mechanism and its paths have, and that its numbers can be."""
+    if study.path is not None and study.path not in paths:
+        raise InputError(
+            "unknown path", field="study.path", value=study.path, remedy=suggestion(study.path, list(paths))
+        )
+    for mode in study.modes:
+        try:
+            parse_mode(mechanism, mode)
+        except InputError as error:
+            raise error.at("study.modes") from error
+    motors = [motor.name for motor in mechanism.motors]
+    for name in study.torques:
+        if name not in motors:
+            raise InputError("unknown motor", field="study.torques", value=name, remedy=suggestion(name, motors))
+    if study.assembly is not None and study.assembly not in {a.name for a in mechanism.assemblies}:
+        raise InputError(
+            "unknown assembly",
+            field="study.assembly",
+            value=study.assembly,
+            remedy=suggestion(study.assembly, [a.name for a in mechanism.assemblies]),
+        )
+    try:
+        check_times(study.duration, study.samples)
+        study.integration()
+    except InputError as error:
+        raise error.within("study") from None

@@ -1,0 +1,154 @@
+"""How the runs of a dataset follow their paths: its metrics, which of them ranks runs, which part of a path was run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import xarray as xr
+
+from paraflex.arguments import checked_arguments
+from paraflex.findings import Finding
+from paraflex.results.formulas import SAME_TIME
+from paraflex.results.kinds import check_kind
+from paraflex.results.metrics import METRICS
+from paraflex.results.traces import data_traces
+
+# What metrics of a dataset are made of.
+_TRACES = ["end_effector", "end_effector_desired", "torque"]
+
+
+class ErrorSpan(Enum):
+    """What of a run its tracking error is taken over, where one number has to stand for it.
+
+    MOTION
+        The motion along the path, from its start to its end.
+    WHOLE
+        All samples, the dwell after the path among them: the paper's index (Eq. 64).
+    """
+
+    MOTION = "motion"
+    WHOLE = "whole"
+
+
+# The metric that ranks runs, and what it is called.
+HEADLINE = {ErrorSpan.MOTION: "tracking_rms_motion", ErrorSpan.WHOLE: "tracking_rms"}
+SPAN_WORDS = {ErrorSpan.MOTION: "during the motion", ErrorSpan.WHOLE: "over the whole run, dwell included"}
+
+
+@checked_arguments()
+def tracking_error(data: xr.Dataset) -> xr.DataArray:
+    """Root mean square distance of the end-effector from its desired place over the samples (Eq. 64) [m]."""
+    return metric_variables(data)["tracking_rms"]
+
+
+@checked_arguments()
+def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
+    """Root mean square distance of the end-effector after the motion's end from its drift [m]: see `vibration`.
+
+    NaN where the run has too few samples after it, or did not get to its end.
+    """
+    return metric_variables(data, motion_end=motion_end)["residual_vibration"]
+
+
+# Metrics that are variables of datasets; and those that tell how a run follows its path.
+KEPT = tuple(metric.name for metric in METRICS.values() if metric.kept)
+FOLLOWING = tuple(name for name in KEPT if not METRICS[name].per_motor)
+
+
+def metric_variables(
+    data: xr.Dataset, names: Sequence[str] = FOLLOWING, motion_end: float | None = None
+) -> dict[str, xr.DataArray]:
+    """Metrics of every run of a dataset by name, NaN over spans that a run did not finish.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    names : sequence of str
+    motion_end : float, optional
+        End of the motion along the path [s]; that of the dataset by default.
+    """
+    check_kind(data, "tracking", "verification")
+    runs = data[_TRACES]
+    dims = [str(dim) for dim in runs["end_effector"].dims if dim not in ("time", "axis")]
+    shape = tuple(runs.sizes[dim] for dim in dims)
+    traces = [data_traces(runs.isel(dict(zip(dims, at, strict=True))), motion_end) for at in np.ndindex(*shape)]
+    out = {}
+    for metric in map(METRICS.__getitem__, names):
+        own = [*dims, "motor"] if metric.per_motor else dims
+        values = np.array([metric.value(one) for one in traces]).reshape([runs.sizes[dim] for dim in own])
+        told = {"long_name": metric.label, "units": metric.unit, "comment": metric.meaning}
+        out[metric.name] = xr.DataArray(values, {dim: data[dim] for dim in own if dim in data.coords}, own, attrs=told)
+    return out
+
+
+def headline(data: xr.Dataset) -> tuple[xr.DataArray, str]:
+    """The tracking error that ranks the runs of a dataset [m], and what it is of, in words.
+
+    Results that earlier versions wrote are ranked by the whole run, as they were then.
+    """
+    span = ErrorSpan.MOTION if ranked_by_motion(data) else ErrorSpan.WHOLE
+    return data[HEADLINE[span]], SPAN_WORDS[span]
+
+
+def ranked_by_motion(data: xr.Dataset) -> bool:
+    """Whether the error of the motion ranks the runs of a dataset; else that of the whole run."""
+    return data.attrs.get("error", ErrorSpan.WHOLE.value) == ErrorSpan.MOTION.value
+
+
+@dataclass(frozen=True)
+class Part:
+    """What runs did of a path that they were too short for.
+
+    Attributes
+    ----------
+    duration, path : float
+        Of the runs, and of the path [s].
+    length : float
+        Of the path's length, the part that was run.
+    """
+
+    duration: float
+    path: float
+    length: float
+
+    def __str__(self) -> str:
+        return (
+            f"only a part of the path was run: {self.duration:.3g} of {self.path:.3g} s, {100.0 * self.length:.3g} % "
+            "of its length; errors are of that part"
+        )
+
+    def finding(self, place: str = "study.duration") -> Finding:
+        """The same, to be kept with results."""
+        return Finding("path-cut-short", place, str(self), f"the path takes {self.path:.4g} s")
+
+    def figures(self) -> dict[str, float | str]:
+        """As plain numbers, and in words."""
+        return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
+
+
+def too_short(end: float, path_duration: float) -> bool:
+    """Whether a run that ends then [s] does not come to the end of its path [s]."""
+    return end < path_duration * (1.0 - SAME_TIME)
+
+
+def part_run(data: xr.Dataset) -> Part | None:
+    """What the runs of a dataset were to do of a path that they were too short for; None where they were not."""
+    end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
+    if "path_length_run" not in data.attrs or not too_short(end, path):
+        return None
+    return Part(end, path, float(data.attrs["path_length_run"]))
+
+
+@checked_arguments()
+def peak_torque(data: xr.Dataset) -> xr.DataArray:
+    """Largest magnitude of each motor's torque [N m]."""
+    return metric_variables(data, ["peak_torque"])["peak_torque"]
+
+
+@checked_arguments()
+def rms_torque(data: xr.Dataset) -> xr.DataArray:
+    """Root mean square of each motor's torque over the run [N m]."""
+    return metric_variables(data, ["rms_torque"])["rms_torque"]

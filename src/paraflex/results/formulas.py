@@ -1,0 +1,72 @@
+"""Formulas of metrics: sums, products and roots alone, so that numbers with a complex step go through them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
+SAME_TIME = 1e-9
+# Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
+_DRIFT_DEGREE = 2
+# Fewer samples after the motion do not tell a vibration from a drift.
+_FEWEST = 3 * (_DRIFT_DEGREE + 1)
+
+
+def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
+    """Which samples at times t (k,) are of the motion, its end among them [s]; the others are after it."""
+    end = np.real(motion_end)
+    return np.real(t) <= end + SAME_TIME * abs(end)
+
+
+def length(vectors: NDArray[Any]) -> NDArray[Any]:
+    """Length of vectors (k, 2)."""
+    return np.sqrt(vectors[:, 0] ** 2 + vectors[:, 1] ** 2)
+
+
+def rms(values: NDArray[Any]) -> Any:
+    """Root mean square over the first axis; NaN of no values."""
+    if len(values) == 0:
+        return np.full(values.shape[1:], np.nan)[()]
+    return np.sqrt(np.mean(values**2, axis=0))
+
+
+def integral(t: NDArray[Any], values: NDArray[Any]) -> Any:
+    """Integral over time by the trapezoidal rule."""
+    return np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t))
+
+
+def drift_speed(t: NDArray[Any], position: NDArray[Any]) -> Any:
+    """Speed at which positions (k, 2) at times t (k,) move on average [m/s]: of the drift that `vibration` is about.
+
+    The slope of the straight line of least squares. NaN where there are too few samples.
+    """
+    if len(t) < _FEWEST:
+        return np.nan
+    coefficients, half = _drift(t, position)[1:]
+    # The constant and the quadratic part are the same at both ends.
+    return np.sqrt(np.sum(coefficients[1] ** 2)) / half
+
+
+def vibration(t: NDArray[Any], position: NDArray[Any]) -> Any:
+    """Root mean square distance of positions (k, 2) at times t (k,) from their drift [m].
+
+    The drift is the quadratic in time of least squares, which a body has that moves freely, at a speed that changes
+    slowly. Of a steady sinusoid of amplitude A along a line A / sqrt(2), if the samples are of a few periods. NaN where
+    there are too few.
+    """
+    if len(t) < _FEWEST:
+        return np.nan
+    basis, coefficients, _ = _drift(t, position)
+    return np.sqrt(np.mean(np.sum((position - basis @ coefficients) ** 2, axis=1)))
+
+
+def _drift(t: NDArray[Any], position: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], Any]:
+    """Legendre polynomials at the samples (k, 3), their coefficients (3, 2) by least squares, half of the time [s]."""
+    half = 0.5 * (t[-1] - t[0])
+    x = (t - t[0]) / half - 1.0
+    basis = np.stack([np.ones_like(x), x, 1.5 * x**2 - 0.5], axis=1)
+    # Normal equations with a plain transpose: well conditioned for these, and analytic.
+    return basis, np.linalg.solve(basis.T @ basis, basis.T @ position), half

@@ -1,0 +1,185 @@
+"""What datasets of runs have in common: variables of the links, labels, units, conventions, provenance."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import Mechanism
+from paraflex.results.drawing import drawing_coordinates, drawing_variables
+from paraflex.results.links import Links
+from paraflex.results.metrics import METRICS
+from paraflex.results.outlines import chord_deflections
+from paraflex.results.storage import SCHEMA
+from paraflex.results.validity import UNITS as VALIDITY_UNITS
+
+# Dimensions besides time, and values at the samples reached.
+Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
+
+UNITS = {
+    "time": ("time", "s"),
+    "end_effector": ("end-effector position", "m"),
+    "end_effector_velocity": ("end-effector velocity", "m/s"),
+    "end_effector_acceleration": ("end-effector acceleration", "m/s^2"),
+    "torque": ("motor torque", "N m"),
+    "motor_speed": ("rate of a motor's joint", "rad/s"),
+    "motor_power": ("power of a motor", "W"),
+    "angle": ("link angle", "rad"),
+    "angular_velocity": ("link angular velocity", "rad/s"),
+    "angular_acceleration": ("link angular acceleration", "rad/s^2"),
+    "chord_angle": ("angle from a link's first end to its last", "rad"),
+    "chord_velocity": ("rate of the angle from a link's first end to its last", "rad/s"),
+    "deflection": ("largest deflection along a link from its chord", "m"),
+    "tip_axial": ("axial tip displacement", "m"),
+    "tip_transverse": ("transverse tip displacement", "m"),
+    "tip_slope": ("tip slope", "rad"),
+    "point_position": ("position of a named point", "m"),
+    "joint_force": ("force of a joint's first body on its second, ground frame", "N"),
+    "joint_moment": ("moment of a joint's first body on its second", "N m"),
+    "multiplier": ("multiplier of a constraint row; torque or force of a spring, damper or friction", "N, N m"),
+    "kinetic_energy": ("kinetic energy", "J"),
+    "strain_energy": ("strain energy of links and springs", "J"),
+    "work": ("work of motors, prescribed motion, weight and loads, less what dampers and friction take", "J"),
+    "actuation_condition": ("condition number of the actuation matrix", "1"),
+    "shape": ("drawn points of the bodies, deformed", "m"),
+    "shape_base": ("drawn points of the bodies, stiff between the joints that hold them", "m"),
+    "joint_position": ("position of a joint, on its second body", "m"),
+    "joint_direction": ("direction of the axis of a joint that slides", "rad"),
+    "spring_position": ("ends of a spring between points", "m"),
+    "station_body": ("body of a drawn point", "1"),
+    "station_place": ("place of a drawn point in the undeformed body, in its frame", "m"),
+    "point_station": ("drawn point that a named point is", "1"),
+    "joint_kind": ("kind of joint", "1"),
+    "joint_grounded": ("whether the joint is on the ground", "1"),
+    "spring_station": ("drawn points that a spring is at; -1 on the ground", "1"),
+    "status": ("how the run ended", "1"),
+    "message": ("why it is not complete", "1"),
+    "factorisations": ("factorisations of the iteration matrix", "1"),
+    "wall_time": ("wall time of the integration", "s"),
+    "constraint_velocity_max": ("largest constraint violation in velocity", "m/s"),
+    "brake_energy": ("energy that brakes took as they engaged after the motion", "J"),
+    "event": ("event that stopped the run", "1"),
+    "event_time": ("when it was stopped", "s"),
+    **{metric.name: (metric.meaning, metric.unit) for metric in METRICS.values() if metric.of_solver},
+    "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
+    "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
+    "point_velocity": ("velocity of a named point", "m/s"),
+    "applied_torque": ("constant motor torque", "N m"),
+} | VALIDITY_UNITS
+
+# What units do not say: on which body, in which frame, positive which way.
+_COMMENTS = {
+    "motor_power": "torque or force times the rate of the joint: positive drives the mechanism, negative brakes it",
+    "joint_force": (
+        "at the joint's point of the second body, in the ground frame: of the constraints and of motors, springs, "
+        "dampers, friction and prescribed motion along the joint; the opposite acts on the first body"
+    ),
+    "joint_moment": (
+        "about the joint's point of the second body, positive anticlockwise: of the constraints and of motors, "
+        "springs, dampers, friction and prescribed motion that turn the joint; the opposite acts on the first body"
+    ),
+    "multiplier": (
+        "stands on the left of the equations of motion: minus it acts on the joint's second body, in the ground frame, "
+        "anticlockwise, or along the joint's axis or normal; of least norm where constraints depend on one another"
+    ),
+    "torque": "on the joint's second body: positive turns it anticlockwise or moves it along the axis",
+    "applied_torque": "as `torque` of a run along a path",
+    "angle": "of the body frame's x axis against the ground's, anticlockwise",
+    "tip_transverse": "across the tangent at the first end of the link, positive to its left: anticlockwise",
+    "tip_slope": "anticlockwise",
+}
+
+
+# Variables that are forces where all motors slide.
+_EFFORTS = ("torque", "peak_torque", "rms_torque", "applied_torque")
+
+
+def link_variables(links: Links, mechanism: Mechanism) -> Variables:
+    """Of the links of a mechanism, at the samples reached."""
+    return {
+        "angle": (("body",), links.angle),
+        "angular_velocity": (("body",), links.rate),
+        "angular_acceleration": (("body",), links.acceleration),
+        "chord_angle": (("body",), links.chord),
+        "chord_velocity": (("body",), links.chord_rate),
+        "tip_axial": (("body",), links.tip[:, :, 0]),
+        "tip_transverse": (("body",), links.tip[:, :, 1]),
+        "tip_slope": (("body",), links.tip[:, :, 2]),
+        "deflection": (("body",), chord_deflections(mechanism, links.drawing.shape)),
+        "point_position": (("point", "axis"), links.points),
+        "joint_force": (("joint", "axis"), links.joint_force),
+        "joint_moment": (("joint",), links.joint_moment),
+        "multiplier": (("row",), links.multiplier),
+        "motor_speed": (("motor",), links.motor_speed),
+        "kinetic_energy": ((), links.kinetic_energy),
+        "strain_energy": ((), links.strain_energy),
+        "work": ((), links.work),
+        **{name: (dims, x.astype(np.float32)) for name, (dims, x) in drawing_variables(links.drawing).items()},
+    }
+
+
+def padded(values: NDArray[Any], total: int) -> NDArray[Any]:
+    """Values over all samples, NaN where a run did not get to."""
+    out = np.full((total, *values.shape[1:]), np.nan, dtype=values.dtype)
+    out[: values.shape[0]] = values
+    return out
+
+
+def link_coordinates(system: System) -> dict[str, Any]:
+    """Labels of the dimensions that the variables of links have."""
+    mechanism = system.mechanism
+    return {
+        "axis": ["x", "y"],
+        "body": [body.name for body in mechanism.bodies],
+        "motor": [motor.name for motor in mechanism.motors],
+        "joint": [joint.name for joint in mechanism.joints],
+        "row": list(system.rows),
+        "point": [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points],
+        **drawing_coordinates(mechanism),
+    }
+
+
+def label(data: xr.Dataset, mechanism: Mechanism) -> None:
+    """Meaning, unit and conventions of every variable into its attributes; "_desired" is what is wanted of one."""
+    for name in map(str, data.variables):
+        plain = name.removesuffix("_desired")
+        if plain in UNITS:
+            meaning, unit = UNITS[plain]
+            data[name].attrs = {"long_name": meaning if name == plain else f"desired {meaning}", "units": unit}
+        if plain in _COMMENTS:
+            data[name].attrs["comment"] = _COMMENTS[plain]
+    units = sorted(set(mechanism.motor_units()), reverse=True) or ["N m"]
+    speeds = {"N m": "rad/s", "N": "m/s"}
+    data["motor_speed"].attrs["units"] = ", ".join(speeds[unit] for unit in units)
+    for name in (each for each in _EFFORTS if each in data):
+        data[name].attrs["units"] = ", ".join(units)
+        if units == ["N"]:
+            data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")
+
+
+def provenance(mechanism: Mechanism, method: str, options: IntegrationOptions, parameters: dict | None) -> dict:
+    """What results came from: mechanism, method, options of our own methods, the model as read, versions."""
+    # Other models and engines integrate in ways of their own.
+    ours = options.told() if method == options.description.title else {}
+    effector = mechanism.end_effector
+    return {
+        "mechanism": mechanism.name,
+        **({} if effector is None else {"end_effector_point": str(effector.point)}),
+        "tolerance": options.tolerance,
+        "baumgarte_alpha": options.alpha,
+        "baumgarte_beta": options.beta,
+        "method": method,
+        **ours,
+        "parameters": json.dumps(parameters or {}, sort_keys=True),
+        "paraflex_version": version("paraflex"),
+        "numba_version": version("numba"),
+        "numpy_version": version("numpy"),
+        "schema": SCHEMA,
+    }

@@ -1,0 +1,227 @@
+"""What a run of our own says of bodies, points, joints and motors, at its samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle
+from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
+from paraflex.integrators import Solution
+from paraflex.mechanism import FIRST_END, LAST_END, PointRef
+from paraflex.results.drawing import Drawing, drawing, system_drawing
+from paraflex.results.joint_loads import joint_loads
+from paraflex.results.outlines import outline_motion, outlines, segment_motion
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Links:
+    """Bodies, points, joints and motors at the k sample times that a run reached; NaN for what a model does not tell.
+
+    Bodies, joints and points are those of the mechanism in its order, whatever the model cut them into. Points are all
+    the named points of all bodies, body after body.
+
+    Attributes
+    ----------
+    angle, rate, acceleration : (k, bodies) arrays
+        Of the body frames; in a model without them the tangent at a beam's first end [rad, rad/s, rad/s^2].
+    chord, chord_rate : (k, bodies) arrays
+        Of the line from a beam's first end to its last, which no choice of frame touches; of a modal body's first
+        point to its last, less its angle undeformed; a rigid body's angle [rad, rad/s].
+    tip : (k, bodies, 3) array
+        Axial, transverse displacement and slope of a beam's last end (a modal body's last point) from the tangent at
+        its first end [m, m, rad].
+    points : (k, points, 2) array
+        Positions [m].
+    joint_force : (k, joints, 2) array
+        All that a joint's first body does to its second: at the joint's point of that, in the ground frame [N].
+    joint_moment : (k, joints) array
+        And about that point, positive anticlockwise [N m].
+    multiplier : (k, rows) array
+        Of the rows of the mechanism's system; NaN of those that the model does not have. Minus it acts on the second
+        body.
+    motor_speed : (k, motors) array
+        Rate of each motor's joint [rad/s], or speed along its axis [m/s].
+    kinetic_energy, strain_energy, work : (k,) arrays
+        [J]
+    drawing : Drawing
+        Deformed shapes of all bodies.
+    """
+
+    angle: Array
+    rate: Array
+    acceleration: Array
+    chord: Array
+    chord_rate: Array
+    tip: Array
+    points: Array
+    joint_force: Array
+    joint_moment: Array
+    multiplier: Array
+    motor_speed: Array
+    kinetic_energy: Array
+    strain_energy: Array
+    work: Array
+    drawing: Drawing
+
+
+def system_links(
+    system: System,
+    solution: Solution,
+    torques: Array,
+    samples: int,
+    whole: System | None = None,
+    carriers: Mapping[str, tuple[str, float]] | None = None,
+) -> Links:
+    """What a run says of the links of a mechanism, those that were cut into segments as they were before.
+
+    Parameters
+    ----------
+    system : System
+    solution : Solution
+    torques : (samples or more, motors) array
+        Torque or force of every motor.
+    samples : int
+        How many of the solution's to take.
+    whole : System, optional
+        Of the mechanism before it was cut; by default it was not.
+    carriers : mapping, optional
+        Of every segment the link it is of and where along that it begins [m].
+    """
+    q, v, a = (x[:samples] for x in (solution.q, solution.v, solution.a))
+    cut = _Cut(system, system if whole is None else whole, carriers or {})
+    mechanism = cut.whole.mechanism
+    first = [system.body(names[0]).angle for names in cut.parts.values()]
+    chords = [_chord(system, names, q, v) for names in cut.parts.values()]
+    named = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
+    points = [point_motion(system, cut.there(ref), q, v, a).position for ref in named]
+    speeds = [joint_coordinate(system, motor.joint, q, v).rate for motor in mechanism.motors]
+    multipliers = solution.multipliers[:samples]
+    loads = joint_loads(system, [joint.name for joint in mechanism.joints], q, multipliers, torques[:samples])
+    return Links(
+        angle=q[:, first],
+        rate=v[:, first],
+        acceleration=a[:, first],
+        chord=np.stack([angle for angle, _ in chords], axis=1),
+        chord_rate=np.stack([rate for _, rate in chords], axis=1),
+        tip=np.stack([_tip(system, names, q) for names in cut.parts.values()], axis=1),
+        points=np.stack(points, axis=1) if points else np.zeros((samples, 0, 2)),
+        joint_force=loads.force,
+        joint_moment=loads.moment,
+        multiplier=_multipliers(system, cut.whole, multipliers),
+        motor_speed=np.stack(speeds, axis=1) if speeds else np.zeros((samples, 0)),
+        kinetic_energy=solution.kinetic_energy[:samples],
+        strain_energy=solution.strain_energy[:samples],
+        work=solution.work[:samples],
+        drawing=_drawing(cut, q),
+    )
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A system whose links may be segments of those of another."""
+
+    system: System
+    whole: System
+    carriers: Mapping[str, tuple[str, float]]
+
+    @cached_property
+    def parts(self) -> dict[str, list[str]]:
+        """Of each body before, the names of what it was cut into, first end first: itself if it was not."""
+        parts: dict[str, list[str]] = {body.name: [] for body in self.whole.bodies}
+        for body in self.system.bodies:
+            parts[self.carriers.get(body.name, (body.name, 0.0))[0]].append(body.name)
+        return parts
+
+    def there(self, ref: PointRef) -> PointRef:
+        """A point of a body, on the part that has it."""
+        owner = next(name for name in self.parts[ref.body] if ref.point in self.system.mechanism.body(name).points)
+        return PointRef(owner, ref.point)
+
+
+def _multipliers(system: System, whole: System, multipliers: Array) -> Array:
+    """Multipliers by the rows of the whole mechanism; NaN of those that it does not share with what it was cut into."""
+    if system is whole:
+        return multipliers
+    out = np.full((len(multipliers), whole.m), np.nan)
+    for i, row in enumerate(whole.rows):
+        if row in system.rows:
+            out[:, i] = multipliers[:, system.rows.index(row)]
+    return out
+
+
+def _drawing(cut: _Cut, q: Array) -> Drawing:
+    """Bodies as their own shape functions have them; cut ones where their segments lie."""
+    system, mechanism = cut.system, cut.whole.mechanism
+    if system is cut.whole:
+        return system_drawing(system, q)
+    shapes = {}
+    for one in outlines(mechanism):
+        pieces = cut.parts[one.body]
+        if pieces == [one.body]:
+            shapes[one.body] = outline_motion(system, one, q)
+        else:
+            shapes[one.body] = segment_motion(system, pieces, [cut.carriers[piece][1] for piece in pieces], one, q)
+
+    def angle(ref: PointRef) -> Array:
+        return material_angle(system, cut.there(ref), q)
+
+    def frame(body: str) -> tuple[Array, Array]:
+        first = system.body(cut.parts[body][0])
+        return q[:, first.position], q[:, first.angle]
+
+    return drawing(mechanism, shapes, angle, frame)
+
+
+def _ends(system: System, names: list[str], q: Array, v: Array) -> list[PointMotion]:
+    """Motion of the first and last end of a beam, or of what it was cut into."""
+    return [marker_motion(system, marker, q, v, np.zeros_like(q)) for marker in _end_markers(system, names)]
+
+
+def _end_markers(system: System, names: list[str]) -> tuple[Marker, ...]:
+    """First and last end of a body, or of what it was cut into; none of what has no ends."""
+    if len(names) == 1:
+        return end_markers(system.index[names[0]], system.body(names[0]))
+    return system.marker(PointRef(names[0], FIRST_END)), system.marker(PointRef(names[-1], LAST_END))
+
+
+def _chord(system: System, names: list[str], q: Array, v: Array) -> tuple[Array, Array]:
+    """Angle and rate of the line from a beam's first end to its last; a rigid body's own.
+
+    Less the line's angle in the undeformed body, which is zero of a beam.
+    """
+    angle, ends = system.body(names[0]).angle, _end_markers(system, names)
+    if not ends:
+        return q[:, angle], v[:, angle]
+    first, last = _ends(system, names, q, v)
+    x, y = ends[1].x0 - ends[0].x0
+    offset = np.arctan2(y, x)
+    line, rate = last.position - first.position, last.velocity - first.velocity
+    chord, chord_rate = line_angle(line, rate, q[:, angle] + offset)
+    return chord - offset, chord_rate
+
+
+def line_angle(line: Array, rate: Array, near: Array) -> tuple[Array, Array]:
+    """Angle (k,) of a line (k, 2) within a half turn of another angle (k,), and its rate."""
+    x, y = line[:, 0], line[:, 1]
+    turned = np.arctan2(y, x) - near
+    angle = near + (turned + np.pi) % (2.0 * np.pi) - np.pi
+    return angle, (x * rate[:, 1] - y * rate[:, 0]) / (x**2 + y**2)
+
+
+def _tip(system: System, names: list[str], q: Array) -> Array:
+    """Displacement and slope of a beam's last end in its frame: of segments, in that of the first one."""
+    if len(names) == 1:
+        return tip_deflection(system, names[0], q)
+    first, last = _ends(system, names, q, np.zeros_like(q))
+    phi, end = q[:, system.body(names[0]).angle], q[:, system.body(names[-1]).angle]
+    c, s = np.cos(phi), np.sin(phi)
+    x, y = (last.position - first.position).T
+    length = sum(system.marker(PointRef(name, LAST_END)).x0[0] for name in names)
+    return np.column_stack([c * x + s * y - length, c * y - s * x, end - phi])

@@ -1,0 +1,105 @@
+"""Files and folders that are written whole or not at all.
+
+What is being written has another name until it is complete. An error or Ctrl-C on the way leaves what was there before,
+and nothing half written beside it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from paraflex.errors import OutputError
+
+_REMEDY = "choose another folder"
+# Of what is gone on with where it was left.
+GO_ON = "what is written stays; free some space and run the same command again: it goes on from there"
+
+
+@contextmanager
+def whole_file(path: Path, *, remedy: str = _REMEDY, field: str = "", parents: bool = True) -> Iterator[Path]:
+    """The name to write a file under, which takes the place of `path` when it is complete and on the disk.
+
+    Parameters
+    ----------
+    path : Path
+    remedy, field : str
+        Of the error; its field is the file by default.
+    parents : bool
+        Whether folders are made that the file is to be in.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    unfinished = path.with_name(path.name + ".part")
+    try:
+        if parents:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        yield unfinished
+        with unfinished.open("rb+") as opened:
+            os.fsync(opened.fileno())
+        unfinished.replace(path)
+    except OSError as error:
+        raise unwritable(error, field or str(path), remedy) from error
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_folder(path: Path, *, replaced: str, remedy: str = _REMEDY) -> Iterator[Path]:
+    """A folder to write files to, which move to `path` when all are complete.
+
+    Parameters
+    ----------
+    path : Path
+    replaced : str
+        Pattern of the files of `path` that they replace; others stay.
+    remedy : str
+        Of the error.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    unfinished = path.with_name(path.name + ".part")
+    try:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        unfinished.mkdir(parents=True)
+        yield unfinished
+        if not path.is_dir():
+            unfinished.replace(path)
+            return
+        for old in path.glob(replaced):
+            old.unlink()
+        for new in sorted(unfinished.iterdir()):
+            new.replace(path / new.name)
+    except OSError as error:
+        raise unwritable(error, str(path), remedy) from error
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def write_text(path: Path, text: str, **options: Any) -> None:
+    """Write a file of text; see `whole_file` for the options and errors."""
+    with whole_file(path, **options) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, figures: Any, **options: Any) -> None:
+    """Write plain values as JSON, others as their text; see `whole_file` for the options and errors."""
+    write_text(path, json.dumps(figures, indent=2, default=str) + "\n", **options)
+
+
+def unwritable(error: OSError, field: str, remedy: str, value: str | None = None) -> OutputError:
+    """The error of a place that cannot be written, with the system's reason."""
+    reason = (error.strerror or str(error)).lower()
+    return OutputError(f"cannot be written ({reason})", field=field, value=value, remedy=remedy)

@@ -1,0 +1,254 @@
+"""Journals and workers: killed, damaged, of an earlier release or held by another; any function in any engine."""
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+
+import pytest
+
+from journals import rows_in
+from paraflex.campaign import held, open_engine, outcomes, read_table, tables_of
+from paraflex.campaign.journal import JOURNAL, read_journal, write_journal
+from paraflex.errors import InputError, OutputError, ResultWarning
+from paraflex.studies import load_sweep, sweep
+from paraflex.studies.sweeps import run_task
+from paraflex.studies.sweeps.report import study_page
+
+STUDY = """
+mechanism = "raparm_i"
+paths = ["line"]
+modes = ["++++", "+-+-"]
+duration = 0.05
+samples = 26
+
+[sampling]
+kind = "sobol"
+number = 32
+seed = 5
+
+[integration]
+method = "esdirk5"
+tolerance = 1e-3
+
+[vary.thickness]
+fields = ["section.bar.thickness"]
+low = 0.005
+high = 0.007
+"""
+SLOWLY = """
+import sys, time
+
+from paraflex.studies import load_sweep, sweep
+from paraflex.studies.sweeps import run_task
+
+
+def slow(setting, task, watch=None):
+    time.sleep(0.3)
+    return run_task(setting, task, watch)
+
+
+sweep(load_sweep(sys.argv[1]), sys.argv[2], workers=1, run=slow)
+"""
+HOLDS = """
+import sys, time
+from pathlib import Path
+
+from paraflex.campaign import held
+
+with held(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+# So small a cache that rows of a transaction are in the file before it is committed.
+HALF_A_COMMIT = """
+import sys, time
+from pathlib import Path
+
+from paraflex.campaign.journal import write_journal
+
+with write_journal(Path(sys.argv[1])) as journal:
+    journal.add([{"run": k, "id": "a"} for k in range(10)])
+    journal.commit()
+    journal._connection.execute("PRAGMA cache_size = 10")
+    more = [(k, "b", "x" * 1000, "") for k in range(10_000)]
+    journal._connection.executemany("INSERT INTO runs VALUES (?, ?, ?, ?)", more)
+    print("half", flush=True)
+    time.sleep(60)
+"""
+kills = pytest.mark.skipif(os.name != "posix", reason="SIGKILL")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    file = tmp_path_factory.mktemp("study") / "study.toml"
+    file.write_text(STUDY, encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def whole(file):
+    """The study done in one go."""
+    return sweep(file, file.parent / "whole", workers=2)
+
+
+@pytest.fixture
+def counted():
+    def run(setting, task, watch=None):
+        run.made.append(task.number)
+        return run_task(setting, task, watch)
+
+    run.made = []
+    return run
+
+
+def start(script, *arguments, until=None):
+    """A process of its own, when it has said something."""
+    process = subprocess.Popen([sys.executable, "-c", script, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
+    if until:
+        assert process.stdout is not None
+        assert process.stdout.readline().strip() == until
+    return process
+
+
+def kill(process):
+    with process:
+        os.kill(process.pid, signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+
+
+@kills
+def test_a_killed_sweep_goes_on_to_the_same_table(file, whole, counted, tmp_path):
+    out = tmp_path / "out"
+    process = start(SLOWLY, file, out)
+    while not rows_in(out):
+        assert process.poll() is None
+        time.sleep(0.05)
+    kill(process)
+    kept = rows_in(out)
+    assert 0 < kept < 64
+    # No table was made, but the rows are there for reports and figures.
+    assert tables_of(out) == [out / JOURNAL]
+    assert read_table(out / JOURNAL).schema.equals(read_table(whole.table).schema, check_metadata=True)
+    assert study_page(out).title
+    result = sweep(file, out, run=counted)
+    assert len(counted.made) == 32 - kept // 2
+    assert result.fresh == 64 - kept
+    assert result.table.read_bytes() == whole.table.read_bytes()
+
+
+@kills
+def test_a_process_killed_in_a_commit_leaves_what_was_committed(tmp_path):
+    kill(start(HALF_A_COMMIT, tmp_path, until="half"))
+    assert (tmp_path / f"{JOURNAL}-journal").stat().st_size > 0
+    assert (tmp_path / JOURNAL).stat().st_size > 1_000_000
+    assert rows_in(tmp_path) == 10
+    with write_journal(tmp_path) as journal:
+        assert [row["run"] for row in journal.rows()] == list(range(10))
+
+
+@kills
+def test_a_killed_process_holds_nothing(tmp_path):
+    process = start(HOLDS, tmp_path, until="held")
+    with pytest.raises(InputError, match=r"another process writes to it .*wait for it, or stop it"), held(tmp_path):
+        pass
+    kill(process)
+    with held(tmp_path) as locks:
+        assert locks
+    assert [each.name for each in tmp_path.iterdir()] == [".lock"]
+
+
+def test_a_file_system_without_locks_is_written_without(file, whole, tmp_path, monkeypatch):
+    connect, opened = sqlite3.connect, []
+
+    class Lockless(sqlite3.Connection):
+        def executescript(self, script, /):
+            if "EXCLUSIVE" in script:
+                error = sqlite3.OperationalError("disk I/O error")
+                error.sqlite_errorcode = sqlite3.SQLITE_IOERR_LOCK
+                raise error
+            return super().executescript(script)
+
+    def lockless(name, **options):
+        opened.append(str(name))
+        return connect(name, factory=Lockless, **options)
+
+    monkeypatch.setattr(sqlite3, "connect", lockless)
+    assert sweep(file, tmp_path / "out").table.read_bytes() == whole.table.read_bytes()
+    assert opened[1].endswith("?mode=rwc&nolock=1")
+
+
+def test_a_damaged_row_is_noticed_and_made_again(file, whole, counted, tmp_path):
+    out = tmp_path / "out"
+    sweep(file, out)
+    content = bytearray((out / JOURNAL).read_bytes())
+    content[content.index(b'{"run": 5,') + 100] = 0xFF
+    (out / JOURNAL).write_bytes(content)
+    with pytest.raises(OutputError, match=r"journal.sqlite: cannot be read \(the row of run 5 is damaged\)"):
+        rows_in(out)
+    with pytest.warns(ResultWarning, match="damaged, and these runs are made again: 5"):
+        result = sweep(file, out, run=counted)
+    assert counted.made == [2]
+    assert result.table.read_bytes() == whole.table.read_bytes()
+
+
+def test_a_folder_of_the_last_release_is_gone_on_with(file, whole, counted, tmp_path):
+    """It has parts and no journal while it is unfinished, and a table alone when it is finished."""
+    import pyarrow.parquet as pq
+
+    rows = pq.read_table(whole.table)
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    (tmp_path / "study.json").write_bytes((whole.folder / "study.json").read_bytes())
+    pq.write_table(rows.slice(8, 4), parts / "part-000001.parquet")
+    pq.write_table(rows.slice(0, 6), parts / "part-000002.parquet")
+    assert sum(read_table(each).num_rows for each in tables_of(tmp_path)) == 10
+    assert sweep(file, tmp_path, run=counted).table.read_bytes() == whole.table.read_bytes()
+    assert len(counted.made) == 27
+    assert not parts.exists()
+    (tmp_path / JOURNAL).unlink()
+    assert tables_of(tmp_path) == [tmp_path / "results.parquet"]
+    assert sweep(file, tmp_path, run=pytest.fail).table.read_bytes() == whole.table.read_bytes()
+
+
+def test_ctrl_c_in_a_commit_loses_no_row(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    def write():
+        with write_journal(tmp_path) as journal, monkeypatch.context() as patch:
+            patch.setattr("paraflex.campaign.journal._digest", interrupted)
+            journal.add([{"run": 0, "id": "a"}])
+            journal.commit()
+
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert rows_in(tmp_path) == 1
+
+
+def test_what_a_study_is_stands_in_the_journal(file, whole, tmp_path):
+    """Without `study.json` another study is still refused, and the file is made again."""
+    said = (whole.folder / "study.json").read_text()
+    (whole.folder / "study.json").unlink()
+    other = tmp_path / "other.toml"
+    other.write_text(STUDY.replace("seed = 5", "seed = 6"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"results of another study.*name a new folder"):
+        sweep(load_sweep(other), whole.folder)
+    sweep(file, whole.folder, run=pytest.fail)
+    assert (whole.folder / "study.json").read_text() == said
+    with read_journal(whole.folder / JOURNAL) as journal:
+        assert json.loads(journal.noted("study") or b"") == json.loads(said)
+
+
+def squared(number, watch=None):
+    return number**2
+
+
+@pytest.mark.parametrize("name", ["threads", "processes"])
+def test_workers_take_any_function(name):
+    with open_engine(name, 2) as engine:
+        assert open_engine(engine) is engine
+        assert dict(outcomes(engine, squared, range(20))) == {n: n**2 for n in range(20)}
