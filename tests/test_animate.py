@@ -23,7 +23,8 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
 from paraflex.plots import mechanism_drawing
 from paraflex.plots.film import FilmOptions, find_encoder, plan_film, write_film
-from paraflex.plots.scene import block, figure_of, ground_of, is_guide, scale_bar, scene, select, zigzag
+from paraflex.plots.marks import block, ground_of, is_guide, zigzag
+from paraflex.plots.scene import figure_of, scale_bar, scene, select
 from paraflex.results import motion_dataset
 
 OLD = Path(__file__).parent / "data" / "schema1.nc"

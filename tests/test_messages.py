@@ -324,7 +324,7 @@ def test_a_sweep_needs_modes_and_its_own_folder(tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / "study.json").write_text("[]")
-    assert "not the study of a sweep; name a new folder" in message(lambda: sweep(file, folder))
+    assert "not the study of a campaign; name a new folder" in message(lambda: sweep(file, folder))
 
 
 def test_a_search_needs_a_start(tmp_path):

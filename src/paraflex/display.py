@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import Any
 
 # Where views are registered; loaded one after the other until that of a class is there.
-_VIEWS = ("paraflex.plots.mechanism_html", "paraflex.results.html", "paraflex.studies.html")
+_VIEWS = ("paraflex.results.html", "paraflex.plots.mechanism_html", "paraflex.studies.html")
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
 
 

@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments
-from paraflex.dynamics import BodyCoordinates, State, System, joint_coordinate, pack_signals
+from paraflex.dynamics import BodyCoordinates, System, joint_coordinate, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
-from paraflex.integrators.beam_ends import BeamEnds, beyond_ends, end_of_motion
+from paraflex.integrators.beam_ends import beyond_ends, end_of_motion
 from paraflex.integrators.linear_structure import Block, Response, march
 from paraflex.integrators.newmark import NewmarkNumbers
 from paraflex.kernel.bodies import motion_forces, system_energy
@@ -101,7 +101,6 @@ def simulate_ked(
     times = np.linspace(samples[0], samples[-1], substeps * (samples.size - 1) + 1)
     numbers = NewmarkNumbers.by_spectral_radius(spectral_radius)
     nominal, rigid = _nominal(task, times), task.motion
-    BeamEnds(rigid.system, State(float(rigid.t[0]), rigid.q[0], rigid.v[0]))
     end = end_of_motion(rigid.system, rigid.t, rigid.q, rigid.v)
     stop = math.inf if end is None else end.time
     blocks = [Block(body.all, _mass(body), _stiffness(body)) for body in task.system.bodies]

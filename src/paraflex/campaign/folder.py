@@ -71,7 +71,7 @@ def read_study(file: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         found = None
     if not isinstance(found, dict) or "content" not in found:
-        raise InputError("not the study of a sweep", field=str(file), remedy="name a new folder")
+        raise InputError("not the study of a campaign", field=str(file), remedy="name a new folder")
     return found
 
 

@@ -18,10 +18,10 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.results import tracking_dataset
 from paraflex.results.metrics import METRICS
+from paraflex.simulate import TrackingRun, TrackingTask, simulate
 
 if TYPE_CHECKING:
     import pyarrow as pa
-from paraflex.simulate import TrackingRun, TrackingTask, simulate
 
 COMPLETE, FAILED, INVALID = "complete", "failed", "invalid"
 STATUSES = (COMPLETE, FAILED, INVALID)
@@ -129,9 +129,8 @@ def table_schema(setting: Setting, motors: Sequence[str]) -> pa.Schema:
     fields.append(pa.field("time_reached", real, metadata={"unit": "s"}))
     for name in setting.metrics:
         metric = METRICS[name]
-        told = {"unit": metric.unit, "meaning": metric.meaning}
-        called = [f"{name}.{motor}" for motor in motors] if metric.per_motor else [name]
-        fields += [pa.field(each, whole if metric.whole else real, metadata=told) for each in called]
+        about = {"unit": metric.unit, "meaning": metric.meaning}
+        fields += [pa.field(each, whole if metric.whole else real, metadata=about) for each in metric.columns(motors)]
     return pa.schema(fields)
 
 

@@ -31,9 +31,9 @@ from paraflex.designs.run import Outcome, Task, lost, run_task, table_schema
 from paraflex.designs.study import SweepStudy, load_sweep
 from paraflex.display import Shown
 from paraflex.errors import InputError
-from paraflex.results import save_results
 from paraflex.results.metrics import VALIDITY
-from paraflex.writing import GO_ON, whole_file, write_json
+from paraflex.results.storage import write_results
+from paraflex.writing import GO_ON, write_json
 
 SUMMARY = "summary.json"
 
@@ -216,8 +216,8 @@ class _Session:
         table = pq.read_table(write_table(folder, self.journal, finished=self.finished), columns=["status", VALIDITY])
         counts = {each["values"]: each["counts"] for each in table["status"].value_counts().to_pylist()}
         beyond = int(np.sum(table[VALIDITY].to_numpy() > 1.0))
-        told = {"name": self.study.name, "runs": runs, "done": len(table), "status": counts, "beyond_validity": beyond}
-        write_json(folder / SUMMARY, told, remedy=GO_ON)
+        summary = {"name": self.study.name, "runs": runs, "done": len(table), "status": counts}
+        write_json(folder / SUMMARY, summary | {"beyond_validity": beyond}, remedy=GO_ON)
         seconds = time.perf_counter() - self.began
         return SweepResult(folder, runs, counts, self.fresh, seconds, interrupted, beyond)
 
@@ -234,8 +234,7 @@ class _Session:
     def _take(self, outcome: Outcome) -> None:
         # A trajectory stands before its row does: a row without one would never be made again.
         for name, data in outcome.trajectories.items():
-            with whole_file(self.folder / TRAJECTORIES / f"{name}.nc", remedy=GO_ON) as unfinished:
-                save_results(data, unfinished)
+            write_results(data, self.folder / TRAJECTORIES / f"{name}.nc", remedy=GO_ON)
         self.journal.add(outcome.rows)
         self.done[outcome.task.number] = True
         self.fresh += len(outcome.rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +49,7 @@ class BeamEnds:
             if gauge.inside(start.q[None])[0] > 0.0:
                 within.append(gauge)
             elif gauge.ends_run:
-                raise _off_at_start(gauge, start)
+                raise _off_at_start(gauge, start.time, start.q)
             else:
                 self._left.append(Leaving(gauge, start.time))
         self.gauges = tuple(within)
@@ -80,25 +80,38 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
     UnreachablePathError
         A point leaves a beam whose joint asks for an error.
     """
-    for one, k in _leavings(system, t, q, v):
+    leavings = list(_leavings(system, t, q, v))
+    for one, k in leavings:
         end = one.gauge.event
         assert isinstance(end, BeamEnd)
         if end.at_end is AtEnd.ERROR:
             moment = Moment(one.time, k)
             raise UnreachablePathError(_planned(end, one.gauge.value(q)), moment, remedy=STAY_ON_BEAM)
-    return beyond_ends(system, t, q, v)
+    return _going_on(leavings, q)
 
 
 def beyond_ends(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
     """Findings of points that go on where their beams end, in a motion at samples t, q, v."""
-    leavings = _leavings(system, t, q, v)
-    return tuple(_finding(one, one.gauge.value(q)) for one, _ in leavings if not one.gauge.ends_run)
+    return _going_on(_leavings(system, t, q, v), q)
 
 
 def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Leaving | None:
-    """The point that ends a motion at samples t, q, v, since it comes to the end of its beam first; None for none."""
-    ending = [one for one, _ in _leavings(system, t, q, v) if one.gauge.ends_run]
-    return min(ending, key=lambda one: one.time, default=None)
+    """The point that ends a motion at samples t, q, v, since it comes to the end of its beam first; None for none.
+
+    Raises
+    ------
+    InputError
+        It is off its beam at the start.
+    """
+    ending = [(one, k) for one, k in _leavings(system, t, q, v) if one.gauge.ends_run]
+    for one, k in ending:
+        if k == 0:
+            raise _off_at_start(one.gauge, one.time, q[0])
+    return min((one for one, _ in ending), key=lambda one: one.time, default=None)
+
+
+def _going_on(leavings: Iterable[tuple[Leaving, int]], q: Array) -> tuple[Finding, ...]:
+    return tuple(_finding(one, one.gauge.value(q)) for one, _ in leavings if not one.gauge.ends_run)
 
 
 def _leavings(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Leaving, int]]:
@@ -128,12 +141,12 @@ def _planned(end: BeamEnd, places: Array) -> str:
     )
 
 
-def _off_at_start(gauge: Gauge, start: State) -> InputError:
+def _off_at_start(gauge: Gauge, time: float, q: Array) -> InputError:
     end = gauge.event
     assert isinstance(end, BeamEnd)
-    place = float(gauge.value(start.q[None])[0])
+    place = float(gauge.value(q[None])[0])
     return InputError(
-        f"its point is off the beam at the start, t = {start.time:.6g} s: {place:.6g} m from the first end of "
+        f"its point is off the beam at the start, t = {time:.6g} s: {place:.6g} m from the first end of "
         f"{end.beam}, which is {end.length:.6g} m long",
         field=f"joint.{end.joint}",
         remedy='start within the beam, lengthen it, or let the run go on with at_end = "warn"',

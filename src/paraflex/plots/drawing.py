@@ -18,20 +18,8 @@ from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import mode_label, three_digits
 from paraflex.plots.layout import page_width
-from paraflex.plots.scene import (
-    LOOKS,
-    Limits,
-    Scene,
-    by_look,
-    figure_of,
-    is_plate,
-    moving_marks,
-    run_times,
-    scale_bar,
-    scene,
-    select,
-    still_marks,
-)
+from paraflex.plots.marks import LOOKS, by_look, moving_marks, still_marks
+from paraflex.plots.scene import Limits, Scene, figure_of, is_plate, run_times, scale_bar, scene, select
 from paraflex.plots.themes import Theme, theme
 
 Array = NDArray[np.float64]

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import symbol
+from paraflex.plots.marks import still_marks
 from paraflex.plots.runs import samples
-from paraflex.plots.scene import DrawnJoint, Scene, limits_of, still_marks
+from paraflex.plots.scene import DrawnJoint, Scene, limits_of
 from paraflex.plots.style import BLACK
 from paraflex.plots.themes import theme
 from paraflex.results.outlines import figure_order

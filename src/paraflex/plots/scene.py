@@ -5,7 +5,6 @@ Matplotlib (`plots/drawing.py`), files of SVG (`plots/svg.py`) and the player of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -19,14 +18,13 @@ from paraflex.plots.runs import select_run
 
 Array = NDArray[np.float64]
 
-# Sizes of symbols as parts of the picture's larger side.
-PIN, TRIANGLE, BLOCK, RAIL = 0.008, 0.028, (0.034, 0.022), 0.02
+# Length and width of what slides, as parts of the picture's larger side.
+BLOCK = (0.034, 0.022)
 _MARGIN = 0.07
-_TEETH = 14
 # Shares of the width that a scale bar may take.
 _BAR = 0.28
-# A joint that moves by less than this part of the picture stays where it is, a point by less than this [m].
-_STILL, _HELD = 1e-3, 1e-6
+# A point that moves by less stays where it is [m].
+_HELD = 1e-6
 # Shares of all places in percent between which a run is that does not come apart.
 _MOST = (0.2, 99.8)
 
@@ -49,33 +47,6 @@ class Limits(NamedTuple):
         width, height = self.right - self.left, self.top - self.bottom
         wide, high = max(ratio * height - width, 0.0) / 2.0, max(width / ratio - height, 0.0) / 2.0
         return Limits(self.left - wide, self.right + wide, self.bottom - high, self.top + high)
-
-
-class Look(NamedTuple):
-    """How symbols are drawn: colours of a theme by what they are for, empty for none, and a width of lines."""
-
-    fill: str
-    stroke: str
-    width: float
-
-
-# Symbols from the back to the front; links are drawn before the first that moves.
-LOOKS = {
-    "ground": Look("", "earth", 1.2),
-    "hatching": Look("", "earth", 0.8),
-    "spring": Look("", "earth", 1.1),
-    "block": Look("ground", "ink", 1.2),
-    "weld": Look("ink", "ink", 0.8),
-    "pin": Look("ground", "ink", 1.3),
-}
-
-
-class Mark(NamedTuple):
-    """A symbol of one of the `LOOKS` at f times: a line (f, n, 2), with gaps where it is NaN, or a dot (f, 1, 2)."""
-
-    look: str
-    name: str
-    places: Array
 
 
 @dataclass(frozen=True)
@@ -351,117 +322,6 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
         springs={name: ends[chosen] for name, ends in shown.springs.items()},
         trail=None if shown.trail is None else shown.trail[chosen],
     )
-
-
-# --- Symbols ---------------------------------------------------------------------------------------------------------
-
-
-def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
-    """Symbols of the ground, at one time."""
-    found = [(joint.name, ground_of(joint, limits)) for joint in shown.joints if joint.grounded]
-    found += [("", support(place, limits)) for place in shown.anchors]
-    return [
-        Mark(look, name, _joined(pieces)[None])
-        for name, (lines, strokes) in found
-        for look, pieces in (("ground", lines), ("hatching", strokes))
-    ]
-
-
-def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
-    """Symbols of springs and joints."""
-    out = [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
-    out += [Mark("block", joint.name, block(joint, limits)) for joint in shown.joints if joint.slides]
-    out += [Mark("weld", joint.name, square(joint.place, limits)) for joint in shown.joints if joint.kind == "weld"]
-    # What slides and turns, turns on a pin; what is welded to a block does neither.
-    turning = [joint for joint in shown.joints if joint.kind in ("pin", "slot", "sliding")]
-    return out + [Mark("pin", joint.name, joint.place[:, None]) for joint in turning]
-
-
-def by_look(marks: Sequence[Mark]) -> dict[str, list[Mark]]:
-    """Marks of each look, from the back to the front."""
-    found = {look: [mark for mark in marks if mark.look == look] for look in LOOKS}
-    return {look: some for look, some in found.items() if some}
-
-
-def _joined(pieces: Sequence[Array] | Array) -> Array:
-    """Lines one after the other, gaps between them."""
-    gap = np.full((1, 2), np.nan)
-    return np.concatenate([part for piece in pieces for part in (piece, gap)])[:-1]
-
-
-def is_guide(joint: DrawnJoint, limits: Limits) -> bool:
-    """Whether what slides goes through a block that stays, instead of a block along a rail."""
-    return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL * limits.size)
-
-
-def triangle(place: Array, limits: Limits) -> Array:
-    """A support under a place, closed (4, 2)."""
-    d = TRIANGLE * limits.size
-    return place + d * np.array([[0.0, 0.0], [-0.6, -1.0], [0.6, -1.0], [0.0, 0.0]])
-
-
-def hatching(start: Array, end: Array, limits: Limits) -> Array:
-    """Strokes (n, 2, 2) of ground on the right of a line from start to end."""
-    d = 0.45 * RAIL * limits.size
-    length = float(np.linalg.norm(end - start))
-    along = (end - start) / length
-    across = np.array([along[1], -along[0]])
-    count = max(3, round(length / d))
-    feet = start + np.outer((np.arange(count) + 0.6) / count * length, along)
-    return np.stack([feet, feet + d * (across - 0.7 * along)], axis=1)
-
-
-def support(place: Array, limits: Limits) -> tuple[list[Array], Array]:
-    """Lines of a support under a place, and the hatching (n, 2, 2) of its ground."""
-    held, wide = triangle(place, limits), 0.35 * TRIANGLE * limits.size
-    base = np.array([held[1] - [wide, 0.0], held[2] + [wide, 0.0]])
-    return [held, base], hatching(base[0], base[1], limits)
-
-
-def ground_of(joint: DrawnJoint, limits: Limits) -> tuple[list[Array], Array]:
-    """Lines of a joint's ground, and its hatching (n, 2, 2): a rail where it slides, else a support."""
-    size = limits.size
-    if joint.slides and not is_guide(joint, limits):
-        along = np.array([np.cos(joint.direction[0]), np.sin(joint.direction[0])])
-        middle = joint.place[0]
-        reach = (joint.place - middle) @ along
-        beyond = 1.2 * BLOCK[0] * size
-        across = np.array([along[1], -along[0]])
-        across = across if across[1] < 0.0 or (across[1] == 0.0 and across[0] > 0.0) else -across
-        foot = middle + 0.5 * BLOCK[1] * size * across
-        ends = [foot + (reach.min() - beyond) * along, foot + (reach.max() + beyond) * along]
-        # Strokes on the side that the block is not on.
-        if np.dot(np.array([along[1], -along[0]]), across) < 0.0:
-            ends.reverse()
-        return [np.array(ends)], hatching(ends[0], ends[1], limits)
-    return support(joint.place[0], limits)
-
-
-def block(joint: DrawnJoint, limits: Limits) -> Array:
-    """Corners (f, 5, 2) of what slides, or of the guide it slides through."""
-    a, b = 0.5 * np.array(BLOCK) * limits.size
-    corners = np.array([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]])
-    c, s = np.cos(joint.direction)[:, None], np.sin(joint.direction)[:, None]
-    x, y = corners.T
-    return joint.place[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
-
-
-def square(place: Array, limits: Limits) -> Array:
-    """Corners (f, 5, 2) of a weld."""
-    d = 0.9 * PIN * limits.size
-    return place[:, None] + d * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
-
-
-def zigzag(ends: Array, limits: Limits) -> Array:
-    """A spring (f, n, 2) between two ends (f, 2, 2)."""
-    a, b = ends[:, 0], ends[:, 1]
-    d = b - a
-    length = np.linalg.norm(d, axis=1, keepdims=True)
-    across = np.stack([-d[:, 1], d[:, 0]], axis=1) / np.where(length > 0.0, length, 1.0)
-    along = np.concatenate([[0.0, 0.12], np.linspace(0.14, 0.86, _TEETH), [0.88, 1.0]])
-    swing = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], _TEETH // 2), [0.0, 0.0]])
-    swing = 0.4 * TRIANGLE * limits.size * swing
-    return a[:, None] + along[:, None] * d[:, None] + swing[:, None] * across[:, None]
 
 
 def figure_of(places: Array) -> Array:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.mechanism import Mechanism
-from paraflex.plots.scene import LOOKS, Limits, Mark, Scene, figure_of, is_plate, moving_marks, scene, still_marks
+from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
+from paraflex.plots.scene import Limits, Scene, figure_of, is_plate, scene
 from paraflex.plots.themes import PAGE, Theme
 from paraflex.results.drawing import assembled_data
 

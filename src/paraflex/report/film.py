@@ -12,18 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.plots.scene import (
-    LOOKS,
-    Limits,
-    Mark,
-    Scene,
-    common_limits,
-    figure_of,
-    is_plate,
-    moving_marks,
-    scene,
-    still_marks,
-)
+from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
+from paraflex.plots.scene import Limits, Scene, common_limits, figure_of, is_plate, scene
 from paraflex.report.packing import packed
 
 Array = NDArray[np.float64]

@@ -79,8 +79,8 @@ def metric_variables(
     for metric in map(METRICS.__getitem__, names):
         own = [*dims, "motor"] if metric.per_motor else dims
         values = np.array([metric.value(one) for one in traces]).reshape([runs.sizes[dim] for dim in own])
-        told = {"long_name": metric.label, "units": metric.unit, "comment": metric.meaning}
-        out[metric.name] = xr.DataArray(values, {dim: data[dim] for dim in own if dim in data.coords}, own, attrs=told)
+        about = {"long_name": metric.label, "units": metric.unit, "comment": metric.meaning}
+        out[metric.name] = xr.DataArray(values, {dim: data[dim] for dim in own if dim in data.coords}, own, attrs=about)
     return out
 
 

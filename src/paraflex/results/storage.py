@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -36,7 +37,12 @@ def save_results(data: xr.Dataset, path: str | Path) -> None:
     OutputError
         The folder cannot be written.
     """
-    with whole_file(Path(path), parents=False) as unfinished:
+    write_results(data, Path(path), parents=False)
+
+
+def write_results(data: xr.Dataset, path: Path, **options: Any) -> None:
+    """Write a dataset as netCDF; see `whole_file` for the options and errors."""
+    with whole_file(path, **options) as unfinished:
         data.to_netcdf(unfinished, engine="netcdf4", encoding=_encoding(data))
 
 
