@@ -76,8 +76,8 @@ def search(kind: str, file: str, folder: str | Path, **changes: Any) -> dict[str
     study = dataclasses.replace(study, search=dataclasses.replace(study.search, **changes))
     result = getattr(studies, kind)(study, folder)
     if not changes:
-        draw({"optimise": "optimisation", "identify": "identification"}[kind], result.figures())
-    return {name: value for name, value in result.figures().items() if name != "history"} | {"seconds": result.seconds}
+        draw({"optimise": "optimisation", "identify": "identification"}[kind], result.to_dict())
+    return {name: value for name, value in result.to_dict().items() if name != "history"} | {"seconds": result.seconds}
 
 
 # Pictures of the pages, by what they are of: the figure that the command writes, and its name there.
@@ -186,7 +186,7 @@ def indices() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         chosen = {"metrics": ["tracking_rms", "peak_torque_max"], "samples": 128, "seed": 1}
         result = sobol_indices(EXAMPLES / "optimisation.toml", folder, **chosen)
-        draw("indices", result.figures())
+        draw("indices", result.to_dict())
         rows = {each.metric: {row["parameter"]: dict(row) for row in each.rows()} for each in result.indices}
         return {"runs": result.sweep.total, "seconds": time.perf_counter() - began, **rows}
 

@@ -36,7 +36,7 @@ def main() -> None:
         for run in comparison.measurements
     ]  # fmt: skip
     print(table(["method", "tolerance [m]", "status", "error [m]", "time [s]"], rows))
-    values = comparison.figures()
+    values = comparison.to_dict()
     del values["machine"], values["versions"]
     write_json("method_times", {"limit": given.limit, **values}, given.folder)
 

@@ -21,7 +21,7 @@ from models import LINEAR_PINNED, PAPER, SECOND_ORDER, SECOND_ORDER_CANTILEVER, 
 import paraflex as pf
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.simulate import TrackingTask
-from paraflex.studies import Refinement, VerificationOptions, agreement, verify
+from paraflex.studies import Refinement, VerificationOptions, verify
 
 MODES = ("+-+-", "-+-+", "+--+", "+++-", "++-+", "++++")
 BEAMS = (PAPER, LINEAR_PINNED, SECOND_ORDER_CANTILEVER, SECOND_ORDER)
@@ -41,7 +41,7 @@ def verified(task: TrackingTask, mode: str, models: dict[str, str]) -> tuple[dic
         Names in `verify` to names in the tables.
     """
     found = verify(task, [mode], models=tuple(models), options=OPTIONS)
-    figures, rows = agreement(found)["modes"][mode], {}
+    figures, rows = found.to_dict()["modes"][mode], {}
     for name, title in models.items():
         base = found.runs[mode][name].records[Refinement.NONE]
         changes = {

@@ -18,7 +18,7 @@ from paraflex.mechanism import raparm_i
 from paraflex.report import Page, render
 from paraflex.report.packing import MISSING
 from paraflex.simulate import plan_tracking
-from paraflex.studies import VerificationOptions, agreement, run_study, verify
+from paraflex.studies import VerificationOptions, VerificationStudy, run_study
 
 MODES = ("++++", "+-+-", "-+-+")
 STOPPED = "-+-+"
@@ -56,8 +56,9 @@ def tracked() -> xr.Dataset:
 def verified() -> tuple[xr.Dataset, dict[str, Any]]:
     """Three models in one mode, and what they say of each other."""
     options = VerificationOptions(tolerance=1e-4, segments=3)
-    verification = verify(task(), ["++++"], models=("rigid", "linear", "segments"), options=options)
-    return verification.dataset(parameters={"run": {"path": "square"}}), agreement(verification)
+    models, provenance = ("rigid", "linear", "segments"), {"run": {"path": "square"}}
+    verification = VerificationStudy(task(), ["++++"], models, options, provenance).run()
+    return verification.data, verification.to_dict()
 
 
 def html_of(page: Page) -> str:

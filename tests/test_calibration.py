@@ -91,7 +91,7 @@ def test_where_noise_rules_no_deviation_is_stated(tmp_path):
     assert told["deviations"] == {"x": None, "y": None}
     assert told["reasons"] == dict(result.confidence.reasons)
     assert "not given: one standard error" in result._repr_html_()
-    assert targets_reached(result.figures()).axes
+    assert targets_reached(result.to_dict()).axes
 
 
 def test_a_step_against_noise_finds_what_a_short_one_does_not(tmp_path):

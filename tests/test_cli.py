@@ -1,30 +1,15 @@
 """The command line as a user meets it: exit codes, one-line errors, files written, interrupted and repeated runs."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
 
+from command_line import interrupted, paraflex
 from paraflex.files import library_file
 from paraflex.results import load_results
 
 FAST = ["--tol", "1e-3", "--duration", "0.1", "--samples", "51"]
-
-
-def paraflex(*arguments, cwd=None):
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-m", "paraflex", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        check=False,
-        timeout=300,
-    )
 
 
 @pytest.fixture(scope="module")
@@ -176,19 +161,9 @@ def test_too_many_steps_keep_what_there_is(tmp_path):
 
 
 def test_interrupt_keeps_what_there_is(tmp_path):
-    # A tolerance that takes minutes; SIGINT is Ctrl-C.
-    command = [sys.executable, "-m", "paraflex", "run", "--mode", "+-+-", "--tol", "1e-9", "--out", str(tmp_path)]
-    # On a busy machine the first may come before the run has begun.
-    for wait in (8.0, 30.0, 100.0):
-        process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        time.sleep(wait)
-        os.kill(process.pid, signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
-        assert process.returncode == 130, errors
-        assert "Traceback" not in errors
-        if errors:
-            break
-    assert "interrupted at t = " in errors
+    # A tolerance that takes minutes.
+    said = "interrupted at t = "
+    assert said in interrupted("run", "--mode", "+-+-", "--tol", "1e-9", "--out", str(tmp_path), said=said)
     data = load_results(tmp_path / "results.nc")
     assert data["status"].item() == "interrupted"
     assert data["end_effector"].notnull().any()

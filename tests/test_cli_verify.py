@@ -1,18 +1,16 @@
 """`paraflex verify` as a user meets it, and the fidelities of `paraflex run`."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
+from command_line import interrupted, paraflex
 from paraflex.files import load
 from paraflex.kinematics import length_fraction
 from paraflex.results import load_results
-from test_cli import FAST, paraflex
+from test_cli import FAST
 
 SHORT = ["--duration", "0.02", "--samples", "11", "--tol", "1e-5"]
 
@@ -85,14 +83,7 @@ def test_an_engine_that_diverges_is_reported_and_the_others_go_on(tmp_path):
 
 
 def test_interrupt_keeps_the_models_that_are_done(tmp_path):
-    command = [sys.executable, "-m", "paraflex", "verify", "--model", "rigid", "--model", "second-order",
-               "--tol", "1e-9", "--out", str(tmp_path)]  # fmt: skip
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    time.sleep(12.0)
-    os.kill(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130, errors
-    assert "Traceback" not in errors
+    interrupted("verify", "--model", "rigid", "--model", "second-order", "--tol", "1e-9", "--out", str(tmp_path))
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,6 @@
 
 import json
 import os
-import signal
-import subprocess
-import sys
 import time
 import warnings
 from dataclasses import replace
@@ -12,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from command_line import interrupted, paraflex
 from paraflex import plots
 from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import InputError, IntegrationError
@@ -28,7 +26,6 @@ from paraflex.studies import (
     motion_case,
     tracking_case,
 )
-from test_cli import paraflex
 from test_plots import stays_on_the_page
 
 LOOSE = ComparisonOptions(tolerances=(1e-3, 1e-4), repetitions=1)
@@ -69,7 +66,7 @@ def test_errors_fall_with_the_tolerance_and_the_reference_says_how_certain_it_is
     assert 0.0 < comparison.reference.uncertainty < tight.error
     assert comparison.reference.tolerance < 1e-4
     # All of it can be written down.
-    figures = json.loads(json.dumps(comparison.figures()))
+    figures = json.loads(json.dumps(comparison.to_dict()))
     assert figures["methods"]["tr-bdf2"]["runs"][1]["error"] == tight.error
     assert figures["versions"]["numpy"] == np.__version__
 
@@ -211,7 +208,7 @@ def test_a_run_that_is_slower_and_less_close_counts_for_nothing():
 def test_the_figure_has_a_line_a_method_in_the_units_it_names():
     found = comparison(esdirk5=[(1e-3, 0.1), (1e-5, 1.0)], radau=[(1e-4, 2.0), (1e-9, 3.0)])
     steps = replace(found.measurements[0], tolerance=None, step=1e-4, error=2e-3)
-    figure = plots.work_precision(replace(found, measurements=(*found.measurements, steps)).figures())
+    figure = plots.work_precision(replace(found, measurements=(*found.measurements, steps)).to_dict())
     for panel, values in zip(figure.axes, ([0.1, 1.0], [100, 1000]), strict=True):
         labels = [line.get_label() for line in panel.lines]
         assert labels == ["ESDIRK 5(4)", "ESDIRK 5(4), fixed steps", "Radau IIA"]
@@ -224,12 +221,12 @@ def test_the_figure_has_a_line_a_method_in_the_units_it_names():
     looks = {(line.get_color(), line.get_marker()) for line in figure.axes[0].lines}
     assert len(looks) == 2
     with pytest.raises(InputError, match="no run got to its end"):
-        plots.work_precision(replace(found, measurements=()).figures())
+        plots.work_precision(replace(found, measurements=()).to_dict())
 
 
 def test_nothing_overlaps_or_leaves_the_page():
     every = {name.replace("-", "_"): [(1e-2 / k, 1e-3 * k), (1e-9, 1e4 * k)] for k, name in enumerate(METHODS, 1)}
-    stays_on_the_page(plots.work_precision(comparison(**every).figures()))
+    stays_on_the_page(plots.work_precision(comparison(**every).to_dict()))
     stays_on_the_page(plots.numerical_damping())
 
 
@@ -282,11 +279,5 @@ def test_compare_methods_prints_and_saves(tmp_path):
 
 
 def test_ctrl_c_ends_the_command_with_130(tmp_path):
-    command = [sys.executable, "-m", "paraflex", "compare-methods", "--method", "tr-bdf2", "--tol", "1e-9",
-               "--limit", "500", "--out", str(tmp_path)]  # fmt: skip
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    time.sleep(12.0)
-    os.kill(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130, errors
-    assert "Traceback" not in errors
+    slow = ("--method", "tr-bdf2", "--tol", "1e-9", "--limit", "500")
+    interrupted("compare-methods", *slow, "--out", str(tmp_path))

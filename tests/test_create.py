@@ -5,8 +5,9 @@ import tomllib
 
 import pytest
 
+from command_line import paraflex
 from paraflex.files import library_file, library_names, load
-from test_cli import FAST, paraflex
+from test_cli import FAST
 
 
 def test_a_newcomers_five_bar(tmp_path):

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from command_line import paraflex
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.dynamics.points import tip_deflection
 from paraflex.files import library_file, library_names, load
@@ -21,7 +22,6 @@ from paraflex.mechanism import (
     Section,
     raparm_i,
 )
-from test_cli import paraflex
 
 PAPER = ("raparm_i", "raparm_ii")
 

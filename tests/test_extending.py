@@ -12,7 +12,7 @@ from pages import apply_diff, blocks_of, check_output
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 
 
-def test_a_mechanism_a_scheme_a_metric_and_a_joint_are_added_as_the_page_says(tmp_path):
+def test_a_mechanism_a_scheme_a_metric_a_family_of_studies_and_a_joint_are_added_as_the_page_says(tmp_path):
     # With the compiled kernels, which do not change.
     package = Path(shutil.copytree(Path(paraflex.__file__).parent, tmp_path / "paraflex"))
     printed, ran = "", 0
@@ -28,7 +28,7 @@ def test_a_mechanism_a_scheme_a_metric_and_a_joint_are_added_as_the_page_says(tm
             check_output(block.text, printed)
         else:
             printed, ran = run(block, tmp_path), ran + 1
-    assert ran == 4
+    assert ran == 6
 
 
 def run(block, folder):

@@ -234,7 +234,7 @@ def test_a_sweep_and_a_search(tmp_path: Path) -> None:
     sampled = STUDY.replace("[vary.x]", '[sampling]\nkind = "sobol"\nnumber = 4\n\n[vary.x]')
     done = sweep(load_sweep(write_study(tmp_path, sampled)), tmp_path / "out", run=run)
     assert row(read(done), "runs")[1] == "4 of 4"
-    assert row(read(SweepResult(tmp_path, 9, {"complete": 3}, interrupted=True)), "runs")[1] == "3 of 9"
+    assert row(read(SweepResult("grid", tmp_path, 9, {"complete": 3}, interrupted=True)), "runs")[1] == "3 of 9"
     text = STUDY + "\n[objective]\nminimise = { tracking_rms = 1.0 }\n[search]\nevaluations = 20\n"
     best = optimise(load_optimisation(write_study(tmp_path, text, "best.toml")), tmp_path / "best", run=run)
     shown = read(best)
@@ -245,7 +245,7 @@ def test_a_sweep_and_a_search(tmp_path: Path) -> None:
 def test_an_identification_and_indices(tmp_path: Path) -> None:
     target = Target(run=0, path="square", mode="++", column="tracking_rms", value=2.0, weight=1.0)  # pyright: ignore[reportCallIssue]
     found = IdentificationResult(
-        folder=tmp_path, table=tmp_path / "t", values={"x": 1.5}, start={"x": 1.0}, residual=0.05, start_residual=0.5,
+        name="rod", folder=tmp_path, values={"x": 1.5}, start={"x": 1.0}, residual=0.05, start_residual=0.5,
         targets=(Reached(target, 2.1, 1.0, 0.05),), confidence=None, bounds={}, evaluations=7, fresh=0, failed=0,
         reasons=(), derivatives="exact", stopped="converged", interrupted=False, seconds=1.0,
     )  # fmt: skip
@@ -254,7 +254,7 @@ def test_an_identification_and_indices(tmp_path: Path) -> None:
     assert row(shown, "tracking_rms") == ["tracking_rms", "square", "++", "2", "1", "2.1"]
     numbers = np.array([0.25]), np.array([0.01]), np.array([0.5]), np.array([0.02])
     index = SobolIndices("square", "++", "tracking_rms", ("x",), *numbers, 1.0, 0.1, 64, 0)
-    result = IndicesResult(SweepResult(tmp_path, 1, {"complete": 1}), (index,), tmp_path / "i")
+    result = IndicesResult(SweepResult("saltelli", tmp_path, 1, {"complete": 1}), (index,))
     assert row(read(indices_html(result)), "tracking_rms")[3:] == ["x", "0.25", "0.01", "0.5", "0.02"]
 
 

@@ -1,13 +1,13 @@
 """Sobol indices through the sweep: known ones of formulas, what is left out, bad input, the command."""
 
 import json
-import subprocess
 import sys
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from command_line import paraflex
 from made_up import STUDY, made_up, write_study
 from paraflex.errors import InputError
 from paraflex.plots import sobol_bars
@@ -75,8 +75,8 @@ def test_indices_of_ishigami(tmp_path, seed):
     assert told[3]["total"] is None
     # The same seed says the same, from the runs that are there.
     again = sobol_indices(file, tmp_path / "out", run=pytest.fail, **given)
-    assert again.figures() == result.figures()
-    figure = sobol_bars(result.figures())
+    assert again.to_dict() == result.to_dict()
+    figure = sobol_bars(result.to_dict())
     assert len(figure.axes) == 1
     lengths = [patch.get_width() for patch in figure.axes[0].patches]
     assert lengths == pytest.approx([*varying.first, *varying.total])
@@ -152,19 +152,15 @@ def test_a_figure_of_nothing_is_refused():
         sobol_bars({"indices": [{"first": None}]})
 
 
-def command(*arguments):
-    return [sys.executable, "-W", "error", "-m", "paraflex", *map(str, arguments)]
-
-
 def test_command_line(tmp_path):
     text, out = STUDY.split("[vary.y]")[0].replace("low = 0.002", "low = 0.005"), tmp_path / "out"
     file = write_study(tmp_path, text)
-    asked = command("indices", file, "--metric", "tracking_rms", "--samples", "8", "--output", out)
-    done = subprocess.run(asked, capture_output=True, text=True, check=False, timeout=100)
+    asked = ("indices", file, "--metric", "tracking_rms", "--samples", "8", "--output", out)
+    done = paraflex(*asked)
     assert done.returncode == 0, done.stderr
     assert "tracking_rms" in done.stdout
     assert (out / "figures" / "indices.png").exists()
-    again = subprocess.run([*asked, "--json"], capture_output=True, text=True, check=False, timeout=100)
+    again = paraflex(*asked, "--json")
     assert again.returncode == 0, again.stderr
     (row,) = json.loads(again.stdout)["indices"]
     # One parameter explains all there is.

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 import paraflex as pf
+from command_line import paraflex
 from journals import rows_in
 from made_up import STUDY, made_up, write_study
 from paraflex.campaign.journal import write_journal
@@ -149,7 +150,7 @@ def test_where_nothing_runs_the_slope_leads_back(tmp_path, evaluate_of):
 
     study = study_of(tmp_path, OBJECTIVE)
     evaluate = evaluate_of(study, tmp_path / "out", made_up(tracking_rms=slope))
-    problem = Problem(study, evaluate, slopes_of(study, evaluate))
+    problem = Problem(study, study.objective, evaluate, slopes_of(study, evaluate))
     problem.slope(problem.start)
     x, step = np.array([0.1, 0.7]), np.diag([1e-4, 1e-4])
     rise = [(problem.value(x + h) - problem.value(x - h)) / 2e-4 for h in step]
@@ -285,7 +286,7 @@ class Interrupt:
         self.number = number
 
     def __call__(self, progress):
-        if progress.evaluations >= self.number:
+        if progress.done >= self.number:
             raise KeyboardInterrupt
 
 
@@ -406,7 +407,7 @@ def test_real_runs(tmp_path):
     assert result.objective < 1.0
     one = run_best(tmp_path / "out" / "best.toml")
     assert one == pytest.approx(result.metrics["tracking_max"], rel=1e-12)
-    figure = convergence({"kind": "optimisation"} | result.figures())
+    figure = convergence(result.to_dict())
     assert figure.axes[0].get_ylabel() == "objective"
 
 
@@ -486,33 +487,19 @@ def test_a_figure_of_nothing_is_refused():
         convergence({"kind": "optimisation", "history": [[0, None, False]]})
 
 
-def command(*arguments):
-    return [sys.executable, "-W", "error", "-m", "paraflex", *map(str, arguments)]
-
-
 def test_command_line(tmp_path):
     text = STUDY + OBJECTIVE + "[search]\nevaluations = 4\n"
     file, out = write_study(tmp_path, text), tmp_path / "out"
-    first = subprocess.run(
-        command("optimise", file, "--output", out), capture_output=True, text=True, check=False, timeout=100
-    )
+    first = paraflex("optimise", file, "--output", out)
     assert first.returncode == 0, first.stderr
     assert "tracking_rms" in first.stdout
     assert "4 designs; evaluations = 4 are done" in first.stdout
-    again = subprocess.run(
-        command("optimize", file, "--output", out, "--json"), capture_output=True, text=True, check=False, timeout=100
-    )
+    again = paraflex("optimize", file, "--output", out, "--json")
     assert again.returncode == 0, again.stderr
     figures = json.loads(again.stdout)
     assert (figures["evaluations"], figures["fresh"]) == (4, 0)
     assert (out / "figures" / "convergence.svg").exists()
-    wrong = subprocess.run(
-        command("optimise", file, "--output", out, "--engine", "x"),
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=100,
-    )
+    wrong = paraflex("optimise", file, "--output", out, "--engine", "x")
     assert wrong.returncode == 2
     assert "unknown engine (got 'x')" in wrong.stderr
 
@@ -522,9 +509,8 @@ def test_control_c_keeps_what_is_done(tmp_path):
     text = STUDY.replace("duration = 0.15", "duration = 0.7").replace("line", "square") + OBJECTIVE
     text = text.replace("1e-4", "1e-5") + '[search]\nevaluations = 5000\nmethod = "differential-evolution"\n'
     file, out = write_study(tmp_path, text), tmp_path / "out"
-    running = subprocess.Popen(
-        command("optimise", file, "--output", out), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    command = [sys.executable, "-W", "error", "-m", "paraflex", "optimise", str(file), "--output", str(out)]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 60.0
     while not rows_in(out) and time.monotonic() < until:
         time.sleep(0.1)

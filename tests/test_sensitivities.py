@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from command_line import paraflex
 from paraflex.cli.commands.studies import SensitivityRequest
 from paraflex.cli.sensitivity import sensitivity_command
 from paraflex.designs.derivatives.changes import Change
@@ -27,7 +28,6 @@ from paraflex.simulate import simulate
 from paraflex.studies import load_sensitivities, metric_gradients, sensitivities
 from paraflex.studies.sensitivities import SMOOTH, nominal_values
 from paraflex.studies.sweeps import METRICS, Task, run_task
-from test_cli import paraflex
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "sensitivity_study.toml"
 STUDY = """
@@ -273,7 +273,7 @@ def test_mass_and_elasticities(found):
     assert len(lines) == 2 * len(found.metrics) * 2
     line = lines[(lines["mode"] == "+++-") & (lines["metric"] == "total_mass") & (lines["parameter"] == "thickness")]
     assert line["derivative"].item() == found.derivatives[1, mass, 1]
-    told = found.told()["runs"][1]["metrics"]
+    told = found.to_dict()["runs"][1]["metrics"]
     assert told["total_mass"]["derivatives"]["thickness"] == found.derivatives[1, mass, 1]
     # No sample is after the motion: no number.
     assert told["residual_vibration"]["value"] is None

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from command_line import paraflex
 from paraflex.dynamics import (
     build_system,
     consistent_state,
@@ -37,7 +38,6 @@ from paraflex.mechanism import (
     Start,
 )
 from paraflex.motion import simulate_motion
-from test_cli import paraflex
 
 LENGTH, EI = 0.8, 70e9 * 0.02 * 0.004**3 / 12
 TIP = PointRef("beam", "tip")

@@ -2,8 +2,6 @@
 
 import json
 import sqlite3
-import subprocess
-import sys
 import threading
 import tracemalloc
 from pathlib import Path
@@ -14,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import paraflex
+from command_line import paraflex as shell
 from paraflex.campaign import journal, tables
 from paraflex.campaign.journal import read_journal
 from paraflex.designs.measure import metrics_of
@@ -82,7 +81,7 @@ def stub(setting, task, watch=None):
 
 def test_every_run_has_its_row(finished):
     _, result = finished
-    assert result.finished
+    assert result.complete
     assert result.counts == {"complete": 8}
     data = pd.read_parquet(result.table)
     assert list(data["run"]) == list(range(8))
@@ -167,7 +166,7 @@ def test_a_stopped_sweep_goes_on_and_makes_no_run_twice(finished, tmp_path):
 
     study = load_sweep(file)
     first = sweep(study, tmp_path / "out", workers=1, limit=2, run=counted)
-    assert not first.finished
+    assert not first.complete
     assert first.done == 2
     assert len(pd.read_parquet(first.table)) == 2
 
@@ -322,7 +321,7 @@ def test_two_sweeps_do_not_write_to_one_folder(finished, tmp_path):
             sweep(study, tmp_path / "out", run=stub)
         return stub(setting, task)
 
-    assert sweep(study, tmp_path / "out", run=inside, workers=1).finished
+    assert sweep(study, tmp_path / "out", run=inside, workers=1).complete
 
 
 def test_a_full_disk_loses_nothing_that_is_written(tmp_path, monkeypatch):
@@ -354,7 +353,7 @@ def test_a_full_disk_loses_nothing_that_is_written(tmp_path, monkeypatch):
         return stub(setting, task)
 
     result = sweep(study, tmp_path / "out", workers=1, run=counted)
-    assert result.finished
+    assert result.complete
     assert sorted(made) == [2, 3]
 
 
@@ -366,7 +365,7 @@ def test_a_damaged_journal_is_named(tmp_path):
     with pytest.raises(OutputError, match=r"journal.sqlite: cannot be read .*delete this file"):
         sweep(study, tmp_path / "out", workers=1, run=stub)
     file.unlink()
-    assert sweep(study, tmp_path / "out", workers=1, run=stub).finished
+    assert sweep(study, tmp_path / "out", workers=1, run=stub).complete
 
 
 MANY = """
@@ -395,7 +394,7 @@ def test_memory_is_flat(tmp_path):
         result = sweep(study, tmp_path / str(number), workers=2, run=stub)
         peaks[number] = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        assert result.finished
+        assert result.complete
         assert len(pd.read_parquet(result.table)) == number
     assert peaks[10_000] < peaks[1000] + 4e6
 
@@ -494,17 +493,16 @@ def test_metrics_are_documented(monkeypatch):
 
 def test_command_line(tmp_path):
     file = write(tmp_path, STUDY.replace("[0.005, 0.006]", "[0.005]"))
-    command = [sys.executable, "-W", "error", "-m", "paraflex", "sweep", str(file), "--output", str(tmp_path / "out")]
-    first = subprocess.run([*command, "--limit", "2"], capture_output=True, text=True, check=False, timeout=100)
+    command = ["sweep", str(file), "--output", str(tmp_path / "out")]
+    first = shell(*command, "--limit", "2")
     assert first.returncode == 0, first.stderr
     assert "2 of 4 runs: 2 complete" in first.stdout
     assert "the same command goes on from there" in first.stderr
-    again = subprocess.run([*command, "--json"], capture_output=True, text=True, check=False, timeout=100)
+    again = shell(*command, "--json")
     assert again.returncode == 0, again.stderr
     figures = json.loads(again.stdout)
     assert (figures["done"], figures["fresh"], figures["runs"]) == (4, 2, 4)
-    wrong = [*command[:-1], str(tmp_path / "other"), "--engine", "thread"]
-    said = subprocess.run(wrong, capture_output=True, text=True, check=False, timeout=100)
+    said = shell(*command[:-1], str(tmp_path / "other"), "--engine", "thread")
     assert said.returncode == 2
     assert said.stderr.strip() == "error: --engine: unknown engine (got 'thread'); did you mean \"threads\"?"
 

@@ -18,7 +18,6 @@ from paraflex.studies import (
     FIDELITIES,
     Refinement,
     VerificationOptions,
-    agreement,
     check_model,
     reference_model,
     verify,
@@ -41,14 +40,14 @@ def whole(square):
 
 @pytest.fixture(scope="module")
 def figures(verification):
-    return agreement(verification)["modes"]["++++"]
+    return verification.to_dict()["modes"]["++++"]
 
 
 def test_every_model_ran_to_its_end(verification, figures):
     assert verification.complete
     assert list(figures["models"]) == list(MODELS)
     assert all(model["status"] == "complete" for model in figures["models"].values())
-    json.dumps(agreement(verification), allow_nan=False)
+    json.dumps(verification.to_dict(), allow_nan=False)
 
 
 def test_exact_beams_confirm_second_order_geometry_and_not_the_linear_shape(figures):
@@ -94,7 +93,7 @@ def test_kineto_elastodynamics_holds_the_motors_and_misses(figures):
 
 
 def test_the_dataset_has_all_models_and_survives_a_file(verification, tmp_path):
-    data = verification.dataset()
+    data = verification.data
     assert list(data["model"].values) == list(MODELS)
     sizes = {"model": 7, "mode": 1, "time": 51, "axis": 2, "body": 8, "motor": 4, "joint": 11, "row": 22, "point": 18}
     assert data.sizes == sizes | {"station": 8 * 17}
@@ -115,7 +114,7 @@ def test_the_dataset_has_all_models_and_survives_a_file(verification, tmp_path):
 
 
 def test_figures_overlay_the_models(verification, tmp_path):
-    data = verification.dataset()
+    data = verification.data
     written = plots.save_agreement_figures(data, tmp_path)
     names = ["fig22_links_++++", "fig23_paths_++++", "model_distances"]
     assert [path.name for path in written] == [f"{name}.{suffix}" for name in names for suffix in ("png", "svg")]
@@ -129,7 +128,7 @@ def test_figures_overlay_the_models(verification, tmp_path):
     distances = plots.model_distances(data)
     far = next(line for line in distances.axes[1].lines if line.get_label() == "rigid").get_ydata()
     assert np.nanmax(far) == pytest.approx(
-        1e3 * agreement(verification)["modes"]["++++"]["models"]["rigid"]["distance_max"]
+        1e3 * verification.to_dict()["modes"]["++++"]["models"]["rigid"]["distance_max"]
     )
     with pytest.raises(InputError, match="no such model"):
         plots.compared_paths(data, "++++", ("second-order", "adams"))
@@ -151,16 +150,16 @@ def test_an_engine_that_diverges_is_reported_and_the_others_go_on(square):
     coarse = VerificationOptions(tolerance=1e-4, mujoco_step=1e-3, exudyn_step=1e-3)
     seen = []
     verification = verify(
-        task, ["++++"], models=("mujoco", "linear", "exudyn"), options=coarse, on_progress=lambda *a: seen.append(a)
+        task, ["++++"], models=("mujoco", "linear", "exudyn"), options=coarse, on_progress=seen.append
     )
-    figures = agreement(verification)["modes"]["++++"]["models"]
+    figures = verification.to_dict()["modes"]["++++"]["models"]
     assert not verification.complete
     assert figures["mujoco"]["status"] == "failed"
     assert "base: MuJoCo diverges with steps of 0.001 s" in figures["mujoco"]["message"]
     assert figures["linear"]["status"] == figures["exudyn"]["status"] == "complete"
     # MuJoCo's finer run is left out once the base run has failed.
-    assert [number for _, number, total in seen] == [0, 2, 3, 4, 5, 6, 7]
-    data = verification.dataset()
+    assert [at.done for at in seen] == [0, 2, 3, 4, 5, 6, 7]
+    data = verification.data
     assert data["status"].sel(model="mujoco").item() == "failed"
     assert np.isnan(data["tracking_rms"].sel(model="mujoco").item())
 
@@ -168,28 +167,28 @@ def test_an_engine_that_diverges_is_reported_and_the_others_go_on(square):
 def test_ctrl_c_keeps_the_models_that_are_done(square):
     task = plan_tracking(raparm_i(), square, duration=0.01, samples=3)
 
-    def stop(what, number, total):
-        if number == 2:
+    def stop(at):
+        if at.done == 2:
             raise KeyboardInterrupt
 
     options = VerificationOptions(tolerance=1e-3)
     verification = verify(task, ["++++"], models=("rigid", "linear"), options=options, on_progress=stop)
     assert verification.interrupted
     assert list(verification.runs["++++"]) == ["rigid"]
-    assert list(verification.dataset()["model"].values) == ["rigid"]
-    assert agreement(verification)["interrupted"]
+    assert list(verification.data["model"].values) == ["rigid"]
+    assert verification.to_dict()["interrupted"]
 
 
 def test_ctrl_c_in_a_later_mode_keeps_the_modes_that_are_done(square):
     task = plan_tracking(raparm_i(), square, duration=0.01, samples=3)
 
-    def stop(what, number, total):
-        if what.startswith("+-+-"):
+    def stop(at):
+        if at.doing.startswith("+-+-"):
             raise KeyboardInterrupt
 
     options = VerificationOptions(tolerance=1e-3)
     verification = verify(task, ["++++", "+-+-"], models=("rigid", "linear"), options=options, on_progress=stop)
-    data = verification.dataset()
+    data = verification.data
     assert list(data["mode"].values) == ["++++"]
     assert list(data["model"].values) == ["rigid", "linear"]
 
@@ -198,7 +197,7 @@ def test_a_rigid_mechanism_is_the_same_in_every_model():
     """A five-bar without beams, every model of it: only MuJoCo's and Exudyn's own errors are left."""
     path = Line((0.0, 0.30), (0.04, 0.27), 20.0)
     task = plan_tracking(make_five_bar(), path, duration=0.1, samples=21)
-    figures = agreement(verify(task, ["++"], models=MODELS))["modes"]["++"]
+    figures = verify(task, ["++"], models=MODELS).to_dict()["modes"]["++"]
     assert proportional_segments(make_five_bar()) == {}
     for name in MODELS:
         assert figures["models"][name]["distance_max"] < 2e-5, name

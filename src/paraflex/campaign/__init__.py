@@ -1,8 +1,9 @@
-"""Thousands of runs of anything: workers that compute them, a journal that keeps them, tables made of it."""
+"""What every study is; and of many runs the workers that compute them, the journal that keeps them, their tables."""
 
 from paraflex.campaign.folder import STUDY, TRAJECTORIES, open_campaign, read_study
 from paraflex.campaign.journal import Journal, Row, held
-from paraflex.campaign.tables import RESULTS, UNFINISHED, read_table, tables_of, write_table
+from paraflex.campaign.study import KeptResult, OnProgress, Progress, Result, Study, Workers, kept_in
+from paraflex.campaign.tables import CSV, RESULTS, UNFINISHED, read_data, read_table, tables_of, write_table
 from paraflex.campaign.workers import (
     DASK,
     ENGINES,
@@ -16,6 +17,7 @@ from paraflex.campaign.workers import (
 )
 
 __all__ = [
+    "CSV",
     "DASK",
     "ENGINES",
     "PROCESSES",
@@ -26,13 +28,21 @@ __all__ = [
     "UNFINISHED",
     "Engine",
     "Journal",
+    "KeptResult",
     "LostCluster",
     "LostWorker",
+    "OnProgress",
+    "Progress",
+    "Result",
     "Row",
+    "Study",
+    "Workers",
     "held",
+    "kept_in",
     "open_campaign",
     "open_engine",
     "outcomes",
+    "read_data",
     "read_study",
     "read_table",
     "tables_of",

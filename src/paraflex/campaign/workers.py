@@ -41,6 +41,7 @@ _AHEAD = 2
 _DEATHS = 2
 # Seconds in which a scheduler must answer, and between two counts of a cluster's workers.
 _REACHED_WITHIN, _RECOUNT = 10.0, 5.0
+_GONE = "the cluster no longer answers; run the same command again: it goes on from there"
 # How long a thread waits for another's Python before it asks for its turn [s]: runs leave Python and come back often.
 _SWITCH = 2e-4
 
@@ -171,12 +172,15 @@ class Dask(Engine):
         """See `Engine`; workers may come and go."""
         now = time.monotonic()
         if now - self._counted > _RECOUNT:
-            self._counted, self._workers = now, max(1, sum(self._client.nthreads().values()))
+            try:
+                self._counted, self._workers = now, max(1, sum(self._client.nthreads().values()))
+            except OSError:
+                raise LostCluster(_GONE) from None
         return self._workers
 
     def restart(self) -> None:
         """See `Engine`."""
-        raise LostCluster("the cluster no longer answers; run the same command again: it goes on from there")
+        raise LostCluster(_GONE)
 
     def close(self, *, abandon: bool = False) -> None:
         """See `Engine`."""
@@ -246,7 +250,8 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
         # Short waits, for Ctrl-C to be heard everywhere.
         done, _ = wait(running, timeout=1.0, return_when=FIRST_COMPLETED)
         suspects = []
-        for future in done:
+        # In the order they were given out, which a set has not.
+        for future in [each for each in running if each in done]:
             task = running.pop(future)
             try:
                 result = future.result()

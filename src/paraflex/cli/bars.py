@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
+
+from paraflex.campaign import OnProgress
 
 
 def bars(console: Console, *columns: str | ProgressColumn) -> Progress:
@@ -19,11 +21,11 @@ def bars(console: Console, *columns: str | ProgressColumn) -> Progress:
 
 
 @contextmanager
-def counting(console: Console) -> Iterator[Callable[[str, int, int], None]]:
-    """A bar of runs one after the other: to be told what begins, its number and how many there are."""
+def counting(console: Console) -> Iterator[OnProgress]:
+    """A bar of runs one after the other."""
     with bars(console, "{task.completed}/{task.total}", TimeElapsedColumn()) as progress:
         bar = progress.add_task("", total=None)
-        yield lambda what, number, total: progress.update(bar, description=what, completed=number, total=total)
+        yield lambda at: progress.update(bar, description=at.doing, completed=at.done, total=at.total)
 
 
 @contextmanager

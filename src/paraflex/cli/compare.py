@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from pathlib import Path
 from typing import Any
-
-from rich.console import Console
 
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import CompareRequest
@@ -34,8 +31,8 @@ from paraflex.errors import AssemblyError, InputError
 from paraflex.files import Model, load
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
-from paraflex.studies import Case, ComparisonOptions, MethodComparison, compare_methods, motion_case, tracking_case
-from paraflex.writing import write_json
+from paraflex.plots import save_work_precision
+from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_case, tracking_case
 
 
 def compare_command(request: CompareRequest) -> int:
@@ -50,10 +47,12 @@ def compare_command(request: CompareRequest) -> int:
     compile_kernels_for(model.mechanism, console.print)
     began = time.perf_counter()
     case = _motion(model, request) if mode is None else _tracking(model, request, mode)
-    comparison = _run(console, case, methods, options)
-    figures = comparison.figures() | {"parameters": _parameters(model, case, options)}
+    study = ComparisonStudy(case, methods, options, _parameters(model, case, options))
+    with counting(console) as report:
+        comparison = study.run(folder, on_progress=report)
+    figures = comparison.to_dict()
     if comparison.measurements:
-        _write(figures, folder)
+        save_work_precision(figures, folder / "figures")
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
@@ -115,22 +114,9 @@ def _motion(model: Model, request: CompareRequest) -> Case:
         raise at_fault(error, model) from None
 
 
-def _run(console: Console, case: Case, methods: list[str], options: ComparisonOptions) -> MethodComparison:
-    with counting(console) as report:
-        return compare_methods(case, methods, options=options, on_progress=report)
-
-
 def _parameters(model: Model, case: Case, options: ComparisonOptions) -> dict[str, Any]:
     asked = {"mechanism": model.source, "limit": options.limit, "repetitions": options.repetitions}
     return {
         "model": dict(model.parameters),
         "run": asked | {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name},
     }
-
-
-def _write(figures: dict[str, Any], folder: Path) -> None:
-    from paraflex.plots import save_work_precision
-
-    folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / "compare-methods.json", figures)
-    save_work_precision(figures, folder / "figures")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 
+from paraflex.campaign import Progress
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import IndicesRequest
 from paraflex.cli.request import COMPLETE, INTERRUPTED
 from paraflex.cli.tables import number, plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
-from paraflex.studies import IndicesResult, SweepProgress, load_indices, sobol_indices
+from paraflex.studies import IndicesResult, load_indices, sobol_indices
 
 
 def indices_command(request: IndicesRequest) -> int:
@@ -21,18 +22,18 @@ def indices_command(request: IndicesRequest) -> int:
     with bars(console, "{task.completed}/{task.total}") as progress:
         bar = progress.add_task(study.sweep.name, total=study.sweep.runs)
 
-        def tell(at: SweepProgress) -> None:
+        def tell(at: Progress) -> None:
             progress.update(bar, completed=at.done)
 
         result = sobol_indices(study, request.folder, on_progress=tell, **request.workers.given)
-    if not result.sweep.finished:
+    if not result.complete:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED
-    save_search_figures(result.figures(), request.folder / "figures")
+    save_search_figures(result.to_dict(), request.folder / "figures")
     verdict = study.sweep.setting.verdict()
     warn_of(console if request.json else plain_console(), verdict)
     if request.json:
-        print(json.dumps(result.figures() | {"verdict": verdict.to_dict()}, indent=2))
+        print(json.dumps(result.to_dict() | {"verdict": verdict.to_dict()}, indent=2))
     else:
         _report(result)
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import TimeElapsedColumn
 
+from paraflex.campaign import Progress
 from paraflex.checks import check_planned
 from paraflex.cli.bars import bars
 from paraflex.cli.collected import collected
@@ -36,14 +36,11 @@ from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import Model, load
-from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, finite_segments, proportional_segments
-from paraflex.results import save_results, summary
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
-from paraflex.studies import Simulator, StudyResult, run_study
-from paraflex.writing import write_json
+from paraflex.studies import Simulator, StudyResult, TrackingStudy
 
 
 def run_command(request: RunRequest) -> int:
@@ -74,9 +71,11 @@ def run_command(request: RunRequest) -> int:
         check_stops(task.mechanism, options, request.stop_at)
     parameters = _parameters(model, path_name, modes, task, how, request)
     doubts = check_planned(model, task, path_name, modes, request.plan.assembly)
-    method = _method(request, options)
+    study = TrackingStudy(
+        task, modes, options, parameters, _method(request, options), model.study.error, warning=False, findings=doubts
+    )
     try:
-        result = _simulate(console, task, modes, options, parameters, method, model.study.error, doubts)
+        result = _simulate(console, study)
     except InputError as error:
         warn_of(console, collected(doubts))
         raise at_fault(error, model) from None
@@ -86,7 +85,7 @@ def run_command(request: RunRequest) -> int:
         return INTERRUPTED if result.interrupted else TROUBLE
     keep_findings(result.data, collected(verdict_of(result.data)))
     _write(result, folder, report=request.report)
-    figures = summary(result.data, result.failed)
+    figures = result.to_dict()
     if request.json:
         warn_of_doubts(console, figures)
         print(json.dumps(figures, indent=2))
@@ -203,44 +202,24 @@ def _parameters(
     }
 
 
-def _simulate(
-    console: Console,
-    task: TrackingTask,
-    modes: list[ActuationMode],
-    options: IntegrationOptions,
-    parameters: dict,
-    method: Simulator | None,
-    error: str,
-    doubts: Iterable[Finding],
-) -> StudyResult:
-    end = float(task.motion.t[-1])
+def _simulate(console: Console, study: TrackingStudy) -> StudyResult:
+    end = float(study.task.motion.t[-1])
     with bars(console, "{task.completed:.3f}/{task.total:.3f} s", TimeElapsedColumn()) as progress:
-        of_mode = {mode.name: progress.add_task(mode.name, total=end, start=False) for mode in modes}
+        names = [study.task.mode(mode).name for mode in study.modes]
+        of_mode = {name: progress.add_task(name, total=end, start=False) for name in names}
 
-        def report(name: str, reached: float) -> None:
-            progress.start_task(of_mode[name])
-            progress.update(of_mode[name], completed=reached)
+        def report(at: Progress) -> None:
+            progress.start_task(of_mode[at.doing])
+            progress.update(of_mode[at.doing], completed=at.done)
 
-        return run_study(
-            task,
-            modes,
-            options=options,
-            parameters=parameters,
-            on_progress=report,
-            method=method,
-            error=error,
-            warning=False,
-            findings=doubts,
-        )
+        return study.run(on_progress=report)
 
 
 def _write(result: StudyResult, folder: Path, *, report: bool) -> None:
     from paraflex.plots import save_figures
 
     assert result.data is not None
-    folder.mkdir(parents=True, exist_ok=True)
-    save_results(result.data, folder / "results.nc")
-    write_json(folder / "summary.json", summary(result.data, result.failed))
+    result.save(folder)
     save_figures(result.data, folder / "figures")
     if report:
         from paraflex.report import save_page, tracking_page

@@ -10,6 +10,7 @@ from typing import TypeVar
 from rich.console import Console
 from rich.table import Table
 
+from paraflex.campaign import Progress
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
@@ -17,7 +18,6 @@ from paraflex.cli.tables import plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
 from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
-from paraflex.studies.optimisation import Progress as SearchProgress
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
 
@@ -32,12 +32,12 @@ def search_command(
     if result.interrupted and not result.values:
         console.print("interrupted before the first design was done")
         return INTERRUPTED
-    save_search_figures({"kind": _kind(result)} | result.figures(), request.folder / "figures")
+    save_search_figures(result.to_dict(), request.folder / "figures")
     verdict = study.base.setting.verdict()
     warn_of(console if request.json else plain_console(), verdict)
     if request.json:
         more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
-        print(json.dumps(result.figures() | more, indent=2))
+        print(json.dumps(result.to_dict() | more, indent=2))
     else:
         report(result)
         _say_end(console, result, request.folder)
@@ -57,17 +57,13 @@ def parameter_table(result: R, **columns: dict[str, str]) -> Table:
     return table
 
 
-def _kind(result: OptimisationResult | IdentificationResult) -> str:
-    return "optimisation" if isinstance(result, OptimisationResult) else "identification"
-
-
 def _with_bar(console: Console, study: DesignStudy, request: SearchRequest, look: Callable[..., R], what: str) -> R:
     with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[told]}") as progress:
         bar = progress.add_task(study.name, total=study.search.evaluations, told="")
 
-        def tell(at: SearchProgress) -> None:
+        def tell(at: Progress) -> None:
             told = "" if at.best is None else f"{what} {at.best:.4g}"
-            progress.update(bar, completed=at.evaluations, told=told)
+            progress.update(bar, completed=at.done, told=told)
 
         return look(study, request.folder, on_progress=tell, **request.workers.given)
 

@@ -3,47 +3,35 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from paraflex.campaign import held
 from paraflex.cli.commands.studies import SensitivityRequest
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import COMPLETE
 from paraflex.cli.tables import number, plain_console, plain_table, warn_of_doubts
-from paraflex.designs.setting import digest
-from paraflex.errors import InputError, OutputError
+from paraflex.errors import InputError
 from paraflex.plots import save_elasticities
-from paraflex.studies import Sensitivities, load_sensitivities, sensitivities
-from paraflex.writing import whole_file, write_json
+from paraflex.studies import Sensitivities, load_sensitivities
+from paraflex.studies.sensitivities.study import FIGURES, LINES, TABLE
 
-RESULTS, TABLE, LINES = "sensitivity.json", "sensitivity.csv", "sensitivity.parquet"
-FIGURES = "figures"
 # Parameters side by side in a table of 80 columns.
 _COLUMNS = 4
-_OURS = {RESULTS, TABLE, LINES, FIGURES, ".lock"}
 
 
 def sensitivity_command(request: SensitivityRequest) -> int:
     """Differentiate the runs of a study; write sensitivity.json, the table and figures. The exit code."""
     study = load_sensitivities(request.study, [name for entry in request.metrics for name in _names(entry)])
-    at = _values(request.at)
     folder = request.folder
-    setting = study.setting
-    places = [[list(place) for place in places] for places in setting.places]
-    asked = digest([setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics, at])
-    with held(folder):
-        _claim(folder, asked)
-        say_replaced(folder, "sensitivity")
-        found = sensitivities(study, at=at)
-        figures = {"content": asked, "verdict": setting.verdict().to_dict()} | found.told()
-        _write(folder, figures, found)
-        save_elasticities(figures, folder / FIGURES)
+    study = replace(study, at=_values(request.at))
+    # Told of the first path when the folder is seen to be this study's.
+    found = study.run(folder, on_progress=lambda at: None if at.done else say_replaced(folder, "sensitivity"))
+    figures = found.to_dict()
+    save_elasticities(figures, folder / FIGURES)
     console = plain_console()
     warn_of_doubts(plain_console(stderr=True) if request.json else console, figures)
     if request.json:
@@ -51,7 +39,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
         return COMPLETE
     for row in range(len(found.rows)):
         _print(console, found, row)
-    console.print(f"{folder / RESULTS}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
+    console.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
     return COMPLETE
 
 
@@ -68,47 +56,6 @@ def _values(entries: list[str]) -> dict[str, float]:
         except ValueError:
             raise InputError("not NAME=VALUE", field="--at", value=entry, remedy="say --at thickness=0.006") from None
     return values
-
-
-def _claim(folder: Path, asked: str) -> None:
-    """Check that the folder is empty or holds what the same study wrote."""
-    others = sorted(entry.name for entry in folder.iterdir() if entry.name not in _OURS)
-    if others:
-        raise InputError(
-            f"the folder holds other files ({', '.join(others[:3])})", field="--output", value=str(folder),
-            remedy="name a new folder",
-        )  # fmt: skip
-    if (folder / RESULTS).exists() and _content(folder / RESULTS) != asked:
-        raise InputError(
-            "the folder holds results of another study, or of this one before it was changed", field="--output",
-            value=str(folder), remedy="name a new folder",
-        )  # fmt: skip
-
-
-def _content(file: Path) -> Any:
-    try:
-        return json.loads(file.read_text(encoding="utf-8")).get("content")
-    except (OSError, ValueError, AttributeError):
-        return None
-
-
-def _write(folder: Path, figures: dict[str, Any], found: Sensitivities) -> None:
-    lines = found.to_frame()
-    write_json(folder / RESULTS, figures)
-    with whole_file(folder / TABLE) as unfinished:
-        lines.to_csv(unfinished, index=False)
-    with whole_file(folder / LINES) as unfinished:
-        _to_parquet(lines, unfinished)
-
-
-def _to_parquet(lines: Any, file: Path) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        pq.write_table(pa.Table.from_pandas(lines, preserve_index=False), file)
-    except pa.ArrowException as error:
-        raise OutputError(f"cannot be written ({error})", field=str(file), remedy="choose another folder") from error
 
 
 def _print(console: Console, found: Sensitivities, row: int) -> None:

@@ -8,13 +8,14 @@ from pathlib import Path
 
 from rich.console import Console
 
+from paraflex.campaign import Progress
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SweepRequest
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
 from paraflex.cli.tables import plain_console, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits
-from paraflex.studies import SweepProgress, SweepResult, load_sweep, sweep
+from paraflex.studies import SweepResult, load_sweep, sweep
 from paraflex.studies.sweeps import SweepStudy
 
 REPORT = "report.html"
@@ -46,7 +47,7 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
     with bars(console, "{task.completed}/{task.total} runs", "{task.fields[told]}") as progress:
         bar = progress.add_task(study.name, total=study.runs, told="", start=False)
 
-        def report(at: SweepProgress) -> None:
+        def report(at: Progress) -> None:
             left = "" if at.left is None else f", {_clock(at.left)} left"
             progress.start_task(bar)
             progress.update(bar, completed=at.done, told=f"{at.rate:.1f} runs/s{left}")
@@ -73,24 +74,16 @@ def _report(console: Console, result: SweepResult) -> None:
         plain_console().print(f"warning: {beyond_limits(result.beyond)}", soft_wrap=True)
     if result.fresh:
         console.print(f"{result.fresh} of them in {result.seconds:.1f} s now, {_rate(result)} runs/s")
-    if result.finished:
+    if result.complete:
         console.print(f"one table: {result.table}", soft_wrap=True)
     else:
         console.print(f"so far: {result.table}; the same command goes on from there", soft_wrap=True)
 
 
 def _figures(result: SweepResult) -> dict:
-    return {
-        "folder": str(result.folder),
-        "table": str(result.table),
-        "runs": result.total,
-        "done": result.done,
-        "status": dict(result.counts),
-        "beyond_validity": result.beyond,
-        "fresh": result.fresh,
-        "seconds": result.seconds,
-        "interrupted": result.interrupted,
-    }
+    places = {"folder": str(result.folder), "table": str(result.table)}
+    session = {"fresh": result.fresh, "seconds": result.seconds, "interrupted": result.interrupted}
+    return places | result.to_dict() | session
 
 
 def _rate(result: SweepResult) -> str:

@@ -7,8 +7,6 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
-
 from paraflex.cli.agreement import print_agreement
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import VerifyRequest
@@ -31,11 +29,8 @@ from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
 from paraflex.files import load
-from paraflex.mechanism import ActuationMode, Geometry
-from paraflex.results import save_results
-from paraflex.simulate import TrackingTask
-from paraflex.studies import FIDELITIES, Verification, VerificationOptions, agreement, check_model, verify
-from paraflex.writing import write_json
+from paraflex.mechanism import Geometry
+from paraflex.studies import FIDELITIES, Verification, VerificationOptions, VerificationStudy, check_model
 
 
 def verify_command(request: VerifyRequest) -> int:
@@ -55,16 +50,18 @@ def verify_command(request: VerifyRequest) -> int:
             compile_kernels(geometry, console.print)
     began = time.perf_counter()
     task = plan_study(model, mechanism, path, path_name, request.plan)
-    verification = _run(console, task, modes, models, options)
     parameters = {
         "model": dict(model.parameters),
         "run": {"mechanism": model.source, "path": path_name, "modes": [mode.name for mode in modes]}
         | asdict(request.frames)
         | asdict(options),
     }
-    figures = agreement(verification, model.study.error) | {"parameters": parameters}
+    study = VerificationStudy(task, modes, models, options, parameters, model.study.error)
+    with counting(console) as report:
+        verification = study.run(on_progress=report)
+    figures = verification.to_dict()
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
-        _write(verification, figures, parameters, folder, report=request.report)
+        _write(verification, figures, folder, report=request.report)
     warn_of_doubts(console if request.json else plain_console(), figures)
     if request.json:
         print(json.dumps(figures, indent=2))
@@ -99,20 +96,12 @@ def _models(request: VerifyRequest) -> list[str]:
     return list(dict.fromkeys([*(request.fidelities or FIDELITIES), *request.engines]))
 
 
-def _run(
-    console: Console, task: TrackingTask, modes: list[ActuationMode], models: list[str], options: VerificationOptions
-) -> Verification:
-    with counting(console) as report:
-        return verify(task, modes, models=models, options=options, on_progress=report)
-
-
-def _write(verification: Verification, figures: dict, parameters: dict, folder: Path, *, report: bool) -> None:
+def _write(verification: Verification, figures: dict, folder: Path, *, report: bool) -> None:
     from paraflex.plots import save_agreement_figures
 
-    folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / "verify.json", figures)
-    data = verification.dataset(parameters=parameters, error=figures["error"])
-    save_results(data, folder / "verify.nc")
+    verification.save(folder)
+    data = verification.data
+    assert data is not None
     save_agreement_figures(data, folder / "figures")
     if report:
         from paraflex.report import save_page, verification_page

@@ -15,7 +15,6 @@ from paraflex.designs.overlay import Place
 from paraflex.designs.run import Abandoned, Task, plan_task
 from paraflex.designs.samples import Varied
 from paraflex.designs.setting import Setting, digest, versions
-from paraflex.designs.study import SweepStudy
 from paraflex.errors import InputError
 from paraflex.results import tracking_dataset
 from paraflex.simulate import simulate
@@ -56,20 +55,23 @@ class StudyFolder:
         return all(versions()[name] == had for name, had in self.versions.items() if name in versions())
 
 
-def study_account(study: SweepStudy, content: Mapping[str, Any], **told: Any) -> dict[str, Any]:
+def study_account(
+    name: str, setting: Setting, parameters: Sequence[Varied], content: Mapping[str, Any], **more: Any
+) -> dict[str, Any]:
     """What the `study.json` of a folder is to say.
 
     Parameters
     ----------
-    study : SweepStudy
-        What is run.
+    name : str
+    setting : Setting
+    parameters : sequence of Varied
     content : mapping
         What the results depend on, in plain values.
-    **told
+    **more
         More of `StudyFolder`.
     """
-    said = {"content": digest(content), "versions": dict(study.setting.versions), "format": 1, "name": study.name}
-    return said | told | {"ranges": {each.name: _range(each) for each in study.parameters}, "study": content}
+    account = {"content": digest(content), "versions": dict(setting.versions), "format": 1, "name": name}
+    return account | more | {"ranges": {each.name: _range(each) for each in parameters}, "study": content}
 
 
 def open_study(folder: str | Path) -> StudyFolder:

@@ -1,14 +1,16 @@
 """Many runs as one result."""
 
-from paraflex.studies.agreement import agreement
+from paraflex.studies.agreement import ModelRuns, Refinement, Verification, reference_model
 from paraflex.studies.cases import Case, motion_case, tracking_case
-from paraflex.studies.compare import ComparisonOptions, compare_methods
+from paraflex.studies.compare import ComparisonOptions, ComparisonStudy, compare_methods
 from paraflex.studies.comparison import Measurement, MethodComparison, Reference
 from paraflex.studies.optimisation import (
     DesignStudy,
     IdentificationResult,
+    IdentificationStudy,
     IndicesResult,
     OptimisationResult,
+    OptimisationStudy,
     identify,
     load_identification,
     load_indices,
@@ -23,16 +25,13 @@ from paraflex.studies.sensitivities import (
     metric_gradients,
     sensitivities,
 )
-from paraflex.studies.sweeps import SweepProgress, SweepResult, SweepStudy, load_sweep, sweep
-from paraflex.studies.tracking import Simulator, StudyResult, run_study
+from paraflex.studies.sweeps import SweepResult, SweepStudy, load_sweep, sweep
+from paraflex.studies.tracking import Simulator, StudyResult, TrackingStudy, run_study
 from paraflex.studies.verification import (
     FIDELITIES,
-    ModelRuns,
-    Refinement,
-    Verification,
     VerificationOptions,
+    VerificationStudy,
     check_model,
-    reference_model,
     verify,
 )
 
@@ -40,25 +39,28 @@ __all__ = [
     "FIDELITIES",
     "Case",
     "ComparisonOptions",
+    "ComparisonStudy",
     "DesignStudy",
     "IdentificationResult",
+    "IdentificationStudy",
     "IndicesResult",
     "Measurement",
     "MethodComparison",
     "ModelRuns",
     "OptimisationResult",
+    "OptimisationStudy",
     "Reference",
     "Refinement",
     "Sensitivities",
     "SensitivityStudy",
     "Simulator",
     "StudyResult",
-    "SweepProgress",
     "SweepResult",
     "SweepStudy",
+    "TrackingStudy",
     "Verification",
     "VerificationOptions",
-    "agreement",
+    "VerificationStudy",
     "check_model",
     "compare_methods",
     "identify",

@@ -1,54 +1,150 @@
-"""What runs of several models say of each other, as plain numbers."""
+"""Runs of several models of one mechanism, and what they say of each other."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.arguments import checked_arguments
+from paraflex.arguments import checked_arguments, given_as
+from paraflex.campaign import Result
 from paraflex.errors import as_enum
 from paraflex.findings import Finding, Verdict
-from paraflex.results.dataset import part_of
+from paraflex.results.dataset import part_of, tracking_dataset
 from paraflex.results.following import HEADLINE, ErrorSpan, Part
 from paraflex.results.formulas import rms
 from paraflex.results.metrics import METRICS
 from paraflex.results.record import Record
 from paraflex.results.traces import Traces
 from paraflex.simulate import TrackingTask
-from paraflex.studies.verification import ModelRuns, Refinement, Verification, reference_model
 from paraflex.validity import doubtful_numbers
 
 
-@checked_arguments()
-def agreement(verification: Verification, error: ErrorSpan | str = ErrorSpan.MOTION) -> dict[str, Any]:
-    """The agreement of all models as plain numbers: what `verify.json` holds. None for what a run did not reach.
+class Refinement(Enum):
+    """Runs of one model: as asked for, and finer ones whose distance from that shows how converged it is."""
 
-    Parameters
+    NONE = "base"
+    STEP = "finer step"
+    MESH = "finer mesh"
+
+
+@dataclass(frozen=True)
+class ModelRuns:
+    """What became of one model in one mode.
+
+    Attributes
     ----------
-    verification : Verification
-    error : ErrorSpan or str
-        What tracking errors are of: the "motion", or the "whole" run, dwell included. Distances between models are of
-        the whole run.
+    records : mapping of Refinement to Record
+        Runs that were begun; one that failed says so in its figures.
+    failure : str
+        Why one of them failed; empty where none did.
     """
-    task, span = verification.task, as_enum(ErrorSpan, error, "error")
-    reference = reference_model(verification.models)
-    part = part_of(task.path, float(task.motion.t[-1]))
-    return {
-        "mechanism": task.mechanism.name,
-        "duration": float(task.motion.t[-1]),
-        "samples": int(task.motion.t.size),
-        "verdict": Verdict(_findings(task, part)).to_dict(),
-        "part": None if part is None else part.figures(),
-        "reference": reference,
-        "error": span.value,
-        "links": [body.name for body in task.mechanism.bodies],
-        "complete": verification.complete,
-        "interrupted": verification.interrupted,
-        "modes": {mode: _of_mode(task, span, by_model, reference) for mode, by_model in verification.runs.items()},
-    }
+
+    records: Mapping[Refinement, Record]
+    failure: str = ""
+
+    def finished(self, level: Refinement | str) -> Record | None:
+        """A run that got to its end."""
+        run = self.records.get(as_enum(Refinement, level, "level"))
+        return run if run is not None and run.figures["status"] == "complete" else None
+
+    @property
+    def base(self) -> Record | None:
+        """The run to compare, if it got to its end."""
+        return self.finished(Refinement.NONE)
+
+
+@given_as("a verification", "what verify returns")
+@dataclass(frozen=True)
+class Verification(Result):
+    """Runs of all models in all modes.
+
+    Attributes
+    ----------
+    task : TrackingTask
+    models : tuple of str
+    runs : mapping of str to mapping of str to ModelRuns
+        By mode and model.
+    interrupted : bool
+        Whether the user stopped it; models that were not begun are missing.
+    parameters : mapping or None
+        Kept as provenance.
+    error : ErrorSpan
+        What tracking errors are of: the motion, or the whole run, dwell included. Distances between models are of the
+        whole run.
+    """
+
+    data_file, values_file = "verify.nc", "verify.json"
+    task: TrackingTask
+    models: tuple[str, ...]
+    runs: Mapping[str, Mapping[str, ModelRuns]]
+    interrupted: bool = False
+    parameters: dict[str, Any] | None = None
+    error: ErrorSpan = ErrorSpan.MOTION
+
+    @property
+    def complete(self) -> bool:
+        """Whether every run got to its end."""
+        return not self.interrupted and not any(
+            runs.failure for by_model in self.runs.values() for runs in by_model.values()
+        )
+
+    @property
+    def data(self) -> xr.Dataset | None:
+        """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
+
+        Modes that every model began; where there is none, models that every mode begun has; None where there are none.
+        """
+        begun = {
+            mode: {name: runs.records[Refinement.NONE] for name, runs in by_model.items() if runs.records}
+            for mode, by_model in self.runs.items()
+        }
+        begun = {mode: records for mode, records in begun.items() if records}
+        kept = {mode: records for mode, records in begun.items() if len(records) == len(self.models)} or begun
+        names = [name for name in self.models if kept and all(name in records for records in kept.values())]
+        if not names:
+            return None
+        parts = [
+            tracking_dataset([records[name] for records in kept.values()], parameters=self.parameters, error=self.error)
+            for name in names
+        ]
+        methods = [part.attrs.pop("method") for part in parts]
+        data = xr.concat(parts, xr.Variable("model", names), combine_attrs="drop_conflicts", join="exact")
+        data.attrs["reference"] = reference_model(names)
+        return data.assign(method=("model", methods))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the models say of each other, in plain values; None for what a run did not reach."""
+        task, reference = self.task, reference_model(self.models)
+        part = part_of(task.path, float(task.motion.t[-1]))
+        out = {
+            "mechanism": task.mechanism.name,
+            "duration": float(task.motion.t[-1]),
+            "samples": int(task.motion.t.size),
+            "verdict": Verdict(_findings(task, part)).to_dict(),
+            "part": None if part is None else part.figures(),
+            "reference": reference,
+            "error": self.error.value,
+            "links": [body.name for body in task.mechanism.bodies],
+            "complete": self.complete,
+            "interrupted": self.interrupted,
+            "modes": {mode: _of_mode(task, self.error, by_model, reference) for mode, by_model in self.runs.items()},
+        }
+        return out if self.parameters is None else out | {"parameters": self.parameters}
+
+
+@checked_arguments()
+def reference_model(models: Sequence[str]) -> str:
+    """What the others are compared with: second-order geometry, or else the first that has flexible links."""
+    for name in ("second-order", "exudyn", "segments", "mujoco", "linear", "ked"):
+        if name in models:
+            return name
+    return models[0]
 
 
 def _findings(task: TrackingTask, part: Part | None) -> list[Finding]:

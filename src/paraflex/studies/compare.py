@@ -7,18 +7,18 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, checked_arguments
+from paraflex.campaign import OnProgress, Progress, Study, Workers
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.methods import Family, Method, find_method
 from paraflex.studies.cases import Case
 from paraflex.studies.comparison import Measurement, MethodComparison, Reference
-
-Report = Callable[[str, int, int], None]
 
 # The reference is asked for this part of the tightest tolerance, its check for twice that; both may take this
 # many times the limit of a run.
@@ -78,63 +78,93 @@ class _TooSlowError(Exception):
     """A run beyond the limit of time."""
 
 
+@dataclass(frozen=True)
+class ComparisonStudy(Study[MethodComparison], CheckedFields):
+    """One motion by every method at every tolerance: time, work and error of each.
+
+    Attributes
+    ----------
+    case : Case
+        From `studies.tracking_case` or `studies.motion_case`.
+    methods : sequence of str or None
+        From `METHODS`; all where None. One that cannot run is listed with its reason and the others go on.
+    options : ComparisonOptions or None
+        The defaults where None.
+    parameters : dict or None
+        Kept as provenance.
+    """
+
+    case: Case
+    methods: Sequence[str] | None = None
+    options: ComparisonOptions | None = None
+    parameters: dict | None = None
+
+    def run(
+        self,
+        folder: str | Path | None = None,
+        *,
+        workers: Workers | None = None,
+        on_progress: OnProgress | None = None,
+    ) -> MethodComparison:
+        """Run all methods; see `Study.run`.
+
+        Runs come one after the other, so that their wall times can be compared: workers have no part in it.
+
+        Raises
+        ------
+        InputError
+            An unknown method, before anything runs.
+        IntegrationError
+            No converged run to compare with.
+        """
+        if workers is not None:
+            raise InputError("runs come one after the other", field="workers", remedy="leave it out")
+        case, options = self.case, self.options or ComparisonOptions()
+        chosen = [find_method(name) for name in dict.fromkeys(METHODS if self.methods is None else self.methods)]
+        plans = {method.name: _plan(method, options) for method in chosen}
+        total = sum(map(len, plans.values()))
+        found: list[Measurement] = []
+        reference, interrupted = None, False
+
+        def tell(what: str) -> None:
+            if on_progress is not None:
+                on_progress(Progress(len(found), total, len(found), doing=what))
+
+        try:
+            tell("reference")
+            reference, places = _reference(case, options)
+            for method in chosen:
+                for measurement in _measurements(case, method, plans[method.name], places, options, tell):
+                    found.append(measurement)
+        except KeyboardInterrupt:
+            interrupted = True
+        result = MethodComparison(
+            case=case.name,
+            mechanism=case.system.mechanism.name,
+            duration=case.duration,
+            samples=case.samples,
+            coordinates=case.system.n,
+            rows=case.system.m,
+            reference=reference,
+            measurements=tuple(found),
+            interrupted=interrupted,
+            parameters=self.parameters,
+        )
+        if folder is not None and found:
+            result.save(folder)
+        return result
+
+
 @checked_arguments()
 def compare_methods(
     case: Case,
     methods: Sequence[str] | None = None,
     *,
     options: ComparisonOptions | None = None,
-    on_progress: Report | None = None,
+    on_progress: OnProgress | None = None,
 ) -> MethodComparison:
-    """Run a motion by every method at every tolerance, and tell time, work and error of each.
-
-    Parameters
-    ----------
-    case : Case
-        From `studies.tracking_case` or `studies.motion_case`.
-    methods : sequence of str, optional
-        From `METHODS`; all by default. One that cannot run is listed with its reason and the others go on.
-    options : ComparisonOptions, optional
-    on_progress : callable, optional
-        Called with what begins, its number and how many runs there are at most.
-
-    Raises
-    ------
-    InputError
-        An unknown method, before anything runs.
-    IntegrationError
-        No converged run to compare with.
-    """
-    options = options or ComparisonOptions()
-    chosen = [find_method(name) for name in dict.fromkeys(METHODS if methods is None else methods)]
-    plans = {method.name: _plan(method, options) for method in chosen}
-    total = sum(map(len, plans.values()))
-    found: list[Measurement] = []
-    reference, interrupted = None, False
-
-    def tell(what: str) -> None:
-        if on_progress is not None:
-            on_progress(what, len(found), total)
-
-    try:
-        tell("reference")
-        reference, places = _reference(case, options)
-        for method in chosen:
-            for measurement in _measurements(case, method, plans[method.name], places, options, tell):
-                found.append(measurement)
-    except KeyboardInterrupt:
-        interrupted = True
-    return MethodComparison(
-        case=case.name,
-        mechanism=case.system.mechanism.name,
-        duration=case.duration,
-        samples=case.samples,
-        coordinates=case.system.n,
-        rows=case.system.m,
-        reference=reference,
-        measurements=tuple(found),
-        interrupted=interrupted,
-    )
+    """Run a motion by every method at every tolerance: `ComparisonStudy(case, methods, options).run()` in one call."""
+    return ComparisonStudy(case, methods, options).run(on_progress=on_progress)
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import os
 import platform
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from paraflex.display import Shown
+from paraflex.campaign import Result
 from paraflex.integrators import DEFAULT_METHOD, METHODS
 
 # Errors at which times are compared [m], and the one in the table.
 LEVELS, TABLE_LEVEL = (1e-3, 1e-4, 1e-5, 1e-6), 1e-5
+# Of a measurement what is no number.
+_TEXTS = ("method", "status", "reason")
 # Packages whose version has a part in the times.
 _PACKAGES = ("paraflex", "numpy", "scipy", "numba", "scikit-sundae")
 
@@ -90,7 +93,7 @@ class Measurement:
 
 
 @dataclass(frozen=True)
-class MethodComparison(Shown):
+class MethodComparison(Result):
     """Wall time against error of several methods on one motion.
 
     Attributes
@@ -107,8 +110,11 @@ class MethodComparison(Shown):
     measurements : tuple of Measurement
     interrupted : bool
         Whether the user stopped it; runs that were not begun are missing.
+    parameters : mapping or None
+        Kept as provenance.
     """
 
+    values_file = "compare-methods.json"
     case: str
     mechanism: str
     duration: float
@@ -118,6 +124,26 @@ class MethodComparison(Shown):
     reference: Reference | None
     measurements: tuple[Measurement, ...]
     interrupted: bool = False
+    parameters: dict[str, Any] | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether every run was begun."""
+        return not self.interrupted
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Every run, (run,): its method, tolerance or step, status, error, time and work; NaN for what it has not."""
+        columns = {
+            each.name: ("run", [getattr(run, each.name) for run in self.measurements])
+            for each in fields(Measurement)
+            if each.name != "warnings"
+        }
+        numbers = {
+            name: (dim, np.array(values, dtype=str if name in _TEXTS else float))
+            for name, (dim, values) in columns.items()
+        }
+        return xr.Dataset(numbers, attrs={"case": self.case, "mechanism": self.mechanism})
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -157,9 +183,9 @@ class MethodComparison(Shown):
         reached = {method: time for method, time in times.items() if time is not None}
         return min(reached, key=lambda method: reached[method]) if reached else None
 
-    def figures(self) -> dict[str, Any]:
-        """The comparison as plain numbers: what `compare-methods.json` holds."""
-        return {
+    def to_dict(self) -> dict[str, Any]:
+        """The comparison in plain values: what `compare-methods.json` holds."""
+        out = {
             "mechanism": self.mechanism,
             "case": self.case,
             "duration": self.duration,
@@ -173,6 +199,7 @@ class MethodComparison(Shown):
             "machine": machine(),
             "versions": _versions(),
         }
+        return out if self.parameters is None else out | {"parameters": self.parameters}
 
     def _of_method(self, name: str) -> dict[str, Any]:
         method = METHODS[name]

@@ -10,13 +10,12 @@ from paraflex.results import summary
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 from paraflex.results.validity import validity_line
-from paraflex.studies.agreement import agreement
+from paraflex.studies.agreement import Verification
 from paraflex.studies.comparison import MethodComparison
 from paraflex.studies.optimisation import IdentificationResult, IndicesResult, OptimisationResult, SearchResult
 from paraflex.studies.sensitivities import Sensitivities
 from paraflex.studies.sweeps import SweepResult
 from paraflex.studies.tracking import StudyResult
-from paraflex.studies.verification import Verification
 
 # Rows of tables that could be long.
 _MOST = 60
@@ -64,7 +63,7 @@ def sweep_html(result: SweepResult) -> str:
         ("in this session", rate),
         ("table", str(result.table)),
     ]
-    return page(f"sweep: {_state(result.finished, result.interrupted)}", facts(told))
+    return page(f"sweep: {_state(result.complete, result.interrupted)}", facts(told))
 
 
 @view.register(OptimisationResult)
@@ -122,7 +121,7 @@ def indices_html(result: IndicesResult) -> str:
     ]  # fmt: skip
     heads = ("metric", "path", "mode", "parameter", "first order", "±", "total", "±")
     shown = table(heads, rows[:_MOST], "with half the widths of the intervals of 95 %")
-    return page(f"Sobol indices: {_state(result.sweep.finished, result.sweep.interrupted)}", shown, _more(len(rows)))
+    return page(f"Sobol indices: {_state(result.sweep.complete, result.sweep.interrupted)}", shown, _more(len(rows)))
 
 
 @view.register(Sensitivities)
@@ -143,7 +142,7 @@ def sensitivities_html(found: Sensitivities) -> str:
 @view.register(Verification)
 def verification_html(verification: Verification) -> str:
     """Every model in every mode: tracking error, distance from the reference, time."""
-    figures = agreement(verification)
+    figures = verification.to_dict()
     rows = [
         (mode, name, told["status"], _millimetres(told.get("tracking_error")), _millimetres(told.get("distance_max")),
          told.get("steps"), told.get("wall_time"))
@@ -164,7 +163,7 @@ def verification_html(verification: Verification) -> str:
 @view.register(MethodComparison)
 def comparison_html(comparison: MethodComparison) -> str:
     """Every run of every method: error, time, steps."""
-    figures = comparison.figures()
+    figures = comparison.to_dict()
     rows = [
         (method["title"], run["tolerance"], run["step"], run["status"], run["error"], run["wall_time"], run["steps"])
         for method in figures["methods"].values()

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import xarray as xr
 
-from paraflex.arguments import checked_arguments, refused
-from paraflex.display import Shown
-from paraflex.errors import IntegrationError, NumericalError
+from paraflex.arguments import CheckedFields, checked_arguments, refused
+from paraflex.campaign import THREADS, OnProgress, Progress, Result, Study, Workers
+from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
-from paraflex.results import tracking_dataset
+from paraflex.results import summary, tracking_dataset
 from paraflex.results.following import ErrorSpan
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
 
@@ -33,12 +35,12 @@ class Simulator(Protocol):
 
 
 @dataclass(frozen=True)
-class StudyResult(Shown):
+class StudyResult(Result):
     """What became of the modes of a study.
 
     Attributes
     ----------
-    data : xarray.Dataset or None
+    dataset : xarray.Dataset or None
         Of every mode that ran, whole or in part; None where none did.
     failed : dict
         Modes that could not start, each with its reason.
@@ -46,9 +48,15 @@ class StudyResult(Shown):
         Whether the user stopped it.
     """
 
-    data: xr.Dataset | None
+    data_file, values_file = "results.nc", "summary.json"
+    dataset: xr.Dataset | None
     failed: dict[str, str]
     interrupted: bool
+
+    @property
+    def data(self) -> xr.Dataset | None:
+        """Of every mode that ran, whole or in part; None where none did."""
+        return self.dataset
 
     @property
     def complete(self) -> bool:
@@ -57,36 +65,25 @@ class StudyResult(Shown):
             not self.failed and self.data is not None and bool(self.data["status"].isin(["complete", "stopped"]).all())
         )
 
+    def to_dict(self) -> dict[str, Any]:
+        """The figures of all modes in plain values; why modes failed where none ran."""
+        return {"failed": self.failed} if self.data is None else summary(self.data, self.failed)
 
-@checked_arguments()
-def run_study(
-    task: TrackingTask,
-    modes: Sequence[str | ActuationMode],
-    *,
-    options: IntegrationOptions | None = None,
-    parameters: dict | None = None,
-    on_progress: Callable[[str, float], None] | None = None,
-    workers: int | None = None,
-    method: Simulator | None = None,
-    error: ErrorSpan | str = ErrorSpan.MOTION,
-    warning: bool = True,
-    findings: Iterable[Finding] = (),
-) -> StudyResult:
-    """Simulate every mode; one that fails is reported and the others go on.
 
-    Parameters
+@dataclass(frozen=True)
+class TrackingStudy(Study[StudyResult], CheckedFields):
+    """One path in several actuation modes.
+
+    Attributes
     ----------
     task : TrackingTask
     modes : sequence of str or ActuationMode
-    options : IntegrationOptions, optional
-    parameters : dict, optional
+    options : IntegrationOptions or None
+        The defaults where None.
+    parameters : dict or None
         Kept as provenance.
-    on_progress : callable, optional
-        Called with the mode's name and the time reached [s]; called from several threads.
-    workers : int, optional
-        Threads; as many as there are processors by default. The results do not depend on it.
-    method : Simulator, optional
-        `simulate` with the options by default.
+    method : Simulator or None
+        `simulate` with the options where None.
     error : ErrorSpan or str
         Which tracking error ranks the modes: that of the "motion", or of the "whole" run, dwell included.
     warning : bool
@@ -94,55 +91,112 @@ def run_study(
         a `ResultWarning`.
     findings : iterable of Finding
         Reasons to doubt the model, found before; kept with the results.
-
-    Returns
-    -------
-    StudyResult
-
-    Raises
-    ------
-    InputError
-        A mode that is none of the mechanism's, before anything runs.
     """
-    if method is not None and not callable(method):
-        remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in a way of its own"
-        raise refused(method, "method", "a function", remedy)
-    chosen = list(dict.fromkeys(task.mode(mode) for mode in modes))
-    stop = threading.Event()
 
-    def run(mode: ActuationMode) -> TrackingRun | str | None:
-        def report(time: float) -> None:
+    _own = ("method",)
+    task: TrackingTask
+    modes: Sequence[str | ActuationMode]
+    options: IntegrationOptions | None = None
+    parameters: dict | None = None
+    method: Simulator | None = None
+    error: ErrorSpan | str = ErrorSpan.MOTION
+    warning: bool = True
+    findings: Iterable[Finding] = ()
+
+    def run(
+        self,
+        folder: str | Path | None = None,
+        *,
+        workers: Workers | None = None,
+        on_progress: OnProgress | None = None,
+    ) -> StudyResult:
+        """Simulate every mode; one that fails is reported and the others go on. See `Study.run`.
+
+        Progress is told of each mode in seconds of its motion. Workers are threads.
+
+        Raises
+        ------
+        InputError
+            A mode that is none of the mechanism's, or workers that are no threads, before anything runs.
+        """
+        if self.method is not None and not callable(self.method):
+            remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in a way of its own"
+            raise refused(self.method, "method", "a function", remedy)
+        workers = workers or Workers()
+        if workers.engine != THREADS:
+            raise InputError("modes run in threads", field="workers", value=workers.engine, remedy="leave it out")
+        chosen = list(dict.fromkeys(self.task.mode(mode) for mode in self.modes))
+        stop = threading.Event()
+        # The kernels release the GIL, so threads are enough; each run is the same whichever thread it is in.
+        with ThreadPoolExecutor(workers.number or os.cpu_count()) as pool:
+            futures = [pool.submit(self._mode, mode, stop, on_progress) for mode in chosen]
+            try:
+                wait(futures)
+            except KeyboardInterrupt:
+                # Ctrl-C reaches the main thread only; the runs hear of it at their next report and keep what they have.
+                stop.set()
+        outcomes = {mode.name: future.result() for mode, future in zip(chosen, futures, strict=True)}
+        result = self._result(outcomes, interrupted=stop.is_set())
+        if folder is not None and result.data is not None:
+            result.save(folder)
+        return result
+
+    def _mode(
+        self, mode: ActuationMode, stop: threading.Event, on_progress: OnProgress | None
+    ) -> TrackingRun | str | None:
+        """A mode's run, or why there is none."""
+        end, began = float(self.task.motion.t[-1]), time.perf_counter()
+
+        def report(reached: float) -> None:
             if stop.is_set():
                 raise KeyboardInterrupt
             if on_progress is not None:
-                on_progress(mode.name, time)
+                on_progress(Progress(reached, end, reached, time.perf_counter() - began, mode.name))
 
         if stop.is_set():
             return None
         try:
-            if method is not None:
-                return method(task, mode, on_progress=report)
-            return simulate(task, mode, options=options, on_progress=report, warning=False)
+            if self.method is not None:
+                return self.method(self.task, mode, on_progress=report)
+            return simulate(self.task, mode, options=self.options, on_progress=report, warning=False)
         except IntegrationError as error:
             return error.partial
         except NumericalError as error:
             return str(error)
 
-    # The kernels release the GIL, so threads are enough; each run is the same whichever thread it is in.
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        futures = [pool.submit(run, mode) for mode in chosen]
-        try:
-            wait(futures)
-        except KeyboardInterrupt:
-            # Ctrl-C reaches the main thread only; the runs hear of it at their next report and keep what they have.
-            stop.set()
-    outcomes = {mode.name: future.result() for mode, future in zip(chosen, futures, strict=True)}
-    runs = [outcome for outcome in outcomes.values() if isinstance(outcome, TrackingRun)]
-    if warning:
-        for run_of_mode in runs:
-            run_of_mode.warn()
-    failed = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
-    data = None
-    if runs:
-        data = tracking_dataset(runs, options=options, parameters=parameters, error=error, findings=findings)
-    return StudyResult(data, failed, stop.is_set())
+    def _result(self, outcomes: Mapping[str, TrackingRun | str | None], *, interrupted: bool) -> StudyResult:
+        runs = [outcome for outcome in outcomes.values() if isinstance(outcome, TrackingRun)]
+        if self.warning:
+            for run in runs:
+                run.warn()
+        failed = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, str)}
+        data = None
+        if runs:
+            data = tracking_dataset(
+                runs, options=self.options, parameters=self.parameters, error=self.error, findings=self.findings
+            )
+        return StudyResult(data, failed, interrupted)
+
+
+@checked_arguments()
+def run_study(
+    task: TrackingTask,
+    modes: Sequence[str | ActuationMode],
+    *,
+    workers: int | None = None,
+    on_progress: OnProgress | None = None,
+    **details: Any,
+) -> StudyResult:
+    """Simulate every mode: `TrackingStudy(task, modes, **details).run()` in one call.
+
+    Parameters
+    ----------
+    task, modes, **details
+        Fields of `TrackingStudy`: options, parameters, method, error, warning, findings.
+    workers : int, optional
+        Threads; as many as there are processors by default. The results do not depend on it.
+    on_progress : callable, optional
+        See `Study.run`.
+    """
+    study = TrackingStudy(task, modes, **details)
+    return study.run(workers=Workers(number=workers), on_progress=on_progress)

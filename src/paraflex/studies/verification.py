@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from functools import partial
+from pathlib import Path
 
-import xarray as xr
-
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
-from paraflex.display import Shown
+from paraflex.arguments import CheckedFields, checked_arguments
+from paraflex.campaign import OnProgress, Progress, Study, Workers
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
@@ -26,20 +24,12 @@ from paraflex.mechanism import (
     given_shapes,
     proportional_segments,
 )
-from paraflex.results import tracking_dataset
 from paraflex.results.following import ErrorSpan
 from paraflex.results.record import Record, record
 from paraflex.simulate import TrackingTask, simulate
+from paraflex.studies.agreement import ModelRuns, Refinement, Verification
 
 FIDELITIES = ("rigid", "ked", "linear", "second-order", "segments")
-
-
-class Refinement(Enum):
-    """Runs of one model: as asked for, and finer ones whose distance from that shows how converged it is."""
-
-    NONE = "base"
-    STEP = "finer step"
-    MESH = "finer mesh"
 
 
 @dataclass(frozen=True)
@@ -72,89 +62,95 @@ class VerificationOptions(CheckedFields):
 
 
 @dataclass(frozen=True)
-class ModelRuns:
-    """What became of one model in one mode.
-
-    Attributes
-    ----------
-    records : mapping of Refinement to Record
-        Runs that were begun; one that failed says so in its figures.
-    failure : str
-        Why one of them failed; empty where none did.
-    """
-
-    records: Mapping[Refinement, Record]
-    failure: str = ""
-
-    def finished(self, level: Refinement | str) -> Record | None:
-        """A run that got to its end."""
-        run = self.records.get(as_enum(Refinement, level, "level"))
-        return run if run is not None and run.figures["status"] == "complete" else None
-
-    @property
-    def base(self) -> Record | None:
-        """The run to compare, if it got to its end."""
-        return self.finished(Refinement.NONE)
-
-
-@given_as("a verification", "what verify returns")
-@dataclass(frozen=True)
-class Verification(Shown):
-    """Runs of all models in all modes.
+class VerificationStudy(Study[Verification], CheckedFields):
+    """Every model in every mode, each with a finer step and a finer mesh.
 
     Attributes
     ----------
     task : TrackingTask
-    models : tuple of str
-    runs : mapping of str to mapping of str to ModelRuns
-        By mode and model.
-    interrupted : bool
-        Whether the user stopped it; models that were not begun are missing.
+        Of a mechanism with flexible beams; its own geometry does not matter.
+    modes : sequence of str or ActuationMode
+    models : sequence of str
+        From FIDELITIES and engines.ENGINES.
+    options : VerificationOptions or None
+        The defaults where None.
+    parameters : dict or None
+        Kept as provenance.
+    error : ErrorSpan or str
+        What tracking errors are of: the "motion", or the "whole" run, dwell included.
     """
 
     task: TrackingTask
-    models: tuple[str, ...]
-    runs: Mapping[str, Mapping[str, ModelRuns]]
-    interrupted: bool = False
+    modes: Sequence[str | ActuationMode]
+    models: Sequence[str] = FIDELITIES
+    options: VerificationOptions | None = None
+    parameters: dict | None = None
+    error: ErrorSpan | str = ErrorSpan.MOTION
 
-    @property
-    def complete(self) -> bool:
-        """Whether every run got to its end."""
-        return not self.interrupted and not any(
-            runs.failure for by_model in self.runs.values() for runs in by_model.values()
-        )
+    def run(
+        self,
+        folder: str | Path | None = None,
+        *,
+        workers: Workers | None = None,
+        on_progress: OnProgress | None = None,
+    ) -> Verification:
+        """Run all models; one that fails does not stop the others. See `Study.run`.
 
-    def dataset(self, *, parameters: dict | None = None, error: ErrorSpan | str = ErrorSpan.MOTION) -> xr.Dataset:
-        """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
+        Runs come one after the other, so that their wall times can be compared: workers have no part in it.
 
-        Modes that every model began; where there is none, models that every mode begun has.
+        Raises
+        ------
+        InputError
+            An unknown model or mode, an engine that is not installed, or one that cannot express the mechanism: before
+            anything runs.
         """
-        begun = {
-            mode: {name: runs.records[Refinement.NONE] for name, runs in by_model.items() if runs.records}
-            for mode, by_model in self.runs.items()
-        }
-        begun = {mode: records for mode, records in begun.items() if records}
-        kept = {mode: records for mode, records in begun.items() if len(records) == len(self.models)} or begun
-        names = [name for name in self.models if kept and all(name in records for records in kept.values())]
-        if not names:
-            raise InputError("no run to keep", field="models", remedy="see why the runs failed")
-        parts = [
-            tracking_dataset([records[name] for records in kept.values()], parameters=parameters, error=error)
-            for name in names
+        if workers is not None:
+            raise InputError("runs come one after the other", field="workers", remedy="leave it out")
+        models = tuple(dict.fromkeys(self.models))
+        for name in models:
+            check_model(name, self.task.mechanism)
+            if name in ENGINES:
+                check_dwell(name, self.task)
+        chosen = list(dict.fromkeys(self.task.mode(mode) for mode in self.modes))
+        runs: dict[str, dict[str, ModelRuns]] = {mode.name: {} for mode in chosen}
+        interrupted = self._do(chosen, models, runs, on_progress)
+        error = as_enum(ErrorSpan, self.error, "error")
+        result = Verification(self.task, models, runs, interrupted, self.parameters, error)
+        if folder is not None:
+            result.save(folder)
+        return result
+
+    def _do(
+        self,
+        modes: Sequence[ActuationMode],
+        models: Sequence[str],
+        runs: dict[str, dict[str, ModelRuns]],
+        on_progress: OnProgress | None,
+    ) -> bool:
+        """Fill in the runs; whether the user stopped it."""
+        task, options = self.task, self.options or VerificationOptions()
+        plan = [
+            (mode, name, level)
+            for mode in modes
+            for name in models
+            for level in Refinement
+            if _has_meaning(name, level, task.mechanism)
         ]
-        methods = [part.attrs.pop("method") for part in parts]
-        data = xr.concat(parts, xr.Variable("model", names), combine_attrs="drop_conflicts", join="exact")
-        data.attrs["reference"] = reference_model(names)
-        return data.assign(method=("model", methods))
-
-
-@checked_arguments()
-def reference_model(models: Sequence[str]) -> str:
-    """What the others are compared with: second-order geometry, or else the first that has flexible links."""
-    for name in ("second-order", "exudyn", "segments", "mujoco", "linear", "ked"):
-        if name in models:
-            return name
-    return models[0]
+        for number, (mode, name, level) in enumerate(plan):
+            so_far = runs[mode.name].get(name, ModelRuns({}))
+            if so_far.failure:
+                continue
+            try:
+                if on_progress is not None:
+                    on_progress(Progress(number, len(plan), number, doing=f"{mode.name}: {name}, {level.value}"))
+                extended = _extended(so_far, level, partial(run_model, task, mode, name, level, options))
+            except KeyboardInterrupt:
+                return True
+            # A run that was stopped returns what it has; it is none to compare.
+            if any(run.figures["status"] == "interrupted" for run in extended.records.values()):
+                return True
+            runs[mode.name][name] = extended
+        return False
 
 
 @checked_arguments()
@@ -164,59 +160,10 @@ def verify(
     *,
     models: Sequence[str] = FIDELITIES,
     options: VerificationOptions | None = None,
-    on_progress: Callable[[str, int, int], None] | None = None,
+    on_progress: OnProgress | None = None,
 ) -> Verification:
-    """Run every model in every mode, each with a finer step and a finer mesh; one that fails does not stop the others.
-
-    Runs come one after the other, so that their wall times can be compared.
-
-    Parameters
-    ----------
-    task : TrackingTask
-        Of a mechanism with flexible beams; its own geometry does not matter.
-    modes : sequence of str or ActuationMode
-    models : sequence of str
-        From FIDELITIES and engines.ENGINES.
-    options : VerificationOptions, optional
-    on_progress : callable, optional
-        Called with what begins, its number and how many runs there are.
-
-    Raises
-    ------
-    InputError
-        An unknown model or mode, an engine that is not installed, or one that cannot express the mechanism: before
-        anything runs.
-    """
-    options = options or VerificationOptions()
-    models = list(dict.fromkeys(models))
-    for name in models:
-        check_model(name, task.mechanism)
-        if name in ENGINES:
-            check_dwell(name, task)
-    chosen = list(dict.fromkeys(task.mode(mode) for mode in modes))
-    plan = [
-        (mode, name, level)
-        for mode in chosen
-        for name in models
-        for level in Refinement
-        if _has_meaning(name, level, task.mechanism)
-    ]
-    runs: dict[str, dict[str, ModelRuns]] = {mode.name: {} for mode in chosen}
-    for number, (mode, name, level) in enumerate(plan):
-        so_far = runs[mode.name].get(name, ModelRuns({}))
-        if so_far.failure:
-            continue
-        try:
-            if on_progress is not None:
-                on_progress(f"{mode.name}: {name}, {level.value}", number, len(plan))
-            extended = _extended(so_far, level, partial(run_model, task, mode, name, level, options))
-        except KeyboardInterrupt:
-            return Verification(task, tuple(models), runs, True)
-        # A run that was stopped returns what it has; it is none to compare.
-        if any(run.figures["status"] == "interrupted" for run in extended.records.values()):
-            return Verification(task, tuple(models), runs, True)
-        runs[mode.name][name] = extended
-    return Verification(task, tuple(models), runs)
+    """Run every model in every mode: `VerificationStudy(task, modes, models, options).run()` in one call."""
+    return VerificationStudy(task, modes, models, options).run(on_progress=on_progress)
 
 
 def _extended(runs: ModelRuns, level: Refinement, run: Callable[[], Record]) -> ModelRuns:

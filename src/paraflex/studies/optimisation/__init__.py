@@ -1,7 +1,13 @@
 """Designs looked for: what minimises metrics, what reproduces them, and which parameters matter at all."""
 
 from paraflex.studies.optimisation.confidence import Confidence
-from paraflex.studies.optimisation.identify import IdentificationResult, Reached, identify
+from paraflex.studies.optimisation.identify import (
+    IdentificationResult,
+    IdentificationStudy,
+    Reached,
+    identify,
+    load_identification,
+)
 from paraflex.studies.optimisation.indices import (
     IndicesResult,
     IndicesStudy,
@@ -10,20 +16,25 @@ from paraflex.studies.optimisation.indices import (
     sobol_indices,
 )
 from paraflex.studies.optimisation.objective import Objective, Target
-from paraflex.studies.optimisation.optimise import OptimisationResult, optimise
+from paraflex.studies.optimisation.optimise import (
+    OptimisationResult,
+    OptimisationStudy,
+    load_optimisation,
+    optimise,
+)
 from paraflex.studies.optimisation.result import SearchResult
-from paraflex.studies.optimisation.session import Progress
-from paraflex.studies.optimisation.study import DesignStudy, Search, load_identification, load_optimisation
+from paraflex.studies.optimisation.study import DesignStudy, Search
 
 __all__ = [
     "Confidence",
     "DesignStudy",
     "IdentificationResult",
+    "IdentificationStudy",
     "IndicesResult",
     "IndicesStudy",
     "Objective",
     "OptimisationResult",
-    "Progress",
+    "OptimisationStudy",
     "Reached",
     "Search",
     "SearchResult",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from paraflex.studies.optimisation.evaluate import Evaluated
 from paraflex.studies.optimisation.fit import residuals
+from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.study import DesignStudy
 
 Array = NDArray[np.float64]
@@ -63,7 +64,7 @@ class Confidence:
         """Whether the targets tell the parameters apart."""
         return self.condition < ILL_CONDITIONED
 
-    def figures(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """In plain values: JSON has no infinity and no numbers that are none."""
         return {
             "deviations": dict(self.deviations),
@@ -94,12 +95,15 @@ def student_factor(freedom: int) -> float:
     return float(stdtrit(freedom, 0.5 * (1.0 + ONE_DEVIATION)))
 
 
-def confidence(study: DesignStudy, design: Evaluated, jacobian: Array, bound: Mapping[str, str]) -> Confidence:
+def confidence(
+    study: DesignStudy, targets: Sequence[Target], design: Evaluated, jacobian: Array, bound: Mapping[str, str]
+) -> Confidence:
     """What a Jacobian says of a design found.
 
     Parameters
     ----------
     study : DesignStudy
+    targets : sequence of Target
     design : Evaluated
     jacobian : (targets, parameters) array
         By the place in the unit cube.
@@ -111,7 +115,7 @@ def confidence(study: DesignStudy, design: Evaluated, jacobian: Array, bound: Ma
     _, stretches, directions = np.linalg.svd(jacobian[:, free], full_matrices=True)
     stretches = np.concatenate([stretches, np.zeros(len(free) - stretches.size)])
     sharp = bool(free) and stretches[-1] > np.finfo(float).eps * stretches[0]
-    freedom = len(study.targets) - len(free)
+    freedom = len(targets) - len(free)
     none: dict[str, float | None] = dict.fromkeys(names)
     found = Confidence(
         deviations=none,
@@ -131,10 +135,10 @@ def confidence(study: DesignStudy, design: Evaluated, jacobian: Array, bound: Ma
         spread = np.sqrt(np.diag(covariance))
         found = replace(found, correlation=covariance / np.outer(spread, spread))
     if freedom <= 0:
-        return found.withheld(f"{len(study.targets)} targets leave nothing to judge {len(free)} free parameters by")
+        return found.withheld(f"{len(targets)} targets leave nothing to judge {len(free)} free parameters by")
     if not found.telling:
         return found.withheld("the targets cannot tell the parameters apart")
-    left = _standard_deviation(study, design, freedom)
+    left = _standard_deviation(targets, design, freedom)
     scaled = left * spread * study.per_unit(design.design)[free]
     errors = none | {names[k]: float(x) for k, x in zip(free, scaled, strict=True)}
     factor = student_factor(freedom)
@@ -145,6 +149,7 @@ def confidence(study: DesignStudy, design: Evaluated, jacobian: Array, bound: Ma
 
 def checked(
     study: DesignStudy,
+    targets: Sequence[Target],
     evaluate: Callable[[Sequence[tuple[float, ...]]], list[Evaluated]],
     design: Evaluated,
     jacobian: Array,
@@ -162,7 +167,7 @@ def checked(
     _, stretches, directions = np.linalg.svd(jacobian[:, free], full_matrices=False)
     middle = study.unit(design.design)
     steps = np.zeros((len(free), middle.size))
-    steps[:, free] = directions * (_standard_deviation(study, design, found.freedom) / stretches)[:, None]
+    steps[:, free] = directions * (_standard_deviation(targets, design, found.freedom) / stretches)[:, None]
     for step in steps:
         # Within the bounds, to both sides alike.
         room = np.minimum(middle, 1.0 - middle) / np.maximum(np.abs(step), np.finfo(float).tiny)
@@ -173,7 +178,7 @@ def checked(
         along = ", ".join(f"{1e2 * step[j]:+.2g} % {study.setting.names[j]}" for j in free)
         if not all(each.complete for each in sides):
             return found.withheld(f"a design one standard error away does not run (along {along} of the ranges)")
-        change = 0.5 * (residuals(study.targets, sides[1]) - residuals(study.targets, sides[0]))
+        change = 0.5 * (residuals(targets, sides[1]) - residuals(targets, sides[0]))
         said = jacobian @ step
         off = float(np.linalg.norm(change - said) / np.linalg.norm(said))
         if not off <= _AGREES:
@@ -184,6 +189,6 @@ def checked(
     return found
 
 
-def _standard_deviation(study: DesignStudy, design: Evaluated, freedom: int) -> float:
+def _standard_deviation(targets: Sequence[Target], design: Evaluated, freedom: int) -> float:
     """Of the residuals, from what is left of them."""
-    return float(np.sqrt(np.sum(residuals(study.targets, design) ** 2) / freedom))
+    return float(np.sqrt(np.sum(residuals(targets, design) ** 2) / freedom))

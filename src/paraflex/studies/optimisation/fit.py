@@ -35,7 +35,7 @@ def closest(targets: Sequence[Target], designs: Sequence[Evaluated]) -> Evaluate
     return min(complete, key=lambda each: (root_mean_square(targets, each), each.number), default=None)
 
 
-def fit(study: DesignStudy, evaluate: Evaluate, slopes: Slopes, start: Evaluated) -> str:
+def fit(study: DesignStudy, targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: Evaluated) -> str:
     """Reduce the residuals from a start; why it stopped, in words.
 
     A trial that does not run has infinite residuals, which SciPy's trust region answers by a shorter step.
@@ -51,10 +51,10 @@ def fit(study: DesignStudy, evaluate: Evaluate, slopes: Slopes, start: Evaluated
     tolerance = _TOLERANCE if given is None else given
 
     def values(x: Array) -> Array:
-        return residuals(study.targets, evaluate([study.design(x)])[0])
+        return residuals(targets, evaluate([study.design(x)])[0])
 
     def jacobian(x: Array) -> Array:
-        return residual_slopes(study.targets, slopes(evaluate([study.design(x)])[0]))
+        return residual_slopes(targets, slopes(evaluate([study.design(x)])[0]))
 
     found = least_squares(
         values,

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from paraflex.arguments import checked_arguments
-from paraflex.campaign import THREADS, Engine, open_engine
-from paraflex.studies.optimisation.best import write_best
+from paraflex.arguments import checked_arguments, given_as
+from paraflex.campaign import THREADS, Engine, OnProgress, Progress, Study, Workers, kept_in
+from paraflex.designs.schema import study_table
+from paraflex.errors import InputError, suggestion
 from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
 from paraflex.studies.optimisation.fit import closest, fit, residual_slopes, root_mean_square
 from paraflex.studies.optimisation.objective import Target
-from paraflex.studies.optimisation.optimise import at_bounds, failures
 from paraflex.studies.optimisation.problem import running_start
-from paraflex.studies.optimisation.result import SearchResult
-from paraflex.studies.optimisation.session import RESULT, Progress, Session, sampled_start, search
+from paraflex.studies.optimisation.result import SearchResult, at_bounds, of_session
+from paraflex.studies.optimisation.schema import StudyTable, TargetTable
+from paraflex.studies.optimisation.session import Session, sampled_start, search
 from paraflex.studies.optimisation.slopes import ExactSlopes, no_exact_slopes, slopes_of
-from paraflex.studies.optimisation.study import DesignStudy, load_identification
-from paraflex.writing import GO_ON, write_json
+from paraflex.studies.optimisation.study import DesignStudy, SweepStudy, base_study, read_search
 
 
 @dataclass(frozen=True)
@@ -42,9 +41,9 @@ class Reached:
     start: float
     residual: float
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """In plain values."""
-        return self.target.told() | {"reached": self.reached, "start": self.start, "residual": self.residual}
+        return self.target.to_dict() | {"reached": self.reached, "start": self.start, "residual": self.residual}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,70 +61,126 @@ class IdentificationResult(SearchResult):
         "exact", or "differences" and why.
     """
 
+    kind: ClassVar[str] = "identification"
     residual: float | None
     start_residual: float | None
     targets: tuple[Reached, ...]
     confidence: Confidence | None
     derivatives: str
 
-    def figures(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """In plain values; without times and counts of a session, which are no results."""
-        return super().figures() | {
-            "targets": [each.told() for each in self.targets],
-            "confidence": None if self.confidence is None else self.confidence.figures(),
+        return super().to_dict() | {
+            "targets": [each.to_dict() for each in self.targets],
+            "confidence": None if self.confidence is None else self.confidence.to_dict(),
         }
+
+
+@given_as("an identification", "what load_identification returns")
+@dataclass(frozen=True)
+class IdentificationStudy(DesignStudy, Study[IdentificationResult]):
+    """A search for the parameters that reproduce targets, by least squares within bounds; see `DesignStudy`.
+
+    Attributes
+    ----------
+    targets : tuple of Target
+    """
+
+    targets: tuple[Target, ...]
+    least_squares: ClassVar[bool] = True
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Metrics that count."""
+        return tuple(dict.fromkeys(target.column for target in self.targets))
+
+    def sought(self) -> dict[str, Any]:
+        """The targets, in plain values."""
+        return {"targets": [vars(target) for target in self.targets]}
+
+    def run(
+        self,
+        folder: str | Path | None = None,
+        *,
+        workers: Workers | None = None,
+        on_progress: OnProgress | None = None,
+        run: RunTask | None = None,
+    ) -> IdentificationResult:
+        """Look for the parameters; see `OptimisationStudy.run`."""
+        folder, solution = kept_in(folder), _Solution(self)
+        watch = None if on_progress is None else _watch(self, on_progress)
+        session = search(self, folder, (workers or Workers()).open, solution.solve, watch, run=run)
+        result = _result(self, folder, session, solution)
+        result.write(self)
+        return result
+
+
+@checked_arguments()
+def load_identification(file: str | Path) -> IdentificationStudy:
+    """Read the study file of an identification; see `load_optimisation`."""
+    with study_table(StudyTable, file) as (table, folder):
+        if not table.target:
+            raise InputError("is missing", field="target", remedy="add [[target]] tables with metric and value")
+        if table.search.method is not None:
+            raise InputError(
+                "an identification is a problem of least squares", field="search.method", value=table.search.method,
+                remedy="leave it out",
+            )  # fmt: skip
+        columns = {f"target.{k}.metric": target.metric for k, target in enumerate(table.target)}
+        base = base_study(table, folder, columns)
+        targets = tuple(_target(entry, k, base) for k, entry in enumerate(table.target))
+        return IdentificationStudy(base, read_search(table.search), targets)
 
 
 @checked_arguments()
 def identify(
-    study: DesignStudy | str | Path,
+    study: IdentificationStudy | str | Path,
     folder: str | Path,
     *,
     engine: str | Engine = THREADS,
     workers: int | None = None,
     cluster: str | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: OnProgress | None = None,
     run: RunTask | None = None,
 ) -> IdentificationResult:
-    """Look for the parameters that reproduce the targets of a study, by least squares within bounds.
+    """Look for the parameters that reproduce the targets of a study, or of its file.
 
-    Parameters
-    ----------
-    study : DesignStudy, str or Path
-        A study, or its file.
-    folder : str or Path
-        For the table of all runs, `result.json` and `best.toml`; one that another session left is gone on with.
-    engine, workers, cluster, on_progress, run
-        See `optimise`.
-
-    Returns
-    -------
-    IdentificationResult
-        A KeyboardInterrupt ends the session with what is there, marked so.
-
-    Raises
-    ------
-    InputError
-        The study cannot be, its start cannot be run, the folder is another's, or the engine cannot be had.
-    OutputError
-        The folder cannot be written any more; what was written stays, and the same call goes on from there.
+    `study.run(folder)` in one call: see there, and `Workers` for engine, workers and cluster.
     """
-    study = study if isinstance(study, DesignStudy) else load_identification(study)
-    solution = _Solution(study)
-    watch = None if on_progress is None else _watch(study, on_progress)
-    opened = partial(open_engine, engine, workers, cluster)
-    session = search(study, Path(folder), opened, solution.solve, watch, run=run)
-    result = _result(study, Path(folder), session, solution)
-    write_json(Path(folder) / RESULT, {"kind": "identification", "name": study.name} | result.figures(), remedy=GO_ON)
-    if result.residual is not None:
-        write_best(Path(folder), study, tuple(result.values.values()))
-    return result
+    study = study if isinstance(study, IdentificationStudy) else load_identification(study)
+    return study.run(folder, workers=Workers(engine, workers, cluster), on_progress=on_progress, run=run)
+
+
+def _target(entry: TargetTable, number: int, base: SweepStudy) -> Target:
+    field, setting = f"target.{number}", base.setting
+    path = _one(f"{field}.path", entry.path, setting.paths)
+    mode = _one(f"{field}.mode", entry.mode, setting.modes)
+    if entry.relative and entry.value == 0.0:
+        raise InputError(
+            "nothing is relative to zero", field=f"{field}.value", value=0.0, remedy="say relative = false"
+        )
+    if not entry.weight > 0.0:
+        raise InputError("must be positive", field=f"{field}.weight", value=entry.weight, remedy="leave the target out")
+    run = setting.paths.index(path) * len(setting.modes) + setting.modes.index(mode)
+    return Target(entry.metric, run, path, mode, entry.value, entry.weight, entry.relative)
+
+
+def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:
+    if name is None and len(known) == 1:
+        return known[0]
+    if name is None:
+        raise InputError(
+            "the study has several, and none is named", field=field, remedy=f"choose from {', '.join(known)}"
+        )
+    if name not in known:
+        raise InputError("the study has none of that name", field=field, value=name, remedy=suggestion(name, known))
+    return name
 
 
 class _Solution:
     """The search itself; keeps where it ended, what derivatives there say, and how they were taken."""
 
-    def __init__(self, study: DesignStudy) -> None:
+    def __init__(self, study: IdentificationStudy) -> None:
         self.study = study
         self.best: Evaluated | None = None
         self.confidence: Confidence | None = None
@@ -136,20 +191,20 @@ class _Solution:
         study, slopes = self.study, slopes_of(self.study, evaluate)
         running_start(study, evaluate)
         start = sampled_start(study, evaluate, lambda designs: closest(study.targets, designs))
-        stopped = fit(study, evaluate, slopes, start)
+        stopped = fit(study, study.targets, evaluate, slopes, start)
         self.best = best = closest(study.targets, evaluate.history)
         assert best is not None
         try:
             jacobian = residual_slopes(study.targets, slopes(best))
-            found = confidence(study, best, jacobian, at_bounds(study, best.design))
-            self.confidence = checked(study, evaluate, best, jacobian, found)
+            found = confidence(study, study.targets, best, jacobian, at_bounds(study, best.design))
+            self.confidence = checked(study, study.targets, evaluate, best, jacobian, found)
         except LimitReached:
             pass
         self.derivatives = _how(study, slopes)
         return stopped
 
 
-def _how(study: DesignStudy, slopes: object) -> str:
+def _how(study: IdentificationStudy, slopes: object) -> str:
     """How derivatives were taken, and why not exactly."""
     if isinstance(slopes, ExactSlopes):
         others = list(dict.fromkeys(slopes.reasons))
@@ -158,32 +213,19 @@ def _how(study: DesignStudy, slopes: object) -> str:
     return f"differences ({reason})" if reason else "differences"
 
 
-def _result(study: DesignStudy, folder: Path, session: Session, solution: _Solution) -> IdentificationResult:
-    history, names = session.evaluate.history, study.setting.names
-    start, best = session.evaluate.known.get(study.start), solution.best or closest(study.targets, history)
+def _result(study: IdentificationStudy, folder: Path, session: Session, solution: _Solution) -> IdentificationResult:
+    history, targets = session.evaluate.history, study.targets
+    start, best = session.evaluate.known.get(study.start), solution.best or closest(targets, history)
     running = start is not None and start.complete
-    failed, reasons = failures(history)
     return IdentificationResult(
-        folder=folder,
-        table=session.table,
-        values={} if best is None else dict(zip(names, best.design, strict=True)),
-        start=dict(zip(names, study.start, strict=True)),
-        residual=None if best is None else root_mean_square(study.targets, best),
-        start_residual=root_mean_square(study.targets, start) if start is not None and running else None,
-        targets=tuple(_reached(target, best, start) for target in study.targets) if best and start and running else (),
+        **of_session(study, folder, session, best),
+        residual=None if best is None else root_mean_square(targets, best),
+        start_residual=root_mean_square(targets, start) if start is not None and running else None,
+        targets=tuple(_reached(target, best, start) for target in targets) if best and start and running else (),
         confidence=solution.confidence,
         derivatives=solution.derivatives,
-        bounds={} if best is None else at_bounds(study, best.design),
-        evaluations=len(history),
-        fresh=session.evaluate.fresh,
-        failed=failed,
-        reasons=reasons,
-        stopped=session.stopped,
-        interrupted=session.interrupted,
-        seconds=session.seconds,
         history=tuple(
-            (each.number, root_mean_square(study.targets, each) if each.complete else None, each.complete)
-            for each in history
+            (each.number, root_mean_square(targets, each) if each.complete else None, each.complete) for each in history
         ),
     )
 
@@ -193,12 +235,13 @@ def _reached(target: Target, best: Evaluated, start: Evaluated) -> Reached:
     return Reached(target, reached, before, target.residual(best))
 
 
-def _watch(study: DesignStudy, on_progress: Callable[[Progress], None]) -> Callable[[Evaluate, Evaluated], None]:
+def _watch(study: IdentificationStudy, on_progress: OnProgress) -> Callable[[Evaluate, Evaluated], None]:
     least: list[float] = []
 
     def watch(evaluate: Evaluate, done: Evaluated) -> None:
         if done.complete:
             least[:] = [min([root_mean_square(study.targets, done), *least])]
-        on_progress(Progress(len(evaluate.known), study.search.evaluations, least[0] if least else None))
+        best = least[0] if least else None
+        on_progress(Progress(len(evaluate.known), study.search.evaluations, evaluate.fresh, best=best))
 
     return watch

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.campaign import THREADS, Engine
-from paraflex.designs.run import COMPLETE, Outcome, run_task
+from paraflex.campaign import THREADS, Engine, OnProgress, Study, Workers
+from paraflex.designs.run import COMPLETE, run_task
 from paraflex.designs.samples import RANDOM
 from paraflex.designs.schema import SamplingTable, study_table
-from paraflex.designs.session import SweepProgress, SweepResult, sweep
-from paraflex.designs.study import SweepStudy, make_study
-from paraflex.display import Shown
+from paraflex.designs.sweep import RunTask, SweepStudy, SweptResult, make_study
 from paraflex.errors import InputError, suggestion
 from paraflex.results.metrics import METRICS
 from paraflex.results.summary import finite_or_none
@@ -25,30 +23,9 @@ from paraflex.studies.optimisation.schema import StudyTable
 from paraflex.writing import GO_ON, whole_file, write_json
 
 Array = NDArray[np.float64]
-INDICES, TABLE = "indices.json", "indices.parquet"
+TABLE = "indices.parquet"
 # Base samples unless asked otherwise, and the fewest of which anything can be said.
 _SAMPLES, _FEWEST = 128, 8
-
-
-@dataclass(frozen=True)
-class IndicesStudy:
-    """A sweep over Saltelli's samples.
-
-    Attributes
-    ----------
-    sweep : SweepStudy
-        Its designs are blocks, one a base sample.
-    columns : tuple of str
-        Metrics whose variance is explained.
-    samples : int
-        Base samples.
-    seed : int
-    """
-
-    sweep: SweepStudy
-    columns: tuple[str, ...]
-    samples: int
-    seed: int
 
 
 @dataclass(frozen=True)
@@ -102,26 +79,91 @@ class SobolIndices:
 
 
 @dataclass(frozen=True)
-class IndicesResult(Shown):
-    """Where a study of indices stands after a session.
+class IndicesResult(SweptResult):
+    """Where a study of indices stands after a session; see `SweptResult`.
 
     Attributes
     ----------
-    sweep : SweepResult
-        The runs.
     indices : tuple of SobolIndices
         None before all runs are done.
-    table : Path
-        Of the indices.
     """
 
-    sweep: SweepResult
+    values_file = "indices.json"
     indices: tuple[SobolIndices, ...]
-    table: Path
 
-    def figures(self) -> dict[str, Any]:
+    @property
+    def table(self) -> Path:
+        """Of the indices."""
+        return self.folder / TABLE
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Indices and their confidence, (index, parameter); what each is of, (index,)."""
+        every, one = ("index", "parameter"), ("index",)
+        of_all = {
+            name: (every, np.array([getattr(each, name) for each in self.indices]))
+            for name in ("first", "first_confidence", "total", "total_confidence")
+        }
+        of_one = {
+            name: (one, [getattr(each, name) for each in self.indices])
+            for name in ("metric", "path", "mode", "mean", "deviation", "samples", "dropped")
+        }
+        data = xr.Dataset(of_all | of_one, {"parameter": list(self.indices[0].parameters) if self.indices else []})
+        return data.set_coords(["metric", "path", "mode"])
+
+    def to_dict(self) -> dict[str, Any]:
         """In plain values."""
-        return {"kind": "indices", "indices": [row for each in self.indices for row in each.rows()]}
+        rows = [row for each in self.indices for row in each.rows()]
+        return {"kind": "indices", "name": self.sweep.name, "indices": rows}
+
+
+@dataclass(frozen=True)
+class IndicesStudy(Study[IndicesResult]):
+    """A sweep over Saltelli's samples.
+
+    Attributes
+    ----------
+    sweep : SweepStudy
+        Its designs are blocks, one a base sample.
+    columns : tuple of str
+        Metrics whose variance is explained.
+    samples : int
+        Base samples.
+    seed : int
+    """
+
+    sweep: SweepStudy
+    columns: tuple[str, ...]
+    samples: int
+    seed: int
+
+    def run(
+        self,
+        folder: str | Path | None = None,
+        *,
+        workers: Workers | None = None,
+        on_progress: OnProgress | None = None,
+        run: RunTask = run_task,
+    ) -> IndicesResult:
+        """Do the runs, and find the indices when all are done; see `SweepStudy.run`.
+
+        The folder gets the sweep's table, `indices.parquet` and `indices.json`.
+
+        Raises
+        ------
+        InputError
+            Too few samples are complete; see `Study.run` for others.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        done = self.sweep.run(folder, workers=workers, on_progress=on_progress, run=run)
+        result = IndicesResult(done, tuple(_indices(self, done.table)) if done.complete else ())
+        if done.complete:
+            write_json(result.folder / result.values_file, result.to_dict(), remedy=GO_ON)
+            with whole_file(result.table, remedy=GO_ON) as unfinished:
+                pq.write_table(pa.Table.from_pylist(result.to_dict()["indices"]), unfinished)
+        return result
 
 
 @checked_arguments()
@@ -165,47 +207,20 @@ def sobol_indices(
     study: IndicesStudy | str | Path,
     folder: str | Path,
     *,
-    metrics: list[str] | None = None,
-    samples: int | None = None,
-    seed: int | None = None,
     engine: str | Engine = THREADS,
     workers: int | None = None,
     cluster: str | None = None,
-    on_progress: Callable[[SweepProgress], None] | None = None,
-    run: Callable[..., Outcome] = run_task,
+    on_progress: OnProgress | None = None,
+    run: RunTask = run_task,
+    **read: Any,
 ) -> IndicesResult:
     """First-order and total Sobol indices of metrics, from Saltelli's samples run as a sweep.
 
-    Parameters
-    ----------
-    study : IndicesStudy, str or Path
-        A study, or its file; see `load_indices` for metrics, samples and seed, which are for a file.
-    folder : str or Path
-        For the sweep's table, `indices.parquet` and `indices.json`; one that another session left is gone on with.
-    engine, workers, cluster, on_progress, run
-        See `sweep`.
-
-    Raises
-    ------
-    InputError
-        The study cannot be, SALib is not installed, or too few samples are complete.
-    OutputError
-        See `sweep`.
+    `study.run(folder)` in one call: see there, and `Workers` for engine, workers and cluster. Of a file `metrics`,
+    `samples` and `seed` may be given as to `load_indices`.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    study = study if isinstance(study, IndicesStudy) else load_indices(study, metrics, samples, seed)
-    done = sweep(study.sweep, folder, engine=engine, workers=workers, cluster=cluster, on_progress=on_progress, run=run)
-    table = Path(folder) / TABLE
-    if not done.finished:
-        return IndicesResult(done, (), table)
-    found = tuple(_indices(study, done.table))
-    result = IndicesResult(done, found, table)
-    write_json(Path(folder) / INDICES, result.figures() | {"name": study.sweep.name}, remedy=GO_ON)
-    with whole_file(table, remedy=GO_ON) as unfinished:
-        pq.write_table(pa.Table.from_pylist(result.figures()["indices"]), unfinished)
-    return result
+    study = study if isinstance(study, IndicesStudy) else load_indices(study, **read)
+    return study.run(folder, workers=Workers(engine, workers, cluster), on_progress=on_progress, run=run)
 
 
 def _indices(study: IndicesStudy, table: Path) -> list[SobolIndices]:

@@ -135,6 +135,6 @@ class Target:
         """Derivatives of `residual`, (parameters,)."""
         return self.factor * slopes[self.column][self.run]
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """In plain values."""
         return {"path": self.path, "mode": self.mode, "metric": self.column, "value": self.value}

@@ -29,7 +29,7 @@ class Problem:
     Parameters
     ----------
     study : DesignStudy
-        With an objective.
+    objective : Objective
     evaluate : Evaluate
     slopes : Slopes
 
@@ -39,11 +39,10 @@ class Problem:
         The start cannot be run, or a metric of it that others would be divided by is zero.
     """
 
-    def __init__(self, study: DesignStudy, evaluate: Evaluate, slopes: Slopes) -> None:
-        assert study.objective is not None
+    def __init__(self, study: DesignStudy, objective: Objective, evaluate: Evaluate, slopes: Slopes) -> None:
         self.study, self.evaluate, self.slopes = study, evaluate, slopes
-        self.objective: Objective = study.objective
-        self.scales = start_scales(study, evaluate)
+        self.objective = objective
+        self.scales = start_scales(study, objective, evaluate)
         self.start = study.unit(study.start)
         # Slopes of designs that fail lead back to the last one that did not.
         self._safe = self.start
@@ -99,7 +98,7 @@ class Problem:
         return self.objective.value(design, self.scales)
 
 
-def start_scales(study: DesignStudy, evaluate: Evaluate) -> Mapping[str, float]:
+def start_scales(study: DesignStudy, objective: Objective, evaluate: Evaluate) -> Mapping[str, float]:
     """What metrics are divided by.
 
     Raises
@@ -107,9 +106,7 @@ def start_scales(study: DesignStudy, evaluate: Evaluate) -> Mapping[str, float]:
     InputError
         The start cannot be run, or a metric of it is zero.
     """
-    assert study.objective is not None
-    start = running_start(study, evaluate)
-    scales = study.objective.scales(start)
+    scales = objective.scales(running_start(study, evaluate))
     for column, scale in scales.items():
         if scale == 0.0:
             raise InputError(

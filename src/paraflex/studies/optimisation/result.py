@@ -1,26 +1,36 @@
-"""What every search for a design tells of itself."""
+"""What every search for a design tells of itself, and writes in the end."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from paraflex.display import Shown
+from paraflex.campaign import KeptResult
+from paraflex.studies.optimisation.best import write_best
+from paraflex.studies.optimisation.evaluate import Evaluated
+from paraflex.studies.optimisation.session import Session
+from paraflex.studies.optimisation.study import DesignStudy
+from paraflex.writing import GO_ON, write_json
 
+# So near a bound, as a share of the range, a parameter is at it.
+_AT_BOUND = 1e-4
+# Different reasons of failures that are listed.
+_REASONS = 5
 # Of a session, and no results.
-_OF_SESSION = ("fresh", "seconds", "folder", "table")
+_OF_SESSION = ("fresh", "seconds", "folder")
 
 
 @dataclass(frozen=True, kw_only=True)
-class SearchResult(Shown):
+class SearchResult(KeptResult):
     """Where a search stands after a session.
 
     Attributes
     ----------
-    folder, table : Path
-        Where all is, and all runs as pandas reads them.
+    name : str
+        Of the study.
+    folder : Path
     values, start : mapping of str to float
         The best design's numbers, and those of the start.
     bounds : mapping of str to str
@@ -39,8 +49,10 @@ class SearchResult(Shown):
         Of every design its number, how good it is (None where it failed), and whether limits hold.
     """
 
+    values_file = "result.json"
+    kind: ClassVar[str]
+    name: str
     folder: Path
-    table: Path
     values: Mapping[str, float]
     start: Mapping[str, float]
     bounds: Mapping[str, str]
@@ -53,7 +65,46 @@ class SearchResult(Shown):
     seconds: float
     history: tuple[tuple[int, float | None, bool], ...] = field(repr=False, default=())
 
-    def figures(self) -> dict[str, Any]:
+    @property
+    def complete(self) -> bool:
+        """Whether it came to its end."""
+        return not self.interrupted
+
+    def to_dict(self) -> dict[str, Any]:
         """In plain values; without times and counts of a session, which are no results."""
         out = {name: value for name, value in vars(self).items() if name not in _OF_SESSION}
-        return out | {"history": [list(each) for each in self.history], "reasons": list(self.reasons)}
+        listed = {"history": [list(each) for each in self.history], "reasons": list(self.reasons)}
+        return {"kind": self.kind} | out | listed
+
+    def write(self, study: DesignStudy) -> None:
+        """Write `result.json`, and the best design's mechanism where there is one."""
+        write_json(self.folder / self.values_file, self.to_dict(), remedy=GO_ON)
+        if self.values:
+            write_best(self.folder, study, tuple(self.values.values()))
+
+
+def of_session(study: DesignStudy, folder: Path, session: Session, best: Evaluated | None) -> dict[str, Any]:
+    """What a `SearchResult` holds of a session and its best design, but for the history."""
+    history, names = session.evaluate.history, study.setting.names
+    reasons = [each.reason for each in history if not each.complete]
+    return {
+        "name": study.name,
+        "folder": folder,
+        "values": {} if best is None else dict(zip(names, best.design, strict=True)),
+        "start": dict(zip(names, study.start, strict=True)),
+        "bounds": {} if best is None else at_bounds(study, best.design),
+        "evaluations": len(history),
+        "fresh": session.evaluate.fresh,
+        "failed": len(reasons),
+        "reasons": tuple(dict.fromkeys(reasons))[:_REASONS],
+        "stopped": session.stopped,
+        "interrupted": session.interrupted,
+        "seconds": session.seconds,
+    }
+
+
+def at_bounds(study: DesignStudy, design: Sequence[float]) -> dict[str, str]:
+    """Which numbers of a design are at an end of their range."""
+    places = dict(zip(study.setting.names, study.unit(design), strict=True))
+    low = {name: "low" for name, place in places.items() if place < _AT_BOUND}
+    return low | {name: "high" for name, place in places.items() if place > 1.0 - _AT_BOUND}

@@ -30,25 +30,6 @@ from paraflex.studies.optimisation.study import DesignStudy
 if TYPE_CHECKING:
     import pyarrow as pa
 
-RESULT = "result.json"
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a search is.
-
-    Attributes
-    ----------
-    evaluations, limit : int
-        Designs, those of earlier sessions among the done ones.
-    best : float or None
-        The least objective, or root mean square residual, until now.
-    """
-
-    evaluations: int
-    limit: int
-    best: float | None
-
 
 @dataclass(frozen=True)
 class Session:
@@ -64,15 +45,12 @@ class Session:
         Whether the user stopped it.
     seconds : float
         It took.
-    table : Path
-        Of its rows.
     """
 
     evaluate: Evaluate
     stopped: str
     interrupted: bool
     seconds: float
-    table: Path
 
 
 def search(
@@ -109,7 +87,7 @@ def search(
     """
     began = time.perf_counter()
     exact = _slopes_run(study, run)
-    account = study_account(study.base, study.content())
+    account = study_account(study.name, study.setting, study.parameters, study.content())
     with open_campaign(folder, account, record_schema(study, slopes=exact is not None)) as journal:
         compile_kernels_for(study.base.model().mechanism)
         evaluate = Evaluate(study, journal, open_workers(), run or run_task, on_evaluated, exact)
@@ -117,8 +95,8 @@ def search(
             stopped, interrupted = _solved(evaluate, solve), False
         except KeyboardInterrupt:
             stopped, interrupted = "interrupted", True
-        table = write_table(folder, journal, finished=not interrupted)
-    return Session(evaluate, stopped, interrupted, time.perf_counter() - began, table)
+        write_table(folder, journal, finished=not interrupted)
+    return Session(evaluate, stopped, interrupted, time.perf_counter() - began)
 
 
 def record_schema(study: DesignStudy, *, slopes: bool) -> pa.Schema:
@@ -161,10 +139,10 @@ def _slopes_run(study: DesignStudy, run: RunTask | None) -> RunTask | None:
         They are asked for, and there are none.
     """
     asked = study.search.gradients
-    if asked == DIFFERENCES or (asked is None and (study.objective is not None or run is not None)):
+    if asked == DIFFERENCES or (asked is None and (run is not None or not study.least_squares)):
         return None
     method = study.search.method or DEFAULT_METHOD
-    if study.objective is not None and method not in WITH_SLOPES:
+    if not study.least_squares and method not in WITH_SLOPES:
         raise InputError(
             f"{method} uses no gradients", field="search.gradients", value=EXACT,
             remedy=f"leave it out, or choose from {', '.join(WITH_SLOPES)}",

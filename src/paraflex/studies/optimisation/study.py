@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any, get_args
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.arguments import checked_arguments, given_as
 from paraflex.designs.measure import check_metric, metric_of
 from paraflex.designs.overlay import Place, number_at
 from paraflex.designs.samples import RANDOM, Varied
-from paraflex.designs.schema import SamplingTable, study_table
+from paraflex.designs.schema import SamplingTable
 from paraflex.designs.setting import Setting
-from paraflex.designs.study import SweepStudy, make_study
+from paraflex.designs.sweep import SweepStudy, make_study
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism import quantities
-from paraflex.studies.optimisation.objective import Objective, Target
 from paraflex.studies.optimisation.schema import (
     GradientsName,
     MethodName,
-    ObjectiveTable,
     ParameterTable,
     SearchTable,
     StudyTable,
-    TargetTable,
 )
 
 Array = NDArray[np.float64]
-# Step of differences in an optimisation, as a share of a range.
-_DIFFERENCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -70,24 +65,21 @@ class Search:
             quantities.known(self.gradients, get_args(GradientsName), "search.gradients", "kind of derivatives")
 
 
-@given_as("a study", "a DesignStudy")
 @dataclass(frozen=True)
-class DesignStudy:
-    """A mechanism, the parameters that are free within bounds, and what is looked for.
+class DesignStudy(ABC):
+    """A mechanism, the parameters that are free within bounds, and how they are looked for.
 
     Attributes
     ----------
     base : SweepStudy
         What is run; its only design is the start.
-    objective : Objective or None
-    targets : tuple of Target
     search : Search
     """
 
     base: SweepStudy
-    objective: Objective | None
-    targets: tuple[Target, ...]
     search: Search
+    # Whether residuals are made small, for which exact derivatives are worth their time.
+    least_squares: ClassVar[bool] = False
 
     @property
     def name(self) -> str:
@@ -115,10 +107,13 @@ class DesignStudy:
         return self.base.runs
 
     @property
+    @abstractmethod
     def columns(self) -> tuple[str, ...]:
         """Metrics that count."""
-        targets = tuple(dict.fromkeys(target.column for target in self.targets))
-        return self.objective.columns if self.objective is not None else targets
+
+    @abstractmethod
+    def sought(self) -> dict[str, Any]:
+        """What is looked for, in plain values."""
 
     def design(self, unit: Array) -> tuple[float, ...]:
         """Numbers of a point of the unit cube, which the ranges are mapped to: logarithmic ones by the logarithm."""
@@ -140,65 +135,12 @@ class DesignStudy:
     def content(self) -> dict[str, Any]:
         """What the results depend on, in plain values; the limit of evaluations is left out, for it may be raised."""
         search = {name: value for name, value in vars(self.search).items() if name != "evaluations"}
-        asked = None if self.objective is None else vars(self.objective) | {"weights": dict(self.objective.weights)}
         ranges = [[p.low, p.high, p.log] for p in self.parameters]
-        targets = [vars(target) for target in self.targets]
-        more = {"ranges": ranges, "objective": asked, "targets": targets, "search": search}
-        return self.base.content() | more
+        sought = {"objective": None, "targets": []} | self.sought()
+        return self.base.content() | {"ranges": ranges} | sought | {"search": search}
 
 
-@checked_arguments()
-def load_optimisation(file: str | FilePath) -> DesignStudy:
-    """Read the study file of an optimisation.
-
-    Parameters
-    ----------
-    file : str or Path
-        TOML; see docs/optimisation.md.
-
-    Raises
-    ------
-    InputError
-        Anything in it that does not fit the file or the mechanism: it names file, field, value and remedy.
-    """
-    with study_table(StudyTable, file) as (table, folder):
-        return _optimisation(table, folder)
-
-
-@checked_arguments()
-def load_identification(file: str | FilePath) -> DesignStudy:
-    """Read the study file of an identification; see `load_optimisation`."""
-    with study_table(StudyTable, file) as (table, folder):
-        return _identification(table, folder)
-
-
-def _optimisation(table: StudyTable, folder: FilePath) -> DesignStudy:
-    if table.objective is None:
-        raise InputError("is missing", field="objective", remedy="say [objective] minimise = { tracking_rms = 1.0 }")
-    columns = {f"objective.minimise.{name}": name for name in table.objective.minimise}
-    columns |= {f"objective.at_most.{k}.metric": each.metric for k, each in enumerate(table.objective.at_most)}
-    base = _base(table, folder, columns)
-    objective = _objective(table.objective, base)
-    search = _search(table.search)
-    if search.difference is None:
-        search = replace(search, difference=_DIFFERENCE)
-    return DesignStudy(base, objective, (), search)
-
-
-def _identification(table: StudyTable, folder: FilePath) -> DesignStudy:
-    if not table.target:
-        raise InputError("is missing", field="target", remedy="add [[target]] tables with metric and value")
-    if table.search.method is not None:
-        raise InputError(
-            "an identification is a problem of least squares", field="search.method", value=table.search.method,
-            remedy="leave it out",
-        )  # fmt: skip
-    base = _base(table, folder, {f"target.{k}.metric": target.metric for k, target in enumerate(table.target)})
-    targets = tuple(_target(entry, k, base) for k, entry in enumerate(table.target))
-    return DesignStudy(base, None, targets, _search(table.search))
-
-
-def _base(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> SweepStudy:
+def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> SweepStudy:
     """What is run, its one design the start; with the metrics that are kept anyway and those that count, by field."""
     for name, entry in table.vary.items():
         _check_range(f"vary.{name}", entry)
@@ -282,45 +224,8 @@ def _rounded(parameter: Varied, value: float) -> float:
     return min(max(float(f"{value:.12g}"), parameter.low), parameter.high)
 
 
-def _objective(table: ObjectiveTable, base: SweepStudy) -> Objective:
-    if not table.minimise:
-        raise InputError("nothing to minimise", field="objective.minimise", remedy="say { tracking_rms = 1.0 }")
-    for column, weight in table.minimise.items():
-        if not weight > 0.0:
-            raise InputError(
-                "must be positive", field=f"objective.minimise.{column}", value=weight, remedy="leave the metric out"
-            )
-    limits = tuple((each.metric, each.value) for each in table.at_most)
-    return Objective(dict(table.minimise), table.over, table.relative, limits)
-
-
-def _target(entry: TargetTable, number: int, base: SweepStudy) -> Target:
-    field, setting = f"target.{number}", base.setting
-    path = _one(f"{field}.path", entry.path, setting.paths)
-    mode = _one(f"{field}.mode", entry.mode, setting.modes)
-    if entry.relative and entry.value == 0.0:
-        raise InputError(
-            "nothing is relative to zero", field=f"{field}.value", value=0.0, remedy="say relative = false"
-        )
-    if not entry.weight > 0.0:
-        raise InputError("must be positive", field=f"{field}.weight", value=entry.weight, remedy="leave the target out")
-    run = setting.paths.index(path) * len(setting.modes) + setting.modes.index(mode)
-    return Target(entry.metric, run, path, mode, entry.value, entry.weight, entry.relative)
-
-
-def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:
-    if name is None and len(known) == 1:
-        return known[0]
-    if name is None:
-        raise InputError(
-            "the study has several, and none is named", field=field, remedy=f"choose from {', '.join(known)}"
-        )
-    if name not in known:
-        raise InputError("the study has none of that name", field=field, value=name, remedy=suggestion(name, known))
-    return name
-
-
-def _search(table: SearchTable) -> Search:
+def read_search(table: SearchTable) -> Search:
+    """How a design is looked for, as a file says it."""
     for name in ("evaluations", "difference", "tolerance"):
         value = getattr(table, name)
         if value is not None and not value > 0:

@@ -2,51 +2,40 @@
 
 from __future__ import annotations
 
+import json
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, held
 from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
 from paraflex.designs.run import Task
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, study_table
-from paraflex.designs.setting import Setting, make_setting
-from paraflex.display import Shown
-from paraflex.errors import InputError, suggestion
+from paraflex.designs.setting import Setting, digest, make_setting
+from paraflex.errors import InputError, OutputError, suggestion
+from paraflex.findings import Verdict
 from paraflex.results.summary import finite_or_none
+from paraflex.writing import whole_file
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+TABLE, LINES, FIGURES = "sensitivity.csv", "sensitivity.parquet", "figures"
 
 
 @dataclass(frozen=True)
-class SensitivityStudy:
-    """What is differentiated by what.
-
-    Attributes
-    ----------
-    name : str
-    setting : Setting
-        Of its metrics those that have derivatives.
-    parameters : tuple of Varied
-    """
-
-    name: str
-    setting: Setting
-    parameters: tuple[Varied, ...]
-
-
-@dataclass(frozen=True)
-class Sensitivities(Shown):
+class Sensitivities(Result):
     """Metrics of runs and their derivatives by parameters.
 
     Attributes
@@ -69,8 +58,13 @@ class Sensitivities(Shown):
         Estimates of what differences left in them: see docs/sensitivities.md.
     unsettled : (rows,) array
         What the equations of a stage are solved to, as a part of the accelerations.
+    content : str
+        Digest of all that they depend on.
+    verdict : Verdict
+        What is doubtful about the design that the file describes.
     """
 
+    values_file = "sensitivity.json"
     name: str
     mechanism: str
     rows: tuple[tuple[str, str], ...]
@@ -83,6 +77,37 @@ class Sensitivities(Shown):
     derivatives: Array
     errors: Array
     unsettled: Array
+    content: str = ""
+    verdict: Verdict = field(default_factory=lambda: Verdict(()))
+
+    @property
+    def complete(self) -> bool:
+        """True: one that lacks a derivative is an error instead."""
+        return True
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Values (run, metric), and derivatives, elasticities and errors (run, metric, parameter)."""
+        of_run, of_metric = ("run", "metric"), ("run", "metric", "parameter")
+        path, mode = zip(*self.rows, strict=True)
+        return xr.Dataset(
+            {
+                "value": (of_run, self.values),
+                "derivative": (of_metric, self.derivatives),
+                "relative": (of_metric, self.relative),
+                "error": (of_metric, self.errors),
+                "unsettled": ("run", self.unsettled),
+            },
+            {
+                "path": ("run", list(path)),
+                "mode": ("run", list(mode)),
+                "metric": list(self.metrics),
+                "unit": ("metric", list(self.units)),
+                "parameter": list(self.parameters),
+                "nominal": ("parameter", self.nominal),
+            },
+            {"name": self.name, "mechanism": self.mechanism},
+        )
 
     @property
     def relative(self) -> Array:
@@ -99,10 +124,12 @@ class Sensitivities(Shown):
 
         return pd.DataFrame(list(self._lines()))
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Everything as plain values; None for what is no number."""
         parameters = zip(self.parameters, self.nominal, self.fields, strict=True)
         return {
+            "content": self.content,
+            "verdict": self.verdict.to_dict(),
             "name": self.name,
             "mechanism": self.mechanism,
             "parameters": {name: {"value": float(value), "fields": list(fields)} for name, value, fields in parameters},
@@ -118,13 +145,22 @@ class Sensitivities(Shown):
             ],
         }
 
+    def save(self, folder: str | Path) -> Path:
+        """Write `sensitivity.json`, and its lines as `sensitivity.csv` and `sensitivity.parquet`; see `Result.save`."""
+        target, lines = super().save(folder), self.to_frame()
+        with whole_file(target / TABLE) as unfinished:
+            lines.to_csv(unfinished, index=False)
+        with whole_file(target / LINES) as unfinished:
+            _to_parquet(lines, unfinished)
+        return target
+
     def _metric(self, i: int, j: int) -> dict[str, Any]:
         arrays = {"derivatives": self.derivatives, "relative": self.relative, "errors": self.errors}
-        told = {
+        by_parameter = {
             kind: {name: finite_or_none(value) for name, value in zip(self.parameters, array[i, j], strict=True)}
             for kind, array in arrays.items()
         }
-        return {"value": finite_or_none(self.values[i, j]), **told}
+        return {"value": finite_or_none(self.values[i, j]), **by_parameter}
 
     def _lines(self):
         relative = self.relative
@@ -143,6 +179,74 @@ class Sensitivities(Shown):
                         "relative": relative[i, j, k],
                         "error": self.errors[i, j, k],
                     }
+
+
+@dataclass(frozen=True)
+class SensitivityStudy(Study[Sensitivities]):
+    """What is differentiated by what.
+
+    Attributes
+    ----------
+    name : str
+    setting : Setting
+        Of its metrics those that have derivatives.
+    parameters : tuple of Varied
+    at : mapping of str to float
+        Values of parameters, where they are not to be those of the mechanism's file.
+    """
+
+    name: str
+    setting: Setting
+    parameters: tuple[Varied, ...]
+    at: Mapping[str, float] = field(default_factory=dict)
+
+    def content(self) -> str:
+        """A digest of all that the results depend on."""
+        setting = self.setting
+        places = [[list(place) for place in places] for places in setting.places]
+        asked = [setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics]
+        return digest([*asked, dict(self.at)])
+
+    def run(
+        self,
+        folder: str | Path | None = None,
+        *,
+        workers: Workers | None = None,
+        on_progress: OnProgress | None = None,
+    ) -> Sensitivities:
+        """Differentiate all runs, one path after the other; see `Study.run`.
+
+        The folder gets what `Sensitivities.save` writes. Workers have no part in it.
+
+        Raises
+        ------
+        InputError
+            An unknown parameter, or one without a derivative; a method without; or see `Study.run`.
+        NumericalError
+            A run that cannot be made.
+        """
+        if workers is not None:
+            raise InputError("one path is differentiated after the other", field="workers", remedy="leave it out")
+        if folder is None:
+            return self._found(on_progress)
+        with held(Path(folder)):
+            _claim(Path(folder), self.content())
+            found = self._found(on_progress)
+            found.save(folder)
+        return found
+
+    def _found(self, on_progress: OnProgress | None) -> Sensitivities:
+        setting, values = self.setting, _values(self.setting, self.at)
+        sizes = [_size(parameter, value) for parameter, value in zip(self.parameters, values, strict=True)]
+        rows, found, began = [], [], time.perf_counter()
+        for number, path in enumerate(setting.paths):
+            if on_progress is not None:
+                spent = time.perf_counter() - began
+                on_progress(Progress(number, len(setting.paths), number, spent, f"path {path}"))
+            for each in mode_gradients(setting, Task(number, 0, values, path), sizes):
+                rows.append((path, each.mode))
+                found.append(each)
+        return _gathered(self, values, rows, found)
 
 
 @checked_arguments()
@@ -178,31 +282,17 @@ def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> Sensiti
 
 @checked_arguments()
 def sensitivities(study: SensitivityStudy | str | Path, *, at: Mapping[str, float] | None = None) -> Sensitivities:
-    """Derivatives of the metrics of a study's runs by its parameters.
+    """Derivatives of the metrics of a study's runs, or of its file's, by its parameters: `study.run()` in one call.
 
     Parameters
     ----------
     study : SensitivityStudy, or str or Path of its file
     at : mapping of str to float, optional
         Values of parameters, where they are not to be those of the mechanism's file.
-
-    Raises
-    ------
-    InputError
-        An unknown parameter, or one without a derivative; a method without.
-    NumericalError
-        A run that cannot be made.
     """
     if not isinstance(study, SensitivityStudy):
         study = load_sensitivities(study)
-    setting, values = study.setting, _values(study.setting, at or {})
-    sizes = [_size(parameter, value) for parameter, value in zip(study.parameters, values, strict=True)]
-    rows, found = [], []
-    for number, path in enumerate(setting.paths):
-        for each in mode_gradients(setting, Task(number, 0, values, path), sizes):
-            rows.append((path, each.mode))
-            found.append(each)
-    return _gathered(study, values, rows, found)
+    return (study if at is None else replace(study, at=at)).run()
 
 
 def _check_names(names: Sequence[str]) -> None:
@@ -249,4 +339,42 @@ def _gathered(
         derivatives=np.array([[each.gradients[name] for name in columns] for each in found]),
         errors=np.array([[each.errors[name] for name in columns] for each in found]),
         unsettled=np.array([each.unsettled for each in found]),
+        content=study.content(),
+        verdict=study.setting.verdict(),
     )
+
+
+def _claim(folder: Path, asked: str) -> None:
+    """Check that the folder is empty or holds what the same study wrote."""
+    others = sorted(
+        entry.name
+        for entry in folder.iterdir()
+        if entry.name not in {Sensitivities.values_file, TABLE, LINES, FIGURES, ".lock"}
+    )
+    if others:
+        raise InputError(
+            f"the folder holds other files ({', '.join(others[:3])})", field="--output", value=str(folder),
+            remedy="name a new folder",
+        )  # fmt: skip
+    if (folder / Sensitivities.values_file).exists() and _content(folder / Sensitivities.values_file) != asked:
+        raise InputError(
+            "the folder holds results of another study, or of this one before it was changed", field="--output",
+            value=str(folder), remedy="name a new folder",
+        )  # fmt: skip
+
+
+def _content(file: Path) -> Any:
+    try:
+        return json.loads(file.read_text(encoding="utf-8")).get("content")
+    except (OSError, ValueError, AttributeError):
+        return None
+
+
+def _to_parquet(lines: Any, file: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        pq.write_table(pa.Table.from_pandas(lines, preserve_index=False), file)
+    except pa.ArrowException as error:
+        raise OutputError(f"cannot be written ({error})", field=str(file), remedy="choose another folder") from error

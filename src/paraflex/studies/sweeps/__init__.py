@@ -3,9 +3,8 @@
 from paraflex.campaign import ENGINES, Engine, LostCluster, open_engine
 from paraflex.designs.run import Outcome, Task, run_task
 from paraflex.designs.samples import Varied
-from paraflex.designs.session import SweepProgress, SweepResult, sweep
 from paraflex.designs.setting import Setting
-from paraflex.designs.study import SweepStudy, load_sweep
+from paraflex.designs.sweep import SweepResult, SweepStudy, load_sweep, sweep
 from paraflex.results.metrics import METRICS, Metric
 
 __all__ = [
@@ -16,7 +15,6 @@ __all__ = [
     "Metric",
     "Outcome",
     "Setting",
-    "SweepProgress",
     "SweepResult",
     "SweepStudy",
     "Task",
