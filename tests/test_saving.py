@@ -360,9 +360,10 @@ def test_a_place_that_cannot_be_written(tmp_path):
 def test_what_the_page_shows(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     page = Path(__file__).parents[1] / "docs" / "model-file.md"
+    shown = {}
     for block in blocks_of(page):
         if block.language == "python":
-            exec(block.text, {})
+            exec(block.text, shown)
     assert read("linear.toml").study.path == "line"
     assert len(read("chain.toml").mechanism.bodies) == 5
 
