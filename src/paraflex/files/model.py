@@ -66,7 +66,7 @@ class Model(CheckedFields):
             ("study: modes", list(study.modes)),
             ("study: duration [s]", study.duration),
         ]
-        return page(f"Model {self.source}", facts(told), self.mechanism._repr_html_())
+        return page(f"Model {self.source or self.mechanism.name}", facts(told), self.mechanism._repr_html_())
 
     @checked_arguments()
     def path(self, name: str | None = None) -> Path:

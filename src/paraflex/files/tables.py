@@ -86,28 +86,29 @@ def model_tables(
         "joint": {joint.name: _joint(joint) for joint in mechanism.joints},
         "motor": {motor.name: motor.joint for motor in mechanism.motors},
         "prescribed": {each.name: _prescribed(each, mechanism) for each in mechanism.prescribed},
-        **{
-            kind: {member.name: _fields(member, "name") for member in members}
-            for kind, members in (
-                ("spring", mechanism.springs), ("damper", mechanism.dampers), ("friction", mechanism.frictions)
-            )
-        },
-        "linear_spring": {
-            spring.name: {"points": [spring.a, spring.b]} | _fields(spring, "name", "a", "b")
-            for spring in mechanism.linear_springs
-        },
-        "load": {
-            load.name: {"type": "force" if isinstance(load, PointForce) else "torque"} | _fields(load, "name")
-            for load in mechanism.loads
-        },
+        **_forces(mechanism),
         "end_effector": {} if mechanism.end_effector is None else _fields(mechanism.end_effector),
         "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
         "mode": {mode.name: mode.motors for mode in mechanism.modes},
         "path": {name: _path(path, name) for name, path in paths.items()},
         "start": {} if start is None else _start(start),
         "study": _fields(study),
-    }  # fmt: skip
+    }
     return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
+
+
+def _forces(mechanism: Mechanism) -> dict[str, Any]:
+    """Springs, dampers, friction and loads."""
+    at_joints = {"spring": mechanism.springs, "damper": mechanism.dampers, "friction": mechanism.frictions}
+    return {kind: {one.name: _fields(one, "name") for one in members} for kind, members in at_joints.items()} | {
+        "linear_spring": {
+            one.name: {"points": [one.a, one.b]} | _fields(one, "name", "a", "b") for one in mechanism.linear_springs
+        },
+        "load": {
+            one.name: {"type": "force" if isinstance(one, PointForce) else "torque"} | _fields(one, "name")
+            for one in mechanism.loads
+        },
+    }
 
 
 def _fields(given: Any, *left_out: str) -> dict[str, Any]:
