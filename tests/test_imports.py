@@ -1,9 +1,17 @@
 """The structure of the package, as its imports have it."""
 
+import ast
+import re
+import sys
+import tomllib
 from graphlib import CycleError, TopologicalSorter
+from importlib.metadata import packages_distributions
+from pathlib import Path
 
 import grimp
 import pytest
+
+ROOT = Path(__file__).parents[1]
 
 
 def circle(imports):
@@ -30,3 +38,29 @@ def test_families_of_studies_do_not_know_one_another(family, others):
     names = [f"paraflex.studies.{name}" for name in (family, others)]
     assert not graph.chain_exists(*names, as_packages=True)
     assert not graph.chain_exists(*reversed(names), as_packages=True)
+
+
+def imported(tree):
+    """First names of what a file imports, within functions too."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (name.name.split(".")[0] for name in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.module.split(".")[0]
+
+
+def test_what_is_imported_is_declared():
+    """Other packages' needs are theirs to change."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = [each for name, listed in project["optional-dependencies"].items() if name != "dev" for each in listed]
+    declared = {plain(re.match(r"[\w.-]+", each)[0]) for each in [*project["dependencies"], *extras]}
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for file in (ROOT / "src").rglob("*.py")]
+    names = {name for tree in trees for name in imported(tree)} - sys.stdlib_module_names - {"paraflex"}
+    homes = packages_distributions()
+    assert {"numpy", "tomlkit", "optuna"} <= names
+    assert sorted(name for name in names if not declared & set(map(plain, homes.get(name, [name])))) == []
+
+
+def plain(distribution):
+    """A name as package indices compare it."""
+    return re.sub(r"[-_.]+", "-", distribution).lower()

@@ -19,9 +19,9 @@ from made_up import STUDY, made_up, write_study
 from paraflex.campaign.journal import write_journal
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_names, load_data
+from paraflex.files.document import document_text
 from paraflex.plots import convergence
 from paraflex.studies import load_optimisation, optimise
-from paraflex.studies.optimisation.best import toml_text
 from paraflex.studies.optimisation.evaluate import Evaluate
 from paraflex.studies.optimisation.problem import Problem
 from paraflex.studies.optimisation.slopes import differences, slopes_of
@@ -386,7 +386,7 @@ def test_the_best_design_is_a_mechanism(tmp_path):
 @pytest.mark.parametrize("name", library_names())
 def test_models_as_text_are_the_same(name):
     data, _ = load_data(name)
-    assert tomllib.loads(toml_text(data)) == data
+    assert tomllib.loads(document_text(data)) == data
 
 
 def test_odd_keys_and_texts_as_text():
@@ -395,7 +395,7 @@ def test_odd_keys_and_texts_as_text():
         "n": [1, 1e-300, -0.0, 1e22, True, [], {"x.y": "ü"}],
         "t": {"+-": {}, "q": {"u": 1}},
     }
-    assert tomllib.loads(toml_text(data)) == data
+    assert tomllib.loads(document_text(data)) == data
 
 
 def test_real_runs(tmp_path):

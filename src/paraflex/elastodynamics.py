@@ -170,7 +170,7 @@ def _check(task: TrackingTask, step: float, spectral_radius: float) -> None:
 
 
 @dataclass(frozen=True)
-class _Motion:
+class _NominalMotion:
     """The rigid motion q, v, a (k, n) in a system's coordinates, undeformed; forces and turns that follow from it."""
 
     system: System
@@ -178,8 +178,8 @@ class _Motion:
     v: Array
     a: Array
 
-    def __getitem__(self, instants: slice) -> _Motion:
-        return _Motion(self.system, self.q[instants], self.v[instants], self.a[instants])
+    def __getitem__(self, instants: slice) -> _NominalMotion:
+        return _NominalMotion(self.system, self.q[instants], self.v[instants], self.a[instants])
 
     @property
     def angles(self) -> Array:
@@ -215,7 +215,7 @@ class _Motion:
         return q, v, a
 
 
-def _nominal(task: TrackingTask, times: Array) -> _Motion:
+def _nominal(task: TrackingTask, times: Array) -> _NominalMotion:
     """The rigid motion in the coordinates of the task's system."""
     rigid = task.plan.follow(times)
     q, v, a = np.zeros((3, times.size, task.system.n))
@@ -225,7 +225,7 @@ def _nominal(task: TrackingTask, times: Array) -> _Motion:
         source = rigid.system.body(carrier).all
         target = slice(body.offset, body.offset + 3)
         q[:, target], v[:, target], a[:, target] = rigid.q[:, source], rigid.v[:, source], rigid.a[:, source]
-    return _Motion(task.system, q, v, a)
+    return _NominalMotion(task.system, q, v, a)
 
 
 def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array:

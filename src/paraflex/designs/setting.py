@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib.metadata import version
 from pathlib import Path as FilePath
@@ -18,8 +18,9 @@ from paraflex.designs.overlay import Place, find_place, overlaid
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, VaryTable
 from paraflex.errors import InputError, suggestion
-from paraflex.files import Model, library_names, load_data, model_from
+from paraflex.files import Model, library_names, model_from
 from paraflex.files.generators import is_generated
+from paraflex.files.model import read_model
 from paraflex.findings import Verdict
 from paraflex.integrators import IntegrationOptions, check_times
 from paraflex.results.dataset import part_of
@@ -68,6 +69,8 @@ class Setting:
         Whether whole runs are kept.
     versions : mapping of str to str
         Of the packages that results depend on.
+    text : str
+        The mechanism's file, for its comments.
     """
 
     data: Mapping[str, Any]
@@ -84,6 +87,7 @@ class Setting:
     metrics: tuple[str, ...]
     trajectories: bool
     versions: Mapping[str, str]
+    text: str = field(default="", repr=False, compare=False)
 
     @cached_property
     def identity(self) -> str:
@@ -110,7 +114,7 @@ class Setting:
         numbers = self.numbers(values)
         inside = [(place, number) for place, number in numbers if place[0] != INTEGRATION]
         chosen = {str(place[1]): number for place, number in numbers if place[0] == INTEGRATION}
-        model = model_from(overlaid(dict(self.data), inside), self.source)
+        model = model_from(overlaid(dict(self.data), inside), self.source, self.text)
         return model, self.options(model, chosen)
 
     def parts(self) -> dict[str, Part]:
@@ -147,12 +151,12 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
     InputError
         Anything that does not fit the mechanism, whatever designs are taken.
     """
-    data, source = load_data(_mechanism(table.mechanism, folder))
-    model = model_from(data, source)
+    model = read_model(_mechanism(table.mechanism, folder))
+    data = model.parameters
     parameters = tuple(_varied(name, entry) for name, entry in table.vary.items())
     setting = Setting(
         data=data,
-        source=source,
+        source=model.source,
         names=tuple(parameter.name for parameter in parameters),
         places=tuple(_places(data, parameter) for parameter in parameters),
         whole=tuple(parameter.whole for parameter in parameters),
@@ -165,6 +169,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
         metrics=metrics_of(table.metrics, model.study.error),
         trajectories=table.trajectories,
         versions=versions(),
+        text=model.text,
     )
     _check(setting, model)
     _check_columns(parameters)

@@ -25,7 +25,7 @@ _CUBIC = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0,
 _LENGTH_POWER = np.array([0, 1, 0, 1])
 
 
-class Pose(NamedTuple):
+class RigidState(NamedTuple):
     """Where a body is at the start and how it moves [m, rad, m/s, rad/s]."""
 
     x: float
@@ -48,7 +48,7 @@ class Pose(NamedTuple):
 
 
 @dataclass(frozen=True)
-class History:
+class Trajectory:
     """What Exudyn computed at its steps.
 
     Attributes
@@ -64,9 +64,9 @@ class History:
     states: Array
     multipliers: Array
 
-    def thinned(self, every: int) -> History:
+    def thinned(self, every: int) -> Trajectory:
         """Every so many steps."""
-        return History(self.t[::every], self.states[:, ::every], self.multipliers[::every])
+        return Trajectory(self.t[::every], self.states[:, ::every], self.multipliers[::every])
 
 
 class Turn(NamedTuple):
@@ -89,12 +89,12 @@ class Ground:
         """Where a named point is, in the words of Exudyn's markers."""
         return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
 
-    def motion(self, point: str, history: History) -> PointMotion:
+    def motion(self, point: str, history: Trajectory) -> PointMotion:
         """None."""
         still = np.zeros((history.t.size, 2))
         return PointMotion(still + self.points[point], still, still)
 
-    def turn(self, point: str, history: History) -> Turn:
+    def turn(self, point: str, history: Trajectory) -> Turn:
         """None."""
         return Turn(*np.zeros((3, history.t.size)))
 
@@ -128,7 +128,7 @@ class RigidLink:
         """Where a named point is, in the words of Exudyn's markers."""
         return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
 
-    def motion(self, point: str, history: History) -> PointMotion:
+    def motion(self, point: str, history: Trajectory) -> PointMotion:
         """Of a named point."""
         r, v, a = history.states[:, :, self.columns[:2]]
         angle, rate, acceleration = self.frame(history)
@@ -138,7 +138,7 @@ class RigidLink:
         across = np.column_stack([-arm[:, 1], arm[:, 0]])
         return PointMotion(r + arm, v + w * across, a + dw * across - w**2 * arm)
 
-    def curve(self, drawn: Outline, history: History) -> Array:
+    def curve(self, drawn: Outline, history: Trajectory) -> Array:
         """Where the stations of the body are (k, s, 2) [m]."""
         r, angle = history.states[0][:, self.columns[:2]], self.frame(history).angle
         c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
@@ -147,19 +147,19 @@ class RigidLink:
         x, y = (drawn.places - drawn.places[station] + self.points[point]).T
         return r[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
-    def turn(self, point: str, history: History) -> Turn:
+    def turn(self, point: str, history: Trajectory) -> Turn:
         """Of the material at a named point."""
         return self.frame(history)
 
-    def frame(self, history: History) -> Turn:
+    def frame(self, history: Trajectory) -> Turn:
         """Of the body."""
         return Turn(*history.states[:, :, self.columns[2]])
 
-    def chord(self, history: History) -> Turn:
+    def chord(self, history: Trajectory) -> Turn:
         """Of the body."""
         return self.frame(history)
 
-    def tip(self, history: History) -> Array:
+    def tip(self, history: Trajectory) -> Array:
         """Nothing bends."""
         return np.zeros((history.t.size, 3))
 
@@ -173,15 +173,15 @@ class RigidLink:
         """Places and masses of what is lumped besides: nothing."""
         return []
 
-    def weighted(self, history: History) -> Array:
+    def weighted(self, history: Trajectory) -> Array:
         """Sum of mass times position (k, 2) [kg m]."""
         return self.mass * history.states[0][:, self.columns[:2]]
 
-    def kinetic_energy(self, history: History) -> Array:
+    def kinetic_energy(self, history: Trajectory) -> Array:
         """Of the body [J]."""
         return 0.5 * history.states[1][:, self.columns] ** 2 @ [self.mass, self.mass, self.inertia]
 
-    def strain_energy(self, history: History) -> Array:
+    def strain_energy(self, history: Trajectory) -> Array:
         """None."""
         return np.zeros(history.t.size)
 
@@ -226,11 +226,11 @@ class Cable:
         along = float(self.mesh.nodes[node] - self.mesh.nodes[element])
         return {"bodyNumber": self.items[element], "localPosition": [along, 0.0, 0.0]}
 
-    def motion(self, point: str, history: History) -> PointMotion:
+    def motion(self, point: str, history: Trajectory) -> PointMotion:
         """Of a named point."""
         return PointMotion(*history.states[:, :, self.columns[2 * self.points[point]]])
 
-    def curve(self, drawn: Outline, history: History) -> Array:
+    def curve(self, drawn: Outline, history: Trajectory) -> Array:
         """Where the stations of the centre line are (k, s, 2) [m]."""
         x, nodes = drawn.places[:, 0], self.mesh.nodes
         element = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, self.mesh.n_elements - 1)
@@ -240,19 +240,19 @@ class Cable:
             rows[i, 2 * e : 2 * e + 4] = _shape(np.array([along / length]), length, 0)
         return rows @ history.states[0][:, self.columns]
 
-    def turn(self, point: str, history: History) -> Turn:
+    def turn(self, point: str, history: Trajectory) -> Turn:
         """Of the tangent at a named point."""
         return self._tangent(self.points[point], history)
 
-    def frame(self, history: History) -> Turn:
+    def frame(self, history: Trajectory) -> Turn:
         """Of the tangent at the first end."""
         return self._tangent(0, history)
 
-    def chord(self, history: History) -> Turn:
+    def chord(self, history: Trajectory) -> Turn:
         """Of the line from the first end to the last."""
         return turn_of(self.start, *self._line(history))
 
-    def tip(self, history: History) -> Array:
+    def tip(self, history: Trajectory) -> Array:
         """Axial, transverse displacement and slope (k, 3) of the last end against the tangent at the first."""
         phi = self.frame(history).angle
         x, y = self._line(history)[0].T
@@ -270,13 +270,13 @@ class Cable:
         """Places and masses of the lumps."""
         return [(self._at(node), float(mass)) for node, (mass, _) in enumerate(self.lumps) if mass > 0.0]
 
-    def weighted(self, history: History) -> Array:
+    def weighted(self, history: Trajectory) -> Array:
         """Sum of mass times position (k, 2) [kg m]."""
         q = history.states[0][:, self.columns]
         weights, rows = self._quadrature(_MASS_POINTS, 0)
         return (weights * self._along("mass_per_length", _MASS_POINTS)) @ (rows @ q) + self.lumps[:, 0] @ q[:, ::2]
 
-    def kinetic_energy(self, history: History) -> Array:
+    def kinetic_energy(self, history: Trajectory) -> Array:
         """1/2 int rho A |r_t|^2 dx, and the lumps' 1/2 m |r_t|^2 + 1/2 J |r'_t|^2 [J]."""
         weights, rows = self._quadrature(_MASS_POINTS, 0)
         weights = weights * self._along("mass_per_length", _MASS_POINTS)
@@ -284,7 +284,7 @@ class Cable:
         v = history.states[1][:, self.columns]
         return 0.5 * np.sum(v * (mass @ v), axis=(1, 2))
 
-    def strain_energy(self, history: History) -> Array:
+    def strain_energy(self, history: Trajectory) -> Array:
         """1/2 int EA (|r'| - 1)^2 + EI (r' x r'' / |r'|^2)^2 dx [J]."""
         q = history.states[0][:, self.columns]
         weights, rows = self._quadrature(_AXIAL_POINTS, 1)
@@ -301,10 +301,10 @@ class Cable:
         stiffest = float(np.max(self._along("axial_stiffness", 1) / np.diff(self.mesh.nodes)))
         return float(np.finfo(float).eps) * stiffest * far
 
-    def _tangent(self, node: int, history: History) -> Turn:
+    def _tangent(self, node: int, history: Trajectory) -> Turn:
         return turn_of(self.start, *history.states[:, :, self.columns[1::2][node]])
 
-    def _line(self, history: History) -> Array:
+    def _line(self, history: Trajectory) -> Array:
         """From the first end to the last, with two derivatives (3, k, 2)."""
         return history.states[:, :, self.columns[-2]] - history.states[:, :, self.columns[0]]
 
@@ -336,15 +336,15 @@ class Linkage:
         """What a point belongs to."""
         return self.ground if ref.on_ground else self.bodies[ref.body]
 
-    def motion(self, ref: PointRef, history: History) -> PointMotion:
+    def motion(self, ref: PointRef, history: Trajectory) -> PointMotion:
         """Of a named point."""
         return self.part(ref).motion(ref.point, history)
 
-    def gap(self, joint: Joint, history: History) -> Array:
+    def gap(self, joint: Joint, history: Trajectory) -> Array:
         """From side a of a joint to side b, with two derivatives (3, k, 2)."""
         return np.subtract(self.motion(joint.b, history), self.motion(joint.a, history))
 
-    def joint_turn(self, joint: Joint, history: History) -> Turn:
+    def joint_turn(self, joint: Joint, history: Trajectory) -> Turn:
         """Of the material at side b of a joint against that at side a."""
         a, b = (self.part(ref).turn(ref.point, history) for ref in (joint.a, joint.b))
         return Turn(*np.subtract(b, a))

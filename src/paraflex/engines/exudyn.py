@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.dynamics import System
-from paraflex.engines.cables import Array, Cable, Columns, Ground, History, Link, Linkage, Pose, RigidLink
+from paraflex.engines.cables import Array, Cable, Columns, Ground, Link, Linkage, RigidLink, RigidState, Trajectory
 from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
@@ -120,7 +120,7 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     return record
 
 
-def _last_moment(record: Record, history: History) -> Moment:
+def _last_moment(record: Record, history: Trajectory) -> Moment:
     """The last step that was finished; the end-effector at the last sample before it."""
     places = record.end_effector.position
     position = (float(places[-1, 0]), float(places[-1, 1])) if len(places) else None
@@ -227,13 +227,13 @@ def _add_gravity(engine: _Engine, linkage: Linkage, mechanism: Mechanism) -> Non
 
 def _add_body(engine: _Engine, task: TrackingTask, body: Body) -> Link:
     first = task.system.body(body.name).offset
-    pose = Pose(*(x for values in (task.start.q, task.start.v) for x in values[first : first + 3].tolist()))
+    pose = RigidState(*(x for values in (task.start.q, task.start.v) for x in values[first : first + 3].tolist()))
     if isinstance(body, FlexibleBeam) and body.flexible:
         return _add_cable(engine, body, pose)
     return _add_rigid(engine, task.system, body, pose)
 
 
-def _add_rigid(engine: _Engine, system: System, body: Body, pose: Pose) -> RigidLink:
+def _add_rigid(engine: _Engine, system: System, body: Body, pose: RigidState) -> RigidLink:
     s = system.body(body.name).integrals
     centre = s.S1 / s.m
     inertia = s.I0 + s.J - s.m * float(centre @ centre)
@@ -244,7 +244,7 @@ def _add_rigid(engine: _Engine, system: System, body: Body, pose: Pose) -> Rigid
     return RigidLink(item, columns, points, s.m, inertia, pose.phi)
 
 
-def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: Pose) -> Cable:
+def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: RigidState) -> Cable:
     mesh, of_span = beam.mesh, beam.spans
     spans = tuple(of_span[span] for span in mesh.spans)
     slope, turning = pose.direction(1.0, 0.0)
@@ -342,7 +342,7 @@ class _Recorder:
 
 def _run(
     engine: _Engine, model: _Model, task: TrackingTask, torques: FeedForward, substeps: int, options: ExudynOptions
-) -> tuple[History, dict[str, Any]]:
+) -> tuple[Trajectory, dict[str, Any]]:
     """Integrate; the figures say why the run stopped early, if it did."""
     times = task.motion.t
     grid = np.linspace(times[0], times[-1], substeps * (times.size - 1) + 1)
@@ -379,7 +379,7 @@ def _run(
         "newton_iterations": int(solver.it.newtonStepsCount),
         "factorisations": int(solver.it.newtonJacobiCount),
     }
-    return History(grid[:k], states, np.reshape(recorder.multipliers, (k, model.rows.size))), figures
+    return Trajectory(grid[:k], states, np.reshape(recorder.multipliers, (k, model.rows.size))), figures
 
 
 def _settings(exu: Any, grid: Array, options: ExudynOptions, floor: float) -> Any:
@@ -408,7 +408,7 @@ def _record(
     model: _Model,
     task: TrackingTask,
     torques: FeedForward,
-    steps: History,
+    steps: Trajectory,
     substeps: int,
     method: str,
     figures: dict[str, Any],
@@ -461,7 +461,7 @@ def _record(
     )
 
 
-def _drawing(mechanism: Mechanism, linkage: Linkage, history: History) -> Drawing:
+def _drawing(mechanism: Mechanism, linkage: Linkage, history: Trajectory) -> Drawing:
     """Bodies as the engine's own shape functions have them."""
     bodies = linkage.bodies
     shapes = {one.body: bodies[one.body].curve(one, history) for one in outlines(mechanism)}
@@ -477,19 +477,19 @@ def _largest(values: Array) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
-def _work(linkage: Linkage, mechanism: Mechanism, torques: FeedForward, history: History) -> Array:
+def _work(linkage: Linkage, mechanism: Mechanism, torques: FeedForward, history: Trajectory) -> Array:
     """Of the motors, by the trapezoidal rule over the steps."""
     power = np.sum(torques.evaluate(history.t) * _motor_speeds(linkage, mechanism, history), axis=1)
     return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(history.t))])[: power.size]
 
 
-def _motor_speeds(linkage: Linkage, mechanism: Mechanism, history: History) -> Array:
+def _motor_speeds(linkage: Linkage, mechanism: Mechanism, history: Trajectory) -> Array:
     """Of all motors (k, motors) [rad/s]."""
     joints = [mechanism.joint(motor.joint) for motor in mechanism.motors]
     return np.array([linkage.joint_turn(joint, history).rate for joint in joints]).reshape(-1, history.t.size).T
 
 
-def _spring_energy(linkage: Linkage, mechanism: Mechanism, history: History) -> Array:
+def _spring_energy(linkage: Linkage, mechanism: Mechanism, history: Trajectory) -> Array:
     energy = np.zeros(history.t.size)
     for spring in mechanism.springs:
         angle = linkage.joint_turn(mechanism.joint(spring.joint), history).angle

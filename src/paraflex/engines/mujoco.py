@@ -157,7 +157,7 @@ def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, s
 
 
 @dataclass(frozen=True)
-class _Motion:
+class _JointMotion:
     """What MuJoCo said at the samples it reached: positions, velocities, accelerations of its joints; energies."""
 
     joints: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
@@ -170,7 +170,7 @@ class _Motion:
         return self.joints[0].shape[0]
 
 
-def _march(mujoco: Any, model: Any, task: TrackingTask, torques: FeedForward, tree: Tree, count: int) -> _Motion:
+def _march(mujoco: Any, model: Any, task: TrackingTask, torques: FeedForward, tree: Tree, count: int) -> _JointMotion:
     times, step = task.motion.t, model.opt.timestep
     data = mujoco.MjData(model)
     # MuJoCo numbers the joints in an order of its own.
@@ -207,7 +207,7 @@ def _march(mujoco: Any, model: Any, task: TrackingTask, torques: FeedForward, tr
             for rows, value in zip(kept, values, strict=True):
                 rows.append(np.array(value))
     position, velocity, acceleration, energy, done = (np.array(rows) for rows in kept)
-    return _Motion((position, velocity, acceleration), energy, done, trouble)
+    return _JointMotion((position, velocity, acceleration), energy, done, trouble)
 
 
 @contextmanager
@@ -225,7 +225,7 @@ def _control_of(mujoco: Any, control: Any) -> Iterator[list[str]]:
 
 
 def _solution(
-    task: TrackingTask, q: NDArray, v: NDArray, a: NDArray, motion: _Motion, count: int, wall_time: float
+    task: TrackingTask, q: NDArray, v: NDArray, a: NDArray, motion: _JointMotion, count: int, wall_time: float
 ) -> Solution:
     system, times = task.system, task.motion.t
     still = constant_signals([0.0] * len(task.mechanism.motors), float(times[-1]))

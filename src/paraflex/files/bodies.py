@@ -1,12 +1,27 @@
-"""Bodies of given shapes from their tables."""
+"""Bodies from their tables."""
 
 from __future__ import annotations
 
-from paraflex.errors import InputError
-from paraflex.files.schema import AssumedModesTable, DampingTable, ModalTable
+from collections.abc import Mapping
+from typing import Any
+
+from paraflex.errors import InputError, suggestion
+from paraflex.fem import ReferenceCondition
+from paraflex.files.schema import (
+    AssumedModesTable,
+    BeamTable,
+    DampingTable,
+    GeneralSectionTable,
+    ModalTable,
+    ModelTable,
+    RigidTable,
+)
 from paraflex.mechanism import (
     AssumedModesBeam,
+    Body,
+    Curvature,
     Damping,
+    FlexibleBeam,
     LossFactor,
     LumpedMass,
     Material,
@@ -15,13 +30,84 @@ from paraflex.mechanism import (
     ModalPoint,
     Polynomial,
     RayleighDamping,
+    RigidBody,
     Section,
     ShapeFunction,
     Sine,
 )
 
 
-def assumed_modes_beam(
+def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | ModalTable, table: ModelTable) -> Body:
+    """The body of that name from its table.
+
+    Raises
+    ------
+    InputError
+        A section, material or lump that the file does not have, or numbers that cannot be.
+    """
+    if isinstance(body, RigidTable):
+        return RigidBody(
+            name=name,
+            mass=body.mass,
+            inertia=body.inertia,
+            centre_of_mass=(body.centre_of_mass[0], body.centre_of_mass[1]),
+            points={key: (point[0], point[1]) for key, point in body.points.items()},
+        )
+    if isinstance(body, ModalTable):
+        return _modal_body(name, body)
+    lumps = []
+    for point, lump_name in body.lumps.items():
+        lump = _named(table.lump, lump_name, f"body.{name}.lumps.{point}", "lump")
+        lumps.append(LumpedMass(point, lump.mass, lump.inertia))
+    if isinstance(body, AssumedModesTable):
+        section, material = _section(name, body.section, table), _material(name, body.material, table)
+        return _assumed_modes_beam(name, body, section, material, tuple(lumps))
+    return FlexibleBeam(
+        name=name,
+        length=body.length,
+        section=_section(name, body.section, table)
+        if isinstance(body.section, str)
+        else tuple(_section(name, each, table) for each in body.section),
+        material=_material(name, body.material, table)
+        if isinstance(body.material, str)
+        else tuple(_material(name, each, table) for each in body.material),
+        points=body.points,
+        elements=tuple(body.elements) if isinstance(body.elements, list) else body.elements,
+        lumps=tuple(lumps),
+        reference=ReferenceCondition(body.reference or table.reference),
+        curvature=Curvature(body.curvature or table.curvature),
+        modes=body.modes,
+        damping=_damping(body.damping, name),
+        flexible=body.flexible,
+    )
+
+
+def _section(body: str, name: str, table: ModelTable) -> Section:
+    section = _named(table.section, name, f"body.{body}.section", "section")
+    if isinstance(section, GeneralSectionTable):
+        return Section(section.area, section.second_moment)
+    _check_sides(section.width, section.thickness, f"section.{name}")
+    return Section.rectangle(section.width, section.thickness)
+
+
+def _material(body: str, name: str, table: ModelTable) -> Material:
+    material = _named(table.material, name, f"body.{body}.material", "material")
+    return Material(material.youngs_modulus, material.density)
+
+
+def _check_sides(width: float, thickness: float, name: str) -> None:
+    for side, value in (("width", width), ("thickness", thickness)):
+        if not value > 0.0:
+            raise InputError("must be positive", field=f"{name}.{side}", value=value, remedy="give it in m")
+
+
+def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:
+    if name not in tables:
+        raise InputError(f"unknown {kind}", field=where, value=name, remedy=suggestion(name, list(tables)))
+    return tables[name]
+
+
+def _assumed_modes_beam(
     name: str, table: AssumedModesTable, section: Section, material: Material, lumps: tuple[LumpedMass, ...]
 ) -> AssumedModesBeam:
     """A bar of assumed modes: its sines first, then its polynomials.
@@ -41,12 +127,12 @@ def assumed_modes_beam(
         points=table.points,
         lumps=lumps,
         modes=table.modes,
-        damping=damping(table.damping, name),
+        damping=_damping(table.damping, name),
         flexible=table.flexible,
     )
 
 
-def modal_body(name: str, table: ModalTable) -> ModalBody:
+def _modal_body(name: str, table: ModalTable) -> ModalBody:
     """A body by its own matrices."""
     return ModalBody(
         name=name,
@@ -62,12 +148,12 @@ def modal_body(name: str, table: ModalTable) -> ModalBody:
         I2=table.I2,
         points={key: ModalPoint(point.position, point.shape, point.slope) for key, point in table.points.items()},
         modes=table.modes,
-        damping=damping(table.damping, name),
+        damping=_damping(table.damping, name),
         flexible=table.flexible,
     )
 
 
-def damping(table: DampingTable | None, name: str) -> Damping | None:
+def _damping(table: DampingTable | None, name: str) -> Damping | None:
     """Structural damping of a body of that name.
 
     Raises

@@ -84,7 +84,12 @@ def check_in_time(text: str, parameters: Mapping[str, float]) -> None:
 
 def is_constant(text: str) -> bool:
     """Whether time does not occur in an expression."""
-    return not any(isinstance(node, ast.Name) and node.id == TIME for node in ast.walk(_parse(text)))
+    return TIME not in names_in(text)
+
+
+def names_in(text: str) -> set[str]:
+    """What an expression speaks of: parameters, functions, time."""
+    return {node.id for node in ast.walk(_parse(text)) if isinstance(node, ast.Name)}
 
 
 def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.files.expressions import ExpressionError, evaluate, evaluate_in_time, is_constant
+from paraflex.files.expressions import (
+    ExpressionError,
+    check_in_time,
+    evaluate,
+    evaluate_in_time,
+    is_constant,
+    names_in,
+)
 from paraflex.files.schema import PieceTable, PrescribedTable
-from paraflex.mechanism import AngleLaw, ConstantSpeed, PiecewiseLaw, TabulatedLaw
+from paraflex.mechanism import AngleLaw, ConstantSpeed, PiecewiseLaw, PrescribedAngle, TabulatedLaw
 from paraflex.mechanism.laws import Values
 
 # Instants at which a law is tried when it is read.
@@ -26,14 +34,29 @@ class ExpressionLaw:
     ----------
     text : str
     parameters : mapping of str to float
+        Those that the text does not name are left out.
     field : str
         Where it stands, for errors.
+
+    Raises
+    ------
+    InputError
+        It is no expression, or names a parameter that is not given.
     """
 
     text: str
-    parameters: Mapping[str, float]
-    field: str = "angle"
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    field: str = field(default="angle", compare=False)
     knots: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        try:
+            check_in_time(self.text, self.parameters)
+        except ExpressionError as error:
+            raise InputError(error.problem, field=self.field, value=self.text, remedy=error.remedy) from None
+        spoken_of = names_in(self.text)
+        used = {name: value for name, value in self.parameters.items() if name in spoken_of}
+        object.__setattr__(self, "parameters", used)
 
     def evaluate(self, t: NDArray[np.float64]) -> Values:
         """Value, rate and acceleration at times t.
@@ -81,6 +104,63 @@ def quantities(entry: PrescribedTable) -> set[str]:
     """Which of "angle" and "displacement" a [prescribed.NAME] table speaks of."""
     said: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
     return {name for table in said for name in ("angle", "displacement") if getattr(table, name) is not None}
+
+
+def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
+    """What a [prescribed.NAME] table says of a law of an "angle" or a "displacement".
+
+    Raises
+    ------
+    InputError
+        A law that a file has no words for.
+    """
+    match law:
+        case ConstantSpeed(angle=angle, speed=speed, knots=()):
+            return {key: value for key, value in ((quantity, angle), ("speed", speed)) if value != 0.0}
+        case ExpressionLaw(text=text, knots=()):
+            return {quantity: text}
+        case TabulatedLaw(times=times, values=values, knots=()):
+            return {"table": list(zip(times, values, strict=True))}
+        case PiecewiseLaw(pieces=pieces, ends=ends):
+            last = {quantity: _piece(pieces[-1])}
+            before = zip(ends, pieces, strict=False)
+            return {"pieces": [*({"until": end, quantity: _piece(piece)} for end, piece in before), last]}
+    raise _no_words(law)
+
+
+def law_parameters(prescribed: Iterable[PrescribedAngle]) -> dict[str, float]:
+    """The parameters that laws speak of, each with one value.
+
+    Raises
+    ------
+    InputError
+        One of two values.
+    """
+    found: dict[str, float] = {}
+    for each in prescribed:
+        for law in each.law.pieces if isinstance(each.law, PiecewiseLaw) else (each.law,):
+            for name, value in law.parameters.items() if isinstance(law, ExpressionLaw) else ():
+                if found.setdefault(name, value) != value:
+                    raise InputError(
+                        f'a file has one value of the parameter "{name}", and laws have {found[name]!r} and {value!r}',
+                        field=f"prescribed.{each.name}.law", remedy="call one of them something else",
+                    )  # fmt: skip
+    return found
+
+
+def _piece(law: AngleLaw) -> float | str:
+    if isinstance(law, ExpressionLaw):
+        return law.text
+    if isinstance(law, ConstantSpeed):
+        return float(law.angle) if law.speed == 0.0 else f"{float(law.angle)!r} + {float(law.speed)!r} * t"
+    raise _no_words(law)
+
+
+def _no_words(law: AngleLaw) -> InputError:
+    return InputError(
+        "a model file cannot say this law", field="law", value=type(law).__name__,
+        remedy="give a ConstantSpeed, an ExpressionLaw, a PiecewiseLaw of these, or a TabulatedLaw of its values",
+    )  # fmt: skip
 
 
 def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:

@@ -2,86 +2,35 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, suggestion
-from paraflex.fem import ReferenceCondition
-from paraflex.files.bodies import assumed_modes_beam, damping, modal_body
-from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.generators import generated_text, generator_names, is_generated
-from paraflex.files.laws import quantities, read_law
 from paraflex.files.library import library_file, library_names
-from paraflex.files.read import naming, read_toml, validate
-from paraflex.files.rows import with_rows
-from paraflex.files.schema import (
-    AssemblyTable,
-    AssumedModesTable,
-    BeamTable,
-    CircleTable,
-    ForceTable,
-    GeneralSectionTable,
-    JointTable,
-    LinearSpringTable,
-    LineTable,
-    ModalTable,
-    ModelTable,
-    PathFile,
-    PointsTable,
-    PolygonTable,
-    PrescribedTable,
-    RigidTable,
-    TorqueTable,
-)
+from paraflex.files.mechanism import read_mechanism, read_path
+from paraflex.files.merge import merged, same
+from paraflex.files.read import naming, parse_toml, read_text, read_toml, validate
+from paraflex.files.rows import with_names, with_rows
+from paraflex.files.schema import ModelTable, PathFile
 from paraflex.files.start import read_start
 from paraflex.files.study import StudyDefaults, check_study
+from paraflex.files.tables import model_tables
 from paraflex.findings import warn_of
-from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
-from paraflex.mechanism import (
-    ActuationMode,
-    AppliedTorque,
-    Assembly,
-    AxisJoint,
-    Body,
-    Curvature,
-    EndEffector,
-    FlexibleBeam,
-    Geometry,
-    Joint,
-    JointFriction,
-    LinearSpring,
-    Load,
-    LumpedMass,
-    Material,
-    Mechanism,
-    Motor,
-    PointForce,
-    PointRef,
-    PrescribedAngle,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
-    Section,
-    SlidingJoint,
-    SlotJoint,
-    Start,
-    TorsionalDamper,
-    TorsionalSpring,
-    WeldJoint,
-    parse_mode,
-)
+from paraflex.kinematics import Path
+from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode
 from paraflex.simulate import Ending, TrackingTask, plan_tracking
 from paraflex.validity import doubtful_numbers
+from paraflex.writing import write_text
 
 
 @given_as("a model", "the model that paraflex.load reads")
 @dataclass(frozen=True)
-class Model:
-    """What a model file says.
+class Model(CheckedFields):
+    """What a model file says, or is to say.
 
     Attributes
     ----------
@@ -89,19 +38,22 @@ class Model:
     paths : mapping of str to Path
     study : StudyDefaults
     source : str
-        The file it came from, or the library name.
+        The file it came from, or the library name; empty for one made in Python.
     parameters : mapping
         The file's content as read, for provenance.
     start : Start or None
         Deflection and velocity at the start of a run without a path; None for a start undeformed and at rest.
+    text : str
+        The file's text, which `save` keeps the comments of.
     """
 
     mechanism: Mechanism
-    paths: Mapping[str, Path]
-    study: StudyDefaults
-    source: str
-    parameters: Mapping[str, Any] = field(repr=False, compare=False)
+    paths: Mapping[str, Path] = field(default_factory=dict)
+    study: StudyDefaults = field(default_factory=StudyDefaults)
+    source: str = ""
+    parameters: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     start: Start | None = None
+    text: str = field(default="", repr=False, compare=False)
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -114,7 +66,7 @@ class Model:
             ("study: modes", list(study.modes)),
             ("study: duration [s]", study.duration),
         ]
-        return page(f"Model {self.source}", facts(told), self.mechanism._repr_html_())
+        return page(f"Model {self.source or self.mechanism.name}", facts(told), self.mechanism._repr_html_())
 
     @checked_arguments()
     def path(self, name: str | None = None) -> Path:
@@ -222,6 +174,31 @@ class Model:
                 remedy="drop the [start] table, or run without a path",
             )  # fmt: skip
 
+    @checked_arguments()
+    def save(self, path: str | FilePath) -> None:
+        """Write a model file from which `load` reads the same mechanism, paths, study and start.
+
+        A model that came from a file is written as that file, with what differs in its place: comments, order and
+        expressions stay. What has no place there is added. The file is written whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            One that exists is replaced.
+
+        Raises
+        ------
+        InputError
+            A member that a file has no words for, such as a law by functions of Python: it is named.
+        OutputError
+            The file cannot be written.
+        """
+        from paraflex.files.document import document_text
+
+        path = FilePath(path)
+        data = with_names(_data(self), self.text, path.parent)
+        write_text(path, document_text(data, self.text), remedy="choose another file")
+
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
 def load(name_or_file: str | FilePath) -> Model:
@@ -241,9 +218,15 @@ def load(name_or_file: str | FilePath) -> Model:
     InputError
         Unknown name, unreadable file, or anything in it that does not fit: it names file, field, value and remedy.
     """
-    model = model_from(*load_data(name_or_file))
+    model = read_model(name_or_file)
     warn_of(doubtful_numbers(model.mechanism, model.study.duration))
     return model
+
+
+def read_model(name_or_file: str | FilePath) -> Model:
+    """What `load` reads, without its warnings."""
+    text, source, folder = _read(name_or_file)
+    return model_from(_parsed(text, source, folder), source, text)
 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
@@ -255,13 +238,12 @@ def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:
     InputError
         Unknown name, unreadable file, or a file it names that cannot be read.
     """
-    data, source, folder = _read(name_or_file)
-    with naming(source):
-        return with_rows(data, folder), source
+    text, source, folder = _read(name_or_file)
+    return _parsed(text, source, folder), source
 
 
 @checked_arguments()
-def model_from(data: dict[str, Any], source: str) -> Model:
+def model_from(data: dict[str, Any], source: str, text: str = "") -> Model:
     """The model that parsed data describe; see `load` for what is raised.
 
     Parameters
@@ -270,16 +252,23 @@ def model_from(data: dict[str, Any], source: str) -> Model:
         See `load_data`; left as it is.
     source : str
         Named in errors.
+    text : str
+        A file's, which `Model.save` keeps the comments of.
     """
     with naming(source):
-        return _model(validate(ModelTable, data, source), data, source)
+        return _model(validate(ModelTable, data, source), data, source, text)
 
 
-def _read(name_or_file: str | FilePath) -> tuple[dict[str, Any], str, FilePath]:
-    """A model's data, the name of their source, and the folder that names of other files in them count from."""
+def _parsed(text: str, source: str, folder: FilePath) -> dict[str, Any]:
+    with naming(source):
+        return with_rows(parse_toml(text, source), folder)
+
+
+def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
+    """A model's text, the name of its source, and the folder that names of other files in it count from."""
     text = str(name_or_file)
     if is_generated(text):
-        return tomllib.loads(generated_text(text)), text, FilePath()
+        return generated_text(text), text, FilePath()
     if text in library_names():
         path, source = FilePath(str(library_file(text))), f"{text}.toml"
     else:
@@ -291,7 +280,7 @@ def _read(name_or_file: str | FilePath) -> tuple[dict[str, Any], str, FilePath]:
                 value=text,
                 remedy=suggestion(text, [*library_names(), *generator_names()]),
             )
-    return read_toml(path, source), source, path.parent
+    return read_text(path, source), source, path.parent
 
 
 @checked_arguments()
@@ -306,33 +295,21 @@ def load_path(file: str | FilePath) -> Path:
     source = str(file)
     table = validate(PathFile, read_toml(FilePath(file), source), source)
     try:
-        return _path(table.path)
+        return read_path(table.path)
     except InputError as error:
         raise error.within("path").in_file(source) from None
 
 
-def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
-    mechanism = _mechanism(table)
+def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
+    mechanism = read_mechanism(table)
     paths = {}
     for name, entry in table.path.items():
         try:
-            paths[name] = _path(entry)
+            paths[name] = read_path(entry)
         except InputError as error:
             raise error.within(f"path.{name}") from error
-    study = StudyDefaults(
-        path=table.study.path,
-        modes=tuple(table.study.modes),
-        duration=table.study.duration,
-        samples=table.study.samples,
-        assembly=table.study.assembly,
-        torques=table.study.torques,
-        orientation=table.study.orientation or 0.0,
-        method=table.study.method,
-        tolerance=table.study.tolerance,
-        step=table.study.step,
-        after=table.study.after,
-        error=table.study.error,
-    )
+    said = dict(table.study) | {"modes": tuple(table.study.modes), "orientation": table.study.orientation or 0.0}
+    study = StudyDefaults(**said)
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
     if table.study.orientation is not None and not turns:
@@ -341,175 +318,39 @@ def _model(table: ModelTable, data: dict[str, Any], source: str) -> Model:
             remedy='name "angle" among the coordinates of [end_effector], or leave it out',
         )  # fmt: skip
     start = None if table.start is None else read_start(table.start, mechanism)
-    return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start)
+    return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start, text=text)
 
 
-def _mechanism(table: ModelTable) -> Mechanism:
-    effector = table.end_effector
-    return Mechanism(
-        name=table.name,
-        description=table.description,
-        geometry=Geometry(table.geometry),
-        ground={name: (point[0], point[1]) for name, point in table.ground.items()},
-        bodies=tuple(_body(name, body, table) for name, body in table.body.items()),
-        joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
-        motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
-        prescribed=_prescribed(table),
-        springs=tuple(
-            TorsionalSpring(name, entry.joint, entry.stiffness, entry.rest) for name, entry in table.spring.items()
-        ),
-        dampers=tuple(TorsionalDamper(name, entry.joint, entry.coefficient) for name, entry in table.damper.items()),
-        frictions=tuple(
-            JointFriction(name, entry.joint, entry.limit, entry.speed) for name, entry in table.friction.items()
-        ),
-        linear_springs=tuple(_linear_spring(name, entry) for name, entry in table.linear_spring.items()),
-        loads=tuple(_load(name, load) for name, load in table.load.items()),
-        gravity=(table.gravity[0], table.gravity[1]),
-        end_effector=None
-        if effector is None
-        else EndEffector(PointRef.parse(effector.point, "end_effector.point"), tuple(effector.coordinates)),
-        assemblies=tuple(_assembly(name, entry) for name, entry in table.assembly.items()),
-        modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
-    )
+def _data(model: Model) -> dict[str, Any]:
+    """The data of a file from which a model is read: those it came from as far as they still say so."""
+    data = dict(model.parameters)
+    if not data:
+        return _checked(model, _tables(model))
+    for each in (False, True, True):
+        found = model_from(data, model.source)
+        now, wanted = (_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
+        if same(now, wanted):
+            return data
+        data = merged(data, now, wanted)
+    return _checked(model, data)
 
 
-def _joint(name: str, entry: list[str] | JointTable) -> Joint:
-    points = entry if isinstance(entry, list) else entry.points
-    a, b = (PointRef.parse(point, f"joint.{name}") for point in points)
-    if isinstance(entry, list):
-        return RevoluteJoint(name, a, b)
-    # A field of another kind of joint would be read and not obeyed.
-    kind = _JOINTS[entry.type]
-    given = {key: getattr(entry, key) for key in ("direction", "angle", "at_end") if key in entry.model_fields_set}
-    for key, value in given.items():
-        if key not in {field.name for field in fields(kind)}:
+def _tables(model: Model, **options: Any) -> dict[str, Any]:
+    return model_tables(model.mechanism, model.paths, model.study, model.start, **options)
+
+
+def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
+    """Data that say what they are to say.
+
+    Raises
+    ------
+    InputError
+        They do not.
+    """
+    wanted, found = (_tables(one) for one in (model, model_from(data, model.source)))
+    for key, value in wanted.items():
+        if not same(value, found.get(key)):
             raise InputError(
-                f"a {entry.type} joint has no {key}", field=f"joint.{name}.{key}", value=value, remedy="leave it out"
+                "a model file cannot say this", field=key, value=value, remedy="make it of what a file has"
             )
-    return kind(name, a, b, **given)
-
-
-_JOINTS = {
-    "revolute": RevoluteJoint,
-    "prismatic": PrismaticJoint,
-    "slot": SlotJoint,
-    "sliding": SlidingJoint,
-    "weld": WeldJoint,
-}
-
-
-def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
-    parameters = evaluate_parameters(table.parameters)
-    made = []
-    for name, entry in table.prescribed.items():
-        _check_quantity(name, entry, table.joint.get(entry.joint))
-        try:
-            law = read_law(entry, parameters, table.study.duration)
-        except InputError as error:
-            raise error.within(f"prescribed.{name}") from None
-        made.append(PrescribedAngle(name, entry.joint, law))
-    return tuple(made)
-
-
-def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointTable | None) -> None:
-    """A joint that turns has an angle, one that slides a displacement."""
-    slides = isinstance(joint, JointTable) and issubclass(_JOINTS[joint.type], AxisJoint)
-    wrong, right = ("angle", "displacement") if slides else ("displacement", "angle")
-    if joint is not None and wrong in quantities(entry):
-        kind = joint.type if isinstance(joint, JointTable) else "revolute"
-        raise InputError(
-            f"a {kind} joint has no {wrong}", field=f"prescribed.{name}.{wrong}", value=entry.joint,
-            remedy=f"give its {right}",
-        )  # fmt: skip
-
-
-def _assembly(name: str, entry: AssemblyTable) -> Assembly:
-    field = f"assembly.{name}.points"
-    points = {PointRef.parse(text, field): (place[0], place[1]) for text, place in entry.points.items()}
-    return Assembly(name, entry.angles, points)
-
-
-def _linear_spring(name: str, entry: LinearSpringTable) -> LinearSpring:
-    a, b = (PointRef.parse(point, f"linear_spring.{name}.points") for point in entry.points)
-    return LinearSpring(name, a, b, entry.stiffness, entry.length, entry.damping)
-
-
-def _load(name: str, load: ForceTable | TorqueTable) -> Load:
-    point = PointRef.parse(load.point, f"load.{name}.point")
-    if isinstance(load, TorqueTable):
-        return AppliedTorque(name, point, load.torque)
-    return PointForce(name, point, (load.force[0], load.force[1]))
-
-
-def _body(name: str, body: BeamTable | RigidTable | AssumedModesTable | ModalTable, table: ModelTable) -> Body:
-    if isinstance(body, RigidTable):
-        return RigidBody(
-            name=name,
-            mass=body.mass,
-            inertia=body.inertia,
-            centre_of_mass=(body.centre_of_mass[0], body.centre_of_mass[1]),
-            points={key: (point[0], point[1]) for key, point in body.points.items()},
-        )
-    if isinstance(body, ModalTable):
-        return modal_body(name, body)
-    lumps = []
-    for point, lump_name in body.lumps.items():
-        lump = _named(table.lump, lump_name, f"body.{name}.lumps.{point}", "lump")
-        lumps.append(LumpedMass(point, lump.mass, lump.inertia))
-    if isinstance(body, AssumedModesTable):
-        section, material = _section(name, body.section, table), _material(name, body.material, table)
-        return assumed_modes_beam(name, body, section, material, tuple(lumps))
-    return FlexibleBeam(
-        name=name,
-        length=body.length,
-        section=_section(name, body.section, table)
-        if isinstance(body.section, str)
-        else tuple(_section(name, each, table) for each in body.section),
-        material=_material(name, body.material, table)
-        if isinstance(body.material, str)
-        else tuple(_material(name, each, table) for each in body.material),
-        points=body.points,
-        elements=tuple(body.elements) if isinstance(body.elements, list) else body.elements,
-        lumps=tuple(lumps),
-        reference=ReferenceCondition(body.reference or table.reference),
-        curvature=Curvature(body.curvature or table.curvature),
-        modes=body.modes,
-        damping=damping(body.damping, name),
-        flexible=body.flexible,
-    )
-
-
-def _section(body: str, name: str, table: ModelTable) -> Section:
-    section = _named(table.section, name, f"body.{body}.section", "section")
-    if isinstance(section, GeneralSectionTable):
-        return Section(section.area, section.second_moment)
-    _check_sides(section.width, section.thickness, f"section.{name}")
-    return Section.rectangle(section.width, section.thickness)
-
-
-def _material(body: str, name: str, table: ModelTable) -> Material:
-    material = _named(table.material, name, f"body.{body}.material", "material")
-    return Material(material.youngs_modulus, material.density)
-
-
-def _check_sides(width: float, thickness: float, name: str) -> None:
-    for side, value in (("width", width), ("thickness", thickness)):
-        if not value > 0.0:
-            raise InputError("must be positive", field=f"{name}.{side}", value=value, remedy="give it in m")
-
-
-def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:
-    if name not in tables:
-        raise InputError(f"unknown {kind}", field=where, value=name, remedy=suggestion(name, list(tables)))
-    return tables[name]
-
-
-def _path(table: PolygonTable | LineTable | CircleTable | PointsTable) -> Path:
-    if isinstance(table, PolygonTable):
-        return Polygon(tuple((x, y) for x, y in table.corners), table.max_acceleration, table.closed)
-    if isinstance(table, LineTable):
-        return Line(table.start, table.end, table.max_acceleration)
-    if isinstance(table, CircleTable):
-        centre = (table.centre[0], table.centre[1])
-        return Circle(centre, table.radius, table.max_acceleration, table.start_angle, table.sweep)
-    return PointPath(tuple(map(tuple, table.points)), table.motion_time)
+    return data

@@ -27,22 +27,37 @@ T = typing.TypeVar("T", bound=BaseModel)
 
 
 def read_toml(path: Path, source: str) -> dict[str, Any]:
-    """Parse a TOML file.
+    """Parse a TOML file; see `read_text` and `parse_toml` for the errors."""
+    return parse_toml(read_text(path, source), source)
+
+
+def read_text(path: Path, source: str) -> str:
+    """The text of a TOML file.
 
     Raises
     ------
     InputError
-        No such file, not readable, not UTF-8, or not TOML.
+        No such file, not readable, or not UTF-8.
     """
     try:
         if path.stat().st_size > _LARGEST_FILE:
             raise InputError("too large for a model file", field="file", remedy="name a TOML file", source=source)
-        text = path.read_bytes().decode("utf-8")
+        return path.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError("not a text file in UTF-8", field="file", remedy="name a TOML file", source=source) from error
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise InputError(f"cannot be read ({reason})", field="file", remedy="check its name", source=source) from error
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The data of a TOML text.
+
+    Raises
+    ------
+    InputError
+        It is not TOML.
+    """
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

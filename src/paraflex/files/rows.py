@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,18 @@ def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         for name, entry in prescribed.items()
     }
     return data | {"prescribed": read}
+
+
+def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
+    """A model's data with the names of files in place of their rows, where a text has names that hold for a folder."""
+    named = tomllib.loads(text).get("prescribed", {})
+    prescribed = dict(data.get("prescribed", {}))
+    for name, entry in prescribed.items():
+        file = named.get(name, {}).get("table")
+        with suppress(InputError):
+            if isinstance(file, str) and _read_rows(folder / file, file, name) == entry.get("table"):
+                prescribed[name] = entry | {"table": file}
+    return data | {"prescribed": prescribed} if prescribed else data
 
 
 def _read_rows(path: Path, name: str, field: str) -> list[list[float]]:

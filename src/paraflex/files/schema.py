@@ -394,7 +394,7 @@ class PointsTable(_Table):
 PathTable = Annotated[PolygonTable | LineTable | CircleTable | PointsTable, Field(discriminator="type")]
 
 
-class StudyTable(_Table):
+class StudyDefaultsTable(_Table):
     """What `paraflex run` does unless asked otherwise."""
 
     path: Text | None = Field(default=None, description="the name of a [path.NAME] table")
@@ -461,7 +461,7 @@ class ModelTable(_Table):
     mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
     path: dict[str, PathTable] = {}
     start: StartTable | None = None
-    study: StudyTable = StudyTable()
+    study: StudyDefaultsTable = StudyDefaultsTable()
 
 
 def model_schema() -> dict[str, Any]:

@@ -26,7 +26,7 @@ from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import CLOSED, SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
-from paraflex.kinematics.reach import Reach, Shortfall
+from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.mechanism import Assembly, Mechanism, PointRef
 from paraflex.mechanism.members import TASK_COORDINATES
 
@@ -242,7 +242,7 @@ class PathClosure:
         )[0]
         self.coordinates = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
         self.packed, self.marker = with_marker(system, effector.point)
-        self.reach = Reach(system, effector.point, self.coordinates, self.signals)
+        self.reach = PoseSearch(system, effector.point, self.coordinates, self.signals)
 
     def check_degrees_of_freedom(self, assembly: Assembly) -> None:
         """Raise unless there are as many task coordinates as degrees of freedom, and no row follows from others."""

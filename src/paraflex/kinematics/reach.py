@@ -107,7 +107,7 @@ class Shortfall:
 
 
 @dataclass(frozen=True)
-class Reach:
+class PoseSearch:
     """The poses of a rigid mechanism and how near they bring its end-effector to places.
 
     Attributes

@@ -39,7 +39,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class TidyTable:
     """Columns of one length."""
 
     columns: tuple[Column, ...]
@@ -50,7 +50,7 @@ class Table:
 
 
 @checked_arguments()
-def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, Table]:
+def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, TidyTable]:
     """Results as tidy tables, a row an observation.
 
     Parameters
@@ -62,7 +62,7 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, Table]
 
     Returns
     -------
-    dict of str to Table
+    dict of str to TidyTable
         `time_series`: a row a model (of a verification), mode and time; a variable of more dimensions makes a column
         for each of their labels, `torque_tau1` or `joint_force_B1_x`. `figures`: a row a model and mode. `shapes`: a
         row a model, mode, time and drawn point.
@@ -83,7 +83,7 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, Table]
     return tables
 
 
-def _table(data: xr.Dataset, names: Sequence[Any], rows: list[str]) -> Table:
+def _table(data: xr.Dataset, names: Sequence[Any], rows: list[str]) -> TidyTable:
     shape = [data.sizes[dim] for dim in rows]
     columns = []
     for axis, dim in enumerate(rows):
@@ -102,7 +102,7 @@ def _table(data: xr.Dataset, names: Sequence[Any], rows: list[str]) -> Table:
         for index in product(*(range(len(one)) for one in labels)):
             suffix = "".join(f"_{one[i]}" for one, i in zip(labels, index, strict=True))
             columns.append(Column(f"{name}{suffix}", *_told(array), values[(..., *index)].ravel()))
-    return Table(tuple(columns))
+    return TidyTable(tuple(columns))
 
 
 def _labels(data: xr.Dataset, dim: Any) -> list[str]:
@@ -172,7 +172,7 @@ def export_results(
     return list(files.values())
 
 
-def write_table(table: Table, file: Path, to: str, told: dict[str, str] | None = None) -> None:
+def write_table(table: TidyTable, file: Path, to: str, told: dict[str, str] | None = None) -> None:
     """Write a table as CSV, units in the names of columns, or Parquet, units in their metadata."""
     import pyarrow as pa
     from pyarrow import csv, parquet

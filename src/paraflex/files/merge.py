@@ -1,0 +1,51 @@
+"""Data of a file changed as the model changed that they describe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether data are the same, keys in the same order."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return list(one) == list(other) and all(same(value, other[key]) for key, value in one.items())
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    return isinstance(one, bool) == isinstance(other, bool) and one == other
+
+
+def merged(data: Any, before: Any, after: Any) -> Any:
+    """Data changed as `after` differs from `before`, which say the same in a form without choices.
+
+    Where the data have a form of their own, such as an expression or a field that is as it is by default, they keep it
+    as long as what it stands for stays.
+    """
+    if same(before, after):
+        return data
+    if isinstance(data, list) and isinstance(before, list) and isinstance(after, list):
+        if len(data) == len(before) == len(after):
+            return [merged(*each) for each in zip(data, before, after, strict=True)]
+    elif (
+        isinstance(data, Mapping)
+        and isinstance(before, Mapping)
+        and isinstance(after, Mapping)
+        and data.get("type") in (None, after.get("type"))
+    ):
+        return _merged_table(data, before, after)
+    return after
+
+
+def _merged_table(data: Mapping[str, Any], before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    out = {key: value for key, value in data.items() if key in after or key not in before}
+    for key, value in after.items():
+        out[key] = merged(data[key], before[key], value) if key in data and key in before else value
+    if order_of(before, after) == list(after):
+        return out
+    return {key: value for key, value in out.items() if key not in after} | {key: out[key] for key in after}
+
+
+def order_of(before: Iterable[str], after: Mapping[str, Any]) -> list[str]:
+    """Keys that stay in their order, then new ones."""
+    kept = [key for key in before if key in after]
+    return [*kept, *(key for key in after if key not in kept)]

@@ -1,0 +1,298 @@
+"""The tables of a model file from the mechanism, the paths, the study and the start that it is to say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields
+from enum import Enum
+from itertools import count
+from numbers import Integral
+from typing import Any
+
+from paraflex.errors import InputError
+from paraflex.files.laws import law_parameters, law_table
+from paraflex.files.mechanism import JOINTS, PATHS
+from paraflex.files.study import StudyDefaults
+from paraflex.kinematics import Path
+from paraflex.mechanism import (
+    Assembly,
+    AssumedModesBeam,
+    AxisJoint,
+    Body,
+    FlexibleBeam,
+    Joint,
+    Mechanism,
+    ModalBody,
+    PointForce,
+    PointRef,
+    Polynomial,
+    PrescribedAngle,
+    RevoluteJoint,
+    RigidBody,
+    Section,
+    ShapeFunction,
+    Sine,
+    Start,
+)
+
+_BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
+# What all beams of a file may have in common at its top, and what they have where it says nothing.
+_SHARED = {"reference": "pinned", "curvature": "separate"}
+# Tables that bodies name, and the field of a body that has the names.
+_NAMED = {"section": "section", "material": "material", "lump": "lumps"}
+
+
+def model_tables(
+    mechanism: Mechanism,
+    paths: Mapping[str, Path],
+    study: StudyDefaults,
+    start: Start | None,
+    *,
+    file: Mapping[str, Any] | None = None,
+    before: Mechanism | None = None,
+    each: bool = False,
+) -> dict[str, Any]:
+    """What a model file says of a model; what is as it is where a file says nothing is left out.
+
+    Parameters
+    ----------
+    mechanism, paths, study, start
+    file : mapping, optional
+        Data of a file whose names for sections, materials and lumps are kept.
+    before : Mechanism, optional
+        That of the file.
+    each : bool
+        Whether every beam says its reference condition and its treatment of curvature, or the file for all that agree.
+
+    Raises
+    ------
+    InputError
+        A member that a file has no words for.
+    """
+    shared = {} if each else _agreed(mechanism)
+    names = {kind: _Names(kind, mechanism, file or {}, before) for kind in _NAMED}
+    said = {
+        "name": mechanism.name,
+        "description": mechanism.description,
+        "geometry": "" if mechanism.geometry.value == "second-order" else mechanism.geometry.value,
+        **{key: value for key, value in shared.items() if value != _SHARED[key]},
+        "parameters": law_parameters(mechanism.prescribed),
+        "section": {name: _section(section) for name, section in names["section"].values.items()},
+        "material": {name: _fields(material) for name, material in names["material"].values.items()},
+        "lump": {name: {"mass": mass, "inertia": inertia} for name, (mass, inertia) in names["lump"].values.items()},
+        "ground": mechanism.ground,
+        "gravity": [] if tuple(mechanism.gravity) == (0.0, 0.0) else mechanism.gravity,
+        "body": {body.name: _body(body, names, shared) for body in mechanism.bodies},
+        "joint": {joint.name: _joint(joint) for joint in mechanism.joints},
+        "motor": {motor.name: motor.joint for motor in mechanism.motors},
+        "prescribed": {each.name: _prescribed(each, mechanism) for each in mechanism.prescribed},
+        **_forces(mechanism),
+        "end_effector": {} if mechanism.end_effector is None else _fields(mechanism.end_effector),
+        "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
+        "mode": {mode.name: mode.motors for mode in mechanism.modes},
+        "path": {name: _path(path, name) for name, path in paths.items()},
+        "start": {} if start is None else _start(start),
+        "study": _fields(study),
+    }
+    return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
+
+
+def _forces(mechanism: Mechanism) -> dict[str, Any]:
+    """Springs, dampers, friction and loads."""
+    at_joints = {"spring": mechanism.springs, "damper": mechanism.dampers, "friction": mechanism.frictions}
+    return {kind: {one.name: _fields(one, "name") for one in members} for kind, members in at_joints.items()} | {
+        "linear_spring": {
+            one.name: {"points": [one.a, one.b]} | _fields(one, "name", "a", "b") for one in mechanism.linear_springs
+        },
+        "load": {
+            one.name: {"type": "force" if isinstance(one, PointForce) else "torque"} | _fields(one, "name")
+            for one in mechanism.loads
+        },
+    }
+
+
+def _fields(given: Any, *left_out: str) -> dict[str, Any]:
+    """The fields of a dataclass that are not as they are by default."""
+    out = {}
+    for field in fields(given):
+        value = getattr(given, field.name)
+        default = field.default if field.default_factory is MISSING else field.default_factory()
+        if field.name not in left_out and (default is MISSING or value != default):
+            out[field.name] = value
+    return out
+
+
+def _plain(value: Any, field: str) -> Any:
+    """Values as TOML has them: texts, numbers, lists and tables."""
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, str | PointRef):
+        return _text(str(value), field)
+    if isinstance(value, Mapping):
+        return {_text(str(key), field): _plain(each, f"{field}.{key}") for key, each in value.items()}
+    if isinstance(value, Integral):
+        return int(value)
+    if hasattr(value, "__iter__"):
+        return [_plain(each, f"{field}.{k}") for k, each in enumerate(value)]
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise _unwritable(field, value, "give a number") from None
+
+
+def _text(text: str, field: str) -> str:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise InputError("not text in UTF-8", field=field, value=ascii(text), remedy="write it otherwise") from None
+    return text
+
+
+def _unwritable(field: str, value: object, remedy: str) -> InputError:
+    return InputError("a model file cannot say this", field=field, value=value, remedy=remedy)
+
+
+def _agreed(mechanism: Mechanism) -> dict[str, str]:
+    """What all beams have in common of reference condition and curvature."""
+    beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam)]
+    values = {key: {getattr(beam, key).value for beam in beams} for key in _SHARED}
+    return {key: found.pop() for key, found in values.items() if len(found) == 1}
+
+
+class _Names:
+    """Names of the sections, materials or lumps of a mechanism, and what they name.
+
+    A name that a file has stays where it is. It gets another value where all that had the old one have another.
+
+    Attributes
+    ----------
+    at : mapping
+        Names by body and place: the number of a span, or the name of a point.
+    values : mapping
+        By name.
+    """
+
+    def __init__(self, kind: str, mechanism: Mechanism, file: Mapping[str, Any], before: Mechanism | None) -> None:
+        places = _places(kind, mechanism)
+        had = {} if before is None else _places(kind, before)
+        taken = {place: name for place in places if (name := _name_at(file, _NAMED[kind], *place)) is not None}
+        self.at: dict[tuple[str, Any], str] = {}
+        self.values: dict[str, Any] = {}
+        for place, name in taken.items():
+            if name not in self.values or places[place] == had.get(place):
+                self.values[name] = places[place]
+        for place, value in places.items():
+            name = taken.get(place)
+            if name is None or self.values[name] != value:
+                name = next((known for known, named in self.values.items() if named == value), None) or next(
+                    new for n in count(1) if (new := f"{kind}{n}") not in self.values and new not in file.get(kind, {})
+                )
+                self.values[name] = value
+            self.at[place] = name
+
+
+def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
+    """Every section, material or lump by body and place."""
+    out: dict[tuple[str, Any], Any] = {}
+    for body in mechanism.bodies:
+        given = getattr(body, _NAMED[kind], ())
+        if kind == "lump":
+            for lump in given:
+                if (body.name, lump.point) in out:
+                    raise _unwritable(f"body.{body.name}.lumps", lump.point, "make one lump of those at a point")
+                out[body.name, lump.point] = (lump.mass, lump.inertia)
+        else:
+            for k, each in enumerate(given if isinstance(given, tuple) else (given,)):
+                sides = getattr(each, "sides", None)
+                if sides is not None and Section.rectangle(*sides) != each:
+                    raise _unwritable(f"body.{body.name}.section", each, "give Section.rectangle(...), or no sides")
+                out[body.name, k] = each
+    return out
+
+
+def _name_at(file: Mapping[str, Any], field: str, body: str, place: Any) -> str | None:
+    """The name that a file has there."""
+    found = file.get("body", {}).get(body, {}).get(field, ())
+    if isinstance(found, Mapping):
+        return found.get(place)
+    listed = (found,) if isinstance(found, str) else found
+    return listed[place] if isinstance(place, int) and place < len(listed) else None
+
+
+def _section(section: Section) -> dict[str, Any]:
+    return _fields(section) if section.sides is None else dict(zip(("width", "thickness"), section.sides, strict=True))
+
+
+def _body(body: Body, names: Mapping[str, _Names], shared: Mapping[str, str]) -> dict[str, Any]:
+    out: dict[str, Any] = {"type": _BODIES[type(body)]} | _fields(body, "name", *_SHARED)
+    if isinstance(body, FlexibleBeam):
+        out |= {key: getattr(body, key) for key in _SHARED if key not in shared}
+    if isinstance(body, FlexibleBeam | AssumedModesBeam):
+        for kind in ("section", "material"):
+            listed = [name for (owner, _), name in names[kind].at.items() if owner == body.name]
+            out[kind] = listed if isinstance(getattr(body, kind), tuple) else listed[0]
+        if body.lumps:
+            out["lumps"] = {lump.point: names["lump"].at[body.name, lump.point] for lump in body.lumps}
+    if isinstance(body, AssumedModesBeam):
+        for direction in ("transverse", "axial"):
+            out |= _functions(out.pop(direction, ()), f"body.{body.name}.{direction}", direction)
+    if isinstance(body, ModalBody):
+        out["points"] = {name: vars(point) for name, point in body.points.items()}
+    if not isinstance(body, RigidBody) and body.damping is not None:
+        out["damping"] = vars(body.damping)
+    return out
+
+
+def _functions(functions: Sequence[ShapeFunction], field: str, direction: str) -> dict[str, Any]:
+    """Shape functions as files have them: the first sines, then polynomials."""
+    sines = [function.half_waves for function in functions if isinstance(function, Sine)]
+    polynomials = [function.coefficients for function in functions[len(sines) :] if isinstance(function, Polynomial)]
+    if sines != list(range(1, len(sines) + 1)) or len(sines) + len(polynomials) != len(functions):
+        raise _unwritable(field, functions, "give the sines from 1 on without gaps, then the polynomials")
+    said = {f"{direction}_sines": len(sines), f"{direction}_polynomials": polynomials}
+    return {key: value for key, value in said.items() if value}
+
+
+def _joint(joint: Joint) -> Any:
+    points = [joint.a, joint.b]
+    if isinstance(joint, RevoluteJoint):
+        return points
+    kind = next(name for name, kind in JOINTS.items() if isinstance(joint, kind))
+    return {"type": kind, "points": points} | _fields(joint, "name", "a", "b")
+
+
+def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, Any]:
+    slides = isinstance(mechanism.joint(prescribed.joint), AxisJoint)
+    try:
+        law = law_table(prescribed.law, "displacement" if slides else "angle")
+    except InputError as error:
+        raise error.within(f"prescribed.{prescribed.name}") from None
+    return {"joint": prescribed.joint} | law
+
+
+def _path(path: Path, name: str) -> dict[str, Any]:
+    for kind, made in PATHS.items():
+        if type(path) is made:
+            return {"type": kind} | _fields(path)
+    raise _unwritable(f"path.{name}", type(path).__name__, "give a Polygon, Line, Circle or PointPath")
+
+
+def _assembly(assembly: Assembly) -> dict[str, Any]:
+    if "points" in assembly.angles:
+        raise _unwritable(f"assembly.{assembly.name}", "points", 'call the body "points" something else')
+    return {**assembly.angles} | ({"points": assembly.points} if assembly.points else {})
+
+
+def _start(start: Start) -> dict[str, Any]:
+    velocity = {"angular": start.angular, "point": start.point}
+    said = {
+        "deflection": {
+            body: {point: _fields(each) for point, each in points.items()} for body, points in start.deflection.items()
+        },
+        "velocity": {key: value for key, value in velocity.items() if value},
+        "coordinates": {body: _fields(each) for body, each in start.coordinates.items()},
+        "rates": {body: _fields(each) for body, each in start.rates.items()},
+    }
+    return {key: value for key, value in said.items() if value}
