@@ -13,6 +13,7 @@ from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
 from paraflex.integrators.scipy_methods import ScipyStepper
+from paraflex.integrators.spectra import MULTISTEP
 from paraflex.integrators.stepper import Stepper, Steps
 from paraflex.integrators.stiffness import warn_if_stiff
 from paraflex.integrators.stretches import hidden_from
@@ -177,7 +178,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
 
 def _stepper(problem: Problem, options: IntegrationOptions) -> Stepper:
     method, order, error = options.method, _max_order(options), _PER_STEP[options.method] * options.tolerance
-    if "max_order" in options.description.parameters:
+    if method in MULTISTEP:
         error *= (options.tolerance / _REFERENCE) ** (1.0 / order)
     steps = Steps(min(FIRST_STEP * problem.span, options.max_step), options.max_step, order)
     if method == "ida":
