@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -319,67 +320,59 @@ def records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
 
 
 def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
-    values = []
-    flex = square = port = effort = block = mass = dense = inverse = first = products = jac = 0
-    places = spans = inertias = damping = 0
+    values: list[dict] = []
+    start: Counter[str] = Counter()
     for body, body_ports, body_efforts, matrix in zip(bodies, ports, efforts, columns, strict=True):
-        s = body.integrals
-        parts = sum(port["parts"] for port in body_ports)
-        # Three lanes more for the rigid coordinates.
-        lanes, size, stride = padded(parts + 3), 3 + body.nf, padded(body.nf)
-        coupled, full = _coupled_damping(body).size, _is_full(body)
-        masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
+        s, parts = body.integrals, sum(port["parts"] for port in body_ports)
+        own = _stretches(body, parts) | {"port": len(body_ports), "effort": len(body_efforts), "columns": matrix.size}
+        starts = {name: start[name] for name in own}
+        start.update(own)
         values.append(
-            {
+            starts
+            | {f"{name}_end": start[name] for name in ("port", "effort", "mass")}
+            | {
                 "offset": body.offset,
                 "nf": body.nf,
-                "flex": flex,
-                "square": square,
-                "port": port,
-                "port_end": port + len(body_ports),
-                "effort": effort,
-                "effort_end": effort + len(body_efforts),
-                "columns": first,
                 "width": matrix.shape[1],
-                "products": products,
-                "stride": stride,
-                "damping": damping if coupled else -1,
-                "block": block,
+                "stride": padded(body.nf),
+                "damping": starts["damping"] if own["damping"] else -1,
                 "parts": parts,
-                "lanes": lanes,
-                "jac": jac,
-                "mass": mass,
-                "mass_end": mass + masses,
-                "slopes": slopes,
-                "pitch": padded(masses),
-                "places": places,
-                "spans": spans,
-                "inertias": inertias,
-                "full": int(full),
-                "dense": dense,
-                "inverse": inverse,
+                "lanes": _lanes(parts),
+                "slopes": 0 if body.points is None else body.points.weights.shape[1],
+                "pitch": padded(own["mass"]),
+                "full": int(_is_full(body)),
                 "m": s.m,
                 "S1x": s.S1[0],
                 "S1y": s.S1[1],
                 "I0": s.I0 + s.J,
             }
         )
-        flex += body.nf
-        square += body.nf**2
-        port += len(body_ports)
-        effort += len(body_efforts)
-        first += matrix.size
-        products += 2 * body.nf * stride
-        damping += coupled
-        block += parts * lanes
-        jac += size * lanes
-        mass += masses
-        places += body.nf * 3 * padded(masses)
-        spans += slopes * padded(masses)
-        inertias += 3 * padded(masses)
-        dense += size**2 if full else 0
-        inverse += size * padded(size) if full else 0
     return records(BODY, values)
+
+
+def _lanes(parts: int) -> int:
+    """Lanes of a body's Jacobian rows, with three more for its rigid coordinates."""
+    return padded(parts + 3)
+
+
+def _stretches(body: BodyCoordinates, parts: int) -> dict[str, int]:
+    """How much of each array is a body's own, by the field that says where that starts."""
+    size, full = 3 + body.nf, _is_full(body)
+    masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
+    return {
+        "flex": body.nf,
+        "square": body.nf**2,
+        "products": 2 * body.nf * padded(body.nf),
+        "damping": _coupled_damping(body).size,
+        "block": parts * _lanes(parts),
+        "jac": size * _lanes(parts),
+        "mass": masses,
+        "places": 3 * body.nf * padded(masses),
+        "spans": slopes * padded(masses),
+        "inertias": 3 * padded(masses),
+        "dense": size**2 if full else 0,
+        "inverse": size * padded(size) if full else 0,
+    }
 
 
 def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
