@@ -130,7 +130,7 @@ def _sparse_equilibrium(
 ) -> NDArray[np.float64]:
     """The same with sparse matrices; springs at joints are stiffness here, not multipliers."""
     forces, elastic = RestingForces(system, start.time), stiffness_diagonal(system)
-    signals, still = moment_signals(system.mechanism, start.time), np.zeros(system.n)
+    signals = moment_signals(system.mechanism, start.time)
     kept = [float(joint_coordinate(system, name, start.q[None]).value[0]) for name in held]
     rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
     q, mu = start.q.copy(), np.zeros(rigid.size + len(held))
@@ -143,7 +143,7 @@ def _sparse_equilibrium(
         lam = forces.compliant(q)
         lam[rigid] = mu[: rigid.size]
         f = forces(q, lam)[0] + elastic * q + holding.T @ mu[rigid.size :]
-        phi, _ = system.constraints(signals, start.time, q, still)
+        phi, _ = system.constraints(signals, start.time, q)
         K = scipy.sparse.csr_matrix(pose_stiffness(system, start.time, q, lam) + scipy.sparse.diags(elastic))
         C = scipy.sparse.csr_matrix(scipy.sparse.vstack([sparse_jacobian(system, q)[rigid], holding]))
         try:
@@ -187,7 +187,7 @@ class _Residual:
         self.kept = self.joints(start.q)[0]
         self.signals = moment_signals(mechanism, start.time)
         self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
-        self.v, self.a, self.still = np.zeros((3, system.n))
+        self.v, self.a = np.zeros((2, system.n))
         self.largest_torque = 0.0
         # Rows of friction come with a scale of their own, none by default.
         self.workspace.compliance[:] = system.packed.rows["compliance"]
@@ -199,11 +199,11 @@ class _Residual:
         return np.array([joint.value[0] for joint in found]), rows
 
     def __call__(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        system, ws, still = self.system, self.workspace, self.still
+        system, ws = self.system, self.workspace
         q, lam, torque = np.split(z, [system.n, system.n + system.m])
         q, lam = np.ascontiguousarray(q), np.ascontiguousarray(lam)
         equations(system.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, ws)
-        phi, _ = system.constraints(self.signals, self.time, q, still)
+        phi, _ = system.constraints(self.signals, self.time, q)
         # Rows of springs, dampers and friction have no second derivatives in them.
         closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
         value, rows = self.joints(q)

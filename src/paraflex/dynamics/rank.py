@@ -63,6 +63,11 @@ class Dependence:
         return out
 
 
+def constraint_jacobian(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:
+    """Phi_q (m, n) at q as a sparse matrix; zero in the rows of springs and dampers."""
+    return sparse_jacobian(system, q) if system.m > DENSE_ROWS else scipy.sparse.csr_matrix(system.jacobian(q))
+
+
 def dependence(
     system: System, q: NDArray[np.float64], threshold: float = DEPENDENT, count: int | None = None
 ) -> Dependence:

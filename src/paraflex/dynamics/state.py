@@ -5,29 +5,37 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.dynamics.projection import NAMED, gap_unit, joint_gaps, least_change, refuse_conflict
+from paraflex.dynamics.projection import (
+    NAMED,
+    assemble,
+    closed,
+    constraint_change,
+    gap_unit,
+    joint_gaps,
+    link_metric,
+    project,
+    refuse_conflict,
+    second_rates,
+)
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
-from paraflex.kernel.stage import equations
+from paraflex.kernel.packed import Signals
 from paraflex.mechanism import GROUND, Assembly, PointJoint, PointRef
 from paraflex.mechanism.poses import approximate_poses
 
-_MAX_ITERATIONS = 50
 # Where Newton's iteration fails, a damped one goes downhill to the smallest gap: how it begins and ends.
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
 # How far links are turned aside before that [rad].
 _ASIDE = 1e-2
-# Closure error that counts as closed [rad], and as a part of the mechanism's size: thousands of rounding errors.
-CLOSED = 1e-12
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
 _POSITION_STIFFNESS = 1.0
 # Links that must be deflected by more than this part of their size for loops to close do not fit together.
@@ -118,27 +126,15 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     AssemblyError
         The loops cannot be closed from there; its partial result is where they come closest to it.
     """
-    start, q = q, q.copy()
-    zero = np.zeros(system.n)
-    for _ in range(_MAX_ITERATIONS):
-        phi, _ = system.constraints(signals, t, q, zero)
-        if closed(system, q, phi):
-            if _keeps_shape(system, start, q):
-                return q
-            break
-        q -= least_change(system, q, phi, stiffness=_POSITION_STIFFNESS)
-    closest = _closest(system, signals, t, start)
-    phi = system.constraints(signals, t, closest, zero)[0]
+    closest, phi = assemble(system, signals, t, q, partial(link_metric, system, stiffness=_POSITION_STIFFNESS))
+    if closed(system, closest, phi) and _keeps_shape(system, q, closest):
+        return closest
+    closest = _closest(system, signals, t, q)
+    phi, _ = system.constraints(signals, t, closest)
     gaps = joint_gaps(system, phi)
     gap, where = f"{max(gaps.values()):.3g} {gap_unit(system, phi)}", " and ".join(list(gaps)[:NAMED])
     cause = f"the loops do not close: a gap of {gap} remains in {where}"
     raise AssemblyError(cause, Moment(t, 0), closest, "correct angles of the assembly, lengths or places of points")
-
-
-def closed(system: System, q: NDArray[np.float64], phi: NDArray[np.float64]) -> bool:
-    """Whether what constraints (m,) leave open at q is rounding: of the size of the mechanism, or of places far off."""
-    far = max(float(np.max(np.abs(q[body.position]), initial=system.size)) for body in system.bodies) / system.size
-    return system.gap(phi) < CLOSED * far
 
 
 def _keeps_shape(system: System, start: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
@@ -176,14 +172,13 @@ def close_downhill(system: System, signals: Signals, t: float, q: NDArray[np.flo
 
     Slower than `project_position` and not as exact, but at home near singular positions and where loops cannot close.
     """
-    still = np.zeros(system.n)
-    phi = system.constraints(signals, t, q, still)[0]
+    phi, _ = system.constraints(signals, t, q)
     damping = _FIRST_DAMPING
     for _ in range(_MAX_DESCENT):
         if closed(system, q, phi) or damping > _LARGEST_DAMPING:
             break
-        trial = q - least_change(system, q, phi, _POSITION_STIFFNESS, damping)
-        gap = system.constraints(signals, t, trial, still)[0]
+        trial = q - constraint_change(system, q, _POSITION_STIFFNESS, damping)(phi)
+        gap, _ = system.constraints(signals, t, trial)
         gain = 1.0 - np.linalg.norm(gap / system.row_units) / np.linalg.norm(phi / system.row_units)
         if gain > 0.0:
             q, phi = trial, gap
@@ -210,10 +205,13 @@ def project_velocity(
     InconsistentConstraintsError
         There are none: two prescribed laws contradict one another.
     """
-    _, rate = system.constraints(signals, t, q, v)
-    v = v - least_change(system, q, rate, stiffness)
-    refuse_conflict(system, "velocities", t, q, rate, system.constraints(signals, t, q, v)[1])
-    return v
+
+    def left(v: NDArray[np.float64]) -> NDArray[np.float64]:
+        return system.constraints(signals, t, q, v)[1]
+
+    found = project(constraint_change(system, q, stiffness), v, left)
+    refuse_conflict(system, "velocities", t, q, left(v), left(found))
+    return found
 
 
 @checked_arguments()
@@ -273,13 +271,9 @@ def check_accelerations(
     InconsistentConstraintsError
         There are none: two prescribed laws, or a singular position in motion.
     """
-    workspace, torques = system.workspace(), np.zeros(len(system.mechanism.motors))
-    no_force = np.zeros(system.m)
-
-    def rows(a: NDArray[np.float64]) -> NDArray[np.float64]:
-        equations(system.packed, signals, t, INDEX_1, q, v, a, no_force, torques, workspace)
-        return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
-
-    wanted = rows(np.zeros(system.n))
+    rest = np.zeros(system.n)
+    wanted = second_rates(system, signals, t, q, v, rest)
     if np.any(wanted):
-        refuse_conflict(system, "accelerations", t, q, wanted, rows(-least_change(system, q, wanted)))
+        left = partial(second_rates, system, signals, t, q, v)
+        found = project(constraint_change(system, q), rest, left)
+        refuse_conflict(system, "accelerations", t, q, wanted, left(found))

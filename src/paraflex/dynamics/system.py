@@ -102,9 +102,10 @@ class System:
         """A fresh workspace for the kernels."""
         return make_workspace(self.packed)
 
-    def constraints(self, signals: Signals, t: float, q: NDArray, v: NDArray) -> tuple[NDArray, NDArray]:
-        """Phi and Phi' at (t, q, v), each (m,); zero in the rows of springs."""
+    def constraints(self, signals: Signals, t: float, q: NDArray, v: NDArray | None = None) -> tuple[NDArray, NDArray]:
+        """Phi and Phi' at (t, q, v), each (m,), at rest without v; zero in the rows of springs."""
         phi, rate = np.zeros(self.m), np.zeros(self.m)
+        v = np.zeros(self.n) if v is None else v
         constraint_values(self.packed, signals, t, q, v, make_scratch(self.packed), phi, rate)
         return phi, rate
 

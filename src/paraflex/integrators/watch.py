@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System, dependence
 from paraflex.dynamics.projection import AGREE, NAMED, contradiction, gap_unit, joint_gaps
-from paraflex.dynamics.rank import DENSE_ROWS
-from paraflex.dynamics.sparse import sparse_jacobian
+from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.integrators.methods import Treatment
 from paraflex.kernel.packed import Signals
 
@@ -68,7 +67,7 @@ def come_apart(
     treatment : Treatment
         What keeps the constraints in the run.
     """
-    phi, _ = system.constraints(signals, t, q, np.zeros(system.n))
+    phi, _ = system.constraints(signals, t, q)
     if not system.gap(phi) > max(_CONTRADICTION if dependent else _APART, tolerance / system.size):
         return None
     if dependent:
@@ -94,7 +93,7 @@ def least_norm(
         return multipliers
     out = multipliers.copy()
     for pose, lam in zip(q, out, strict=True):
-        jacobian = sparse_jacobian(system, pose) if system.m > DENSE_ROWS else system.jacobian(pose)
+        jacobian = constraint_jacobian(system, pose)
         least = dependence(system, pose, count=dependent).least_norm(lam)
         if np.linalg.norm(jacobian.T @ (least - lam)) <= _SAME_FORCES * np.linalg.norm(jacobian.T @ lam):
             lam[:] = least
