@@ -12,12 +12,12 @@ from paraflex.errors import ActuationError, AssemblyError, InputError, Numerical
 from paraflex.files import Model
 from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
-from paraflex.mechanism import ActuationMode, AxisJoint, Mechanism
+from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
 from paraflex.simulate import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import GRAVITY, mechanism_mass, mechanism_size
-from paraflex.validity.plausibility import Driven, doubtful_efforts
+from paraflex.validity.plausibility import doubtful_efforts
 
 # Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
 ILL_CONDITIONED = 1e3
@@ -147,7 +147,7 @@ def _few_samples(model: Model) -> Iterator[Finding]:
     """A drive that turns between two samples so far that its motion is not to be seen."""
     duration, count = model.study.duration, model.study.samples
     for one in model.mechanism.prescribed:
-        if duration is None or isinstance(model.mechanism.joint(one.joint), AxisJoint):
+        if duration is None or model.mechanism.slides(one.joint):
             continue
         angle, _, _ = one.law.evaluate(np.array([0.0, duration]))
         turns = abs(float(angle[1] - angle[0])) / (2.0 * math.pi)
@@ -193,20 +193,7 @@ def _efforts(task: TrackingTask, mode: ActuationMode) -> Iterator[Finding]:
         torques = task.torques(mode).evaluate(task.motion.t)
     except (ActuationError, NumericalError):
         return
-    mechanism, desired = task.mechanism, task.motion.desired
-    names = [motor.name for motor in mechanism.motors]
-    yield from doubtful_efforts(
-        task.system,
-        Driven(
-            mode=mode.name,
-            desired=desired.position,
-            actual=desired.position,
-            acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
-            efforts=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
-            units=dict(zip(names, mechanism.motor_units(), strict=True)),
-            condition=float(np.max(actuation_condition(task.effort, mode))),
-        ),
-    )
+    yield from doubtful_efforts(task.system, task.driven(mode.name, torques, actuation_condition(task.effort, mode)))
 
 
 def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:

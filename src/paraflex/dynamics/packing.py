@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.constraints import Constraint, axis_of
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
 from paraflex.dynamics.scale import mechanism_size
@@ -188,7 +189,7 @@ class _Packer:
                 self.efforts[self.index[ref.body]].append(record)
 
 
-def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], NDArray[np.float64], NDArray[np.float64]]:
+def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
     """Deflections of beams that points slide on: records, breaks and coefficients."""
     records, breaks, coefficients = [], [np.zeros(0)], [np.zeros(0)]
     for body in bodies:
@@ -212,7 +213,7 @@ def _load_record(load: Load) -> dict[str, float]:
     return {"torque": load.torque}
 
 
-def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
+def _modal_rows(body: BodyCoordinates) -> Array:
     s = body.integrals
     return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2, np.diag(body.damping)])
 
@@ -222,13 +223,13 @@ def _is_full(body: BodyCoordinates) -> bool:
     return body.points is not None or _coupled_damping(body).size > 0
 
 
-def _coupled_damping(body: BodyCoordinates) -> NDArray[np.float64]:
+def _coupled_damping(body: BodyCoordinates) -> Array:
     """Damping matrix of a body without its diagonal, rows padded; no rows where nothing is left."""
     rest = body.damping - np.diag(np.diag(body.damping))
     return _padded(rest) if np.any(rest) else np.zeros((0, padded(body.nf)))
 
 
-def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _padded(matrix: Array) -> Array:
     """The matrix with columns of zeros up to whole vectors."""
     rows, columns = matrix.shape
     out = np.zeros((rows, padded(columns)), dtype=matrix.dtype)
@@ -236,7 +237,7 @@ def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
-def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[NDArray[np.float64]]:
+def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[Array]:
     """What coordinates give to the sums of each body, (nf, width): see `kernel.sums`."""
     rows = [[_modal_rows(body)[:FIRST_MARKER]] for body in bodies]
     for marker in markers:
@@ -244,25 +245,25 @@ def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list
     return [_padded(np.vstack(parts).T) for parts in rows]
 
 
-def _products(body: BodyCoordinates) -> NDArray[np.float64]:
+def _products(body: BodyCoordinates) -> Array:
     """Columns of G2 and I2 of a body, one after the other, padded: (nf, 2 stride)."""
     return np.hstack([_padded(body.integrals.G2.T), _padded(body.integrals.I2.T)])
 
 
-def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> NDArray[np.float64] | None:
+def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> Array | None:
     if not any(_is_full(body) for body in bodies):
         return None
     return np.concatenate([np.zeros(0), *(_padded(m.bending).ravel() for m in markers if m.bending is not None)])
 
 
-def _mass_weights(body: BodyCoordinates) -> list[NDArray[np.float64]]:
+def _mass_weights(body: BodyCoordinates) -> list[Array]:
     """Weights of each mass point, as far as they are not zero."""
     if body.points is None:
         return []
     return [row[: 1 + int(np.max(np.nonzero(row)[0], initial=-1))] for row in body.points.weights]
 
 
-def _places(body: BodyCoordinates) -> NDArray[np.float64]:
+def _places(body: BodyCoordinates) -> Array:
     """Nx, Ny and N2' of all mass points by coordinate, (nf, 3 pitch)."""
     if body.points is None:
         return np.zeros((body.nf, 0))
@@ -270,18 +271,18 @@ def _places(body: BodyCoordinates) -> NDArray[np.float64]:
     return np.hstack([_padded(rows.T) for rows in (N[:, 0], N[:, 1], body.points.slope)])
 
 
-def _spans(body: BodyCoordinates) -> NDArray[np.float64]:
+def _spans(body: BodyCoordinates) -> Array:
     """Weights of all mass points by Gauss point, (slopes, pitch)."""
     return np.zeros((0, 0)) if body.points is None else _padded(body.points.weights.T)
 
 
-def _inertias(body: BodyCoordinates) -> NDArray[np.float64]:
+def _inertias(body: BodyCoordinates) -> Array:
     """Place along the beam, mass and moment of inertia of all mass points, (3, pitch)."""
     points = body.points
     return np.zeros((3, 0)) if points is None else _padded(np.stack([points.x, points.mass, points.inertia]))
 
 
-def _mass_rows(body: BodyCoordinates) -> NDArray[np.float64]:
+def _mass_rows(body: BodyCoordinates) -> Array:
     if body.points is None:
         return np.zeros((3, 0))
     rows = np.concatenate([body.points.N, body.points.slope[:, None]], axis=1)

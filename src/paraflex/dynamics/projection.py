@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, constraint_jacobian, dependence, involved, joint_of_row
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_mass
 from paraflex.dynamics.system import System
@@ -19,7 +20,6 @@ from paraflex.errors import InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
 from paraflex.kernel.stage import equations
 
-Array = NDArray[np.float64]
 Sparse = scipy.sparse.csr_matrix
 # The smallest change that rows (m,) ask for, and the weights (n, n) it is small in at coordinates (n,).
 LeastChange = Callable[[Array], Array]

@@ -8,8 +8,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.brake import HeldAngle
 from paraflex.dynamics.equilibrium import moving_equilibrium, static_equilibrium
 from paraflex.dynamics.joint_coordinates import joint_coordinate
@@ -19,8 +19,6 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import State
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import AngleLaw, PrescribedAngle
-
-Array = NDArray[np.float64]
 
 # Weight of stiffness against mass [s^2]: that of `dynamics.state`, links move and do not begin to bend.
 _STIFFNESS = 1e3

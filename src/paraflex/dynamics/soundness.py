@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.projection import joint_gaps
 from paraflex.dynamics.rank import Dependence, dependence, involved, joint_of_row
 from paraflex.dynamics.signals import moment_signals
@@ -17,8 +17,6 @@ from paraflex.dynamics.state import State, close_downhill, consistent_state, ref
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, InconsistentConstraintsError
 from paraflex.mechanism import Assembly
-
-Array = NDArray[np.float64]
 
 # How far a body turns, or moves as a part of the mechanism's size, to look whether a pose is a special one.
 _NUDGE = 1e-2

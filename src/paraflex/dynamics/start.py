@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.projection import assemble, least_change, link_metric, project
@@ -38,7 +39,7 @@ def start_state(
     start: Start,
     assembly: Assembly | str | None = None,
     *,
-    q: NDArray[np.float64] | None = None,
+    q: Array | None = None,
     time: float = 0.0,
 ) -> State:
     """The state a start describes; bodies it does not place come from an assembly, joints closed.
@@ -68,7 +69,7 @@ def start_state(
     return State(time, q, _velocities(system, signals, start, time, q))
 
 
-def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> NDArray[np.float64]:
+def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> Array:
     """Modal coordinates (nf,) of a beam of least elastic energy at given deflections of its points.
 
     Deflections count from the tangent at the first end, whatever the reference condition; of a body of given shapes
@@ -111,7 +112,7 @@ def static_shape(system: System, name: str, points: Mapping[str, Deflection]) ->
     return u
 
 
-def _root_rows(system: System, name: str) -> NDArray[np.float64]:
+def _root_rows(system: System, name: str) -> Array:
     """Displacement and slope of a beam's first end in its frame (3, nf); zero for bodies of given shapes."""
     body = system.body(name)
     if body.mesh is None:
@@ -120,14 +121,12 @@ def _root_rows(system: System, name: str) -> NDArray[np.float64]:
     return np.vstack([first.N, first.slope])
 
 
-def point_rows(system: System, q: NDArray[np.float64], ref: PointRef) -> NDArray[np.float64]:
+def point_rows(system: System, q: Array, ref: PointRef) -> Array:
     """Rows (2, n) that take velocities of the coordinates to the velocity of a point of a body at q."""
     return marker_place(system, system.marker(ref), q[None])[1][0]
 
 
-def _coordinates(
-    system: System, signals: Signals, start: Start, assembly: Assembly | None, time: float
-) -> NDArray[np.float64]:
+def _coordinates(system: System, signals: Signals, start: Start, assembly: Assembly | None, time: float) -> Array:
     if set(start.coordinates) == set(system.index):
         q = np.zeros(system.n)
     elif assembly is None:
@@ -157,9 +156,7 @@ def _coordinates(
     return _closed(system, signals, time, q, held)
 
 
-def _closed(
-    system: System, signals: Signals, time: float, q: NDArray[np.float64], held: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArray[np.bool_]) -> Array:
     """Joints closed by the least change of the coordinates that are not held."""
     metric = partial(link_metric, system, stiffness=_POSITION_STIFFNESS)
     q, phi = assemble(system, signals, time, q, metric, free=~held)
@@ -174,9 +171,7 @@ def _closed(
     return q
 
 
-def _velocities(
-    system: System, signals: Signals, start: Start, time: float, q: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _velocities(system: System, signals: Signals, start: Start, time: float, q: Array) -> Array:
     _, rate = system.constraints(signals, time, q)
     given = _given_velocities(system, start, q)
     C = scipy.sparse.csr_matrix(scipy.sparse.vstack([constraint_jacobian(system, q), *(entry.row for entry in given)]))
@@ -208,7 +203,7 @@ class _Given(NamedTuple):
     field: str
 
 
-def _given_velocities(system: System, start: Start, q: NDArray[np.float64]) -> list[_Given]:
+def _given_velocities(system: System, start: Start, q: Array) -> list[_Given]:
     unit = scipy.sparse.csr_matrix(scipy.sparse.identity(system.n))
     given = [
         _Given(unit[system.body(name).angle], rate, 1.0, f"start.velocity.angular.{name}")
@@ -226,7 +221,7 @@ def _given_velocities(system: System, start: Start, q: NDArray[np.float64]) -> l
     return given
 
 
-def _refuse_velocities(system: System, given: list[_Given], slip: NDArray[np.float64], bad: NDArray[np.bool_]) -> None:
+def _refuse_velocities(system: System, given: list[_Given], slip: Array, bad: NDArray[np.bool_]) -> None:
     worst = int(np.argmax(np.where(bad, slip, 0.0)))
     where = system.rows[worst] if worst < system.m else "what is given"
     of_given = slip[system.m :]
@@ -240,7 +235,7 @@ def _refuse_velocities(system: System, given: list[_Given], slip: NDArray[np.flo
     )
 
 
-def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> NDArray[np.float64]:
+def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> Array:
     """A body's coordinates as they stand in q, or their rates."""
     frame = [values.x, values.y, values.phi]
     if values.flexible is None:

@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.dynamics.projection import (
     NAMED,
     assemble,
@@ -50,16 +50,16 @@ class State:
     """Coordinates q and velocities v of a system at a time."""
 
     time: float
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
+    q: Array
+    v: Array
 
 
-def mass_matrix(system: System, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def mass_matrix(system: System, q: Array) -> Array:
     """Dense mass matrix (n, n) at q; of many bodies see `dynamics.sparse.sparse_mass`."""
     return np.asarray(scipy.linalg.block_diag(*body_masses(system, q)))
 
 
-def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
+def momentum(system: System, state: State) -> tuple[Array, float]:
     """Linear momentum (2,) [kg m/s] and angular momentum about the ground frame's origin [kg m^2/s]."""
     p = sparse_mass(system, state.q) @ state.v
     linear, angular = np.zeros(2), 0.0
@@ -71,7 +71,7 @@ def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
     return linear, angular
 
 
-def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
+def reference_pose(system: System, assembly: Assembly) -> Array:
     """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
 
     Bodies whose places follow from the assembly's points are there. Loops are not closed yet.
@@ -107,7 +107,7 @@ def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
     return q
 
 
-def point_position(system: System, q: NDArray[np.float64], ref) -> NDArray[np.float64]:
+def point_position(system: System, q: Array, ref) -> Array:
     """Ground-frame position (2,) of a named point at q [m]."""
     marker = system.marker(ref)
     if ref.on_ground:
@@ -118,7 +118,7 @@ def point_position(system: System, q: NDArray[np.float64], ref) -> NDArray[np.fl
     return q[body.position] + np.array([c * local[0] - s * local[1], s * local[0] + c * local[1]])
 
 
-def project_position(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def project_position(system: System, signals: Signals, t: float, q: Array) -> Array:
     """The nearest coordinates, in the metric of mass and stiffness, at which the constraints hold.
 
     Raises
@@ -137,7 +137,7 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     raise AssemblyError(cause, Moment(t, 0), closest, "correct angles of the assembly, lengths or places of points")
 
 
-def _keeps_shape(system: System, start: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
+def _keeps_shape(system: System, start: Array, q: Array) -> bool:
     """Whether closing bends no link out of the shape it had: in linear theory any loop closes by stretching."""
     for body in system.bodies:
         markers = [system.marker(PointRef(body.name, point)) for point in system.mechanism.points[body.name]]
@@ -153,7 +153,7 @@ def _keeps_shape(system: System, start: NDArray[np.float64], q: NDArray[np.float
     return True
 
 
-def _closest(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Where loops that do not close come closest to it, downhill from q.
 
     All joints share the gap there; put together along the tree of joints, undeformed, those that close loops have it.
@@ -167,7 +167,7 @@ def _closest(system: System, signals: Signals, t: float, q: NDArray[np.float64])
     return reference_pose(system, Assembly("closest", {body.name: float(q[body.angle]) for body in system.bodies}))
 
 
-def close_downhill(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Coordinates near q at which the gaps of all joints are smallest, by the method of Levenberg and Marquardt.
 
     Slower than `project_position` and not as exact, but at home near singular positions and where loops cannot close.
@@ -188,14 +188,7 @@ def close_downhill(system: System, signals: Signals, t: float, q: NDArray[np.flo
     return q
 
 
-def project_velocity(
-    system: System,
-    signals: Signals,
-    t: float,
-    q: NDArray[np.float64],
-    v: NDArray[np.float64],
-    stiffness: float = 0.0,
-) -> NDArray[np.float64]:
+def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Array, stiffness: float = 0.0) -> Array:
     """The nearest velocities, in the metric of mass, at which the constraints' first derivative vanishes.
 
     That is what a blow does. With a weight of stiffness [s^2] against mass links move and do not begin to bend.
@@ -206,7 +199,7 @@ def project_velocity(
         There are none: two prescribed laws contradict one another.
     """
 
-    def left(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    def left(v: Array) -> Array:
         return system.constraints(signals, t, q, v)[1]
 
     found = project(constraint_change(system, q, stiffness), v, left)
@@ -219,8 +212,8 @@ def consistent_state(
     system: System,
     assembly: Assembly | str | None,
     *,
-    deflection: Mapping[str, NDArray[np.float64]] | None = None,
-    velocity: NDArray[np.float64] | None = None,
+    deflection: Mapping[str, Array] | None = None,
+    velocity: Array | None = None,
     time: float = 0.0,
 ) -> State:
     """A start: an assembly closed, with an initial deflection and velocity if given.
@@ -261,9 +254,7 @@ def consistent_state(
     return State(time, q, v)
 
 
-def check_accelerations(
-    system: System, signals: Signals, t: float, q: NDArray[np.float64], v: NDArray[np.float64]
-) -> None:
+def check_accelerations(system: System, signals: Signals, t: float, q: Array, v: Array) -> None:
     """Whether there are accelerations that all constraints allow at a consistent position and velocity.
 
     Raises

@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
+from paraflex.integrators.jumps import hidden_from
 from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
@@ -16,14 +17,11 @@ from paraflex.integrators.scipy_methods import ScipyStepper
 from paraflex.integrators.spectra import MULTISTEP
 from paraflex.integrators.stepper import Stepper, Steps
 from paraflex.integrators.stiffness import warn_if_stiff
-from paraflex.integrators.stretches import hidden_from
 from paraflex.integrators.sundials import CvodeStepper, IdaStepper
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.ode import stored_energy
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import FINISHED, PAUSED
-
-Array = NDArray[np.float64]
 
 # What the estimated error of a step may be, of the tolerance: estimates say how far a solver errs in a step, not how
 # errors add up. Measured on RAParM-I, a soft arm and a falling platform, whose ends err by 0.01 to 2 tolerances.

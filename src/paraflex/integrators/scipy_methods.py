@@ -7,14 +7,11 @@ import warnings
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
-
-Array = NDArray[np.float64]
-
 
 # Of each method: the solver, at how many times of a step it evaluates, evaluations of an iteration (none: explicit).
 _SOLVERS: dict[str, tuple[type[scipy.integrate.OdeSolver], int, int]] = {

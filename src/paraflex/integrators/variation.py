@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import numbers_of, with_numbers
 from paraflex.errors import InputError, IntegrationError, Moment, SliderOffBeamError
 from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
 from paraflex.integrators.integrate import CAUSES
+from paraflex.integrators.jumps import hidden_from
 from paraflex.integrators.methods import METHODS, Family, Treatment
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Problem, empty_samples
-from paraflex.integrators.stretches import hidden_from
 from paraflex.kernel.krylov import make_krylov
 from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
 from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
@@ -25,8 +25,6 @@ from paraflex.kernel.settle import History, make_history, sample_energies, settl
 from paraflex.kernel.tangent import make_tangent
 from paraflex.kernel.variation import make_piece, vary_steps
 from paraflex.kernel.variation_samples import PLACES, STEP, Variation, make_variation
-
-Array = NDArray[np.float64]
 
 # Steps that are held at once.
 _CHUNK = 256
@@ -168,12 +166,12 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
 
 def _check_on_beams(problem: Problem, motion: Motion) -> None:
     """Raise where a sliding point is off its beam at a sample, and the run would not have gone on."""
-    for gauge in BeamEnds(problem.system, problem.initial).gauges:
-        outside = np.nonzero(gauge.inside(motion.q) <= 0.0)[0]
-        if outside.size and gauge.ends_run:
+    for function in BeamEnds(problem.system, problem.initial).functions:
+        outside = np.nonzero(function.inside(motion.q) <= 0.0)[0]
+        if outside.size and function.ends_run:
             first = int(outside[0])
             moment = Moment(float(problem.times[first]), first)
-            raise SliderOffBeamError(gauge.reached(motion.q[first]), moment, remedy=STAY_ON_BEAM)
+            raise SliderOffBeamError(function.reached(motion.q[first]), moment, remedy=STAY_ON_BEAM)
 
 
 def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System, dependence
 from paraflex.dynamics.projection import AGREE, NAMED, contradiction, gap_unit, joint_gaps
 from paraflex.dynamics.rank import constraint_jacobian
@@ -29,7 +29,7 @@ class Breakdown(NamedTuple):
     remedy: str
 
 
-def bent_too_far(system: System, q: NDArray[np.float64]) -> Breakdown | None:
+def bent_too_far(system: System, q: Array) -> Breakdown | None:
     """Which beam is bent beyond what the theory can describe, and how far; None for none."""
     for body in system.bodies:
         slope = float(np.max(np.abs(body.slopes(q)), initial=0.0))
@@ -46,7 +46,7 @@ def come_apart(
     system: System,
     signals: Signals,
     t: float,
-    q: NDArray[np.float64],
+    q: Array,
     dependent: int,
     tolerance: float,
     treatment: Treatment,
@@ -81,9 +81,7 @@ def come_apart(
     )
 
 
-def least_norm(
-    system: System, q: NDArray[np.float64], multipliers: NDArray[np.float64], dependent: int
-) -> NDArray[np.float64]:
+def least_norm(system: System, q: Array, multipliers: Array, dependent: int) -> Array:
     """Multipliers (k, m) at poses (k, n) with the least sum of squares, where so many rows are dependent.
 
     They exert the same forces. Near a singular position other rows nearly depend on one another too, and none of them

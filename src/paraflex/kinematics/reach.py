@@ -10,13 +10,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.joint_coordinates import marker_place, material_angle
 from paraflex.dynamics.projection import assemble, closed, shortened
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PointRef
-
-Array = NDArray[np.float64]
 
 # A place nearer than this part of the mechanism's size to a pose is reached.
 REACHED = 1e-8

@@ -135,16 +135,8 @@ def check_assemblies(mechanism: Members) -> None:
 
 def check_connected(mechanism: Members) -> None:
     """Where there is a ground joint, joints lead from the ground to every body. Free-floating: all hang together."""
-    neighbours: dict[str, set[str]] = {body.name: set() for body in mechanism.bodies} | {GROUND: set()}
-    for joint in mechanism.joints:
-        neighbours[joint.a.body].add(joint.b.body)
-        neighbours[joint.b.body].add(joint.a.body)
-    start = GROUND if neighbours[GROUND] else mechanism.bodies[0].name
-    reached, stack = {start}, [start]
-    while stack:
-        for other in neighbours[stack.pop()] - reached:
-            reached.add(other)
-            stack.append(other)
+    start = GROUND if mechanism.joints_at[GROUND] else mechanism.bodies[0].name
+    reached = mechanism.reached(start)
     lost = [body.name for body in mechanism.bodies if body.name not in reached]
     if lost:
         raise InputError(
