@@ -112,10 +112,10 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     taken = run.samples.times[: run.reached]
     kept = slice(0, int(np.searchsorted(taken, crossing.t)))
     before = crossing.before
-    first = _settled(problem, before.t, before.q, before.v)
+    first = _begun_at(problem, before.t, before.q, before.v)
     # Where something given jumps accelerations do: the step began with those after the jump.
     before = replace(before, a=first.samples.a[0])
-    middle, last = (_settled(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
+    middle, last = (_begun_at(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
     # Simpson's rule: powers that jump do so at the ends of steps.
     powers = [one.state.power[0] for one in (first, middle, last)]
     width = crossing.t - before.t
@@ -127,7 +127,7 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     return Samples(*(np.concatenate([old[kept], new]) for old, new in zip(run.samples, end, strict=True)))
 
 
-def _settled(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
+def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
     """A run begun at a state: what its first sample holds, and the power there, follow from the state alone."""
     here = replace(problem, initial=State(t, q, v), times=np.array([t]), stops=np.array([t + problem.span]))
     begun = native.prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))

@@ -8,7 +8,6 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System
-from paraflex.integrators.jumps import hidden_from
 from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.newmark import newmark_numbers, newmark_scheme
 from paraflex.integrators.options import IntegrationOptions
@@ -118,10 +117,11 @@ class NativeRun:
         if np.any(jumps == now):
             self._resume()
         ahead = jumps[jumps > now]
-        signals, stops = self.problem.signals, self.problem.stops
+        stops = self.problem.stops
         if ahead.size:
-            signals, stops = hidden_from(signals, ahead[0]), stops[stops <= ahead[0]]
-        arguments = (self.problem.system.packed, signals, self.scheme, self.controls, stops, attempts)
+            stops = stops[stops <= ahead[0]]
+        given = (self.problem.system.packed, self.problem.signals_from(now))
+        arguments = (*given, self.scheme, self.controls, stops, attempts)
         code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
         return PAUSED if code == FINISHED and ahead.size else code
 

@@ -9,7 +9,6 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
-from paraflex.integrators.jumps import hidden_from
 from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
@@ -101,8 +100,7 @@ class OutsideRun:
     def _begin(self, t: float, q: Array, v: Array, work: float) -> None:
         """Start anew, with what acts from t on as far as the next jump."""
         problem, form = self.problem, self._stepper.form
-        ahead = problem.jumps[problem.jumps > t]
-        form.signals = hidden_from(problem.signals, ahead[0]) if ahead.size else problem.signals
+        form.signals = problem.signals_from(t)
         solved = form.solve(t, q, v)
         self._instant = Instant(t, q.copy(), v.copy(), solved.a, solved.multipliers, work)
         self._stepper.begin(t, form.pack(t, q, v, work), float(problem.stops[problem.stops > t][0]))

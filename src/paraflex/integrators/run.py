@@ -10,7 +10,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System
 from paraflex.errors import InputError
-from paraflex.integrators.jumps import jump_times
+from paraflex.integrators.jumps import hidden_from, jump_times
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import Samples
@@ -53,6 +53,11 @@ class Problem:
     def span(self) -> float:
         """From the start to the end [s]."""
         return float(self.stops[-1] - self.initial.time)
+
+    def signals_from(self, time: float) -> Signals:
+        """Signals as steps from a time on may see them: none of what follows the next jump."""
+        ahead = self.jumps[self.jumps > time]
+        return hidden_from(self.signals, ahead[0]) if ahead.size else self.signals
 
 
 @dataclass(frozen=True)

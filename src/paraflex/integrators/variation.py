@@ -13,7 +13,6 @@ from paraflex.dynamics import numbers_of, with_numbers
 from paraflex.errors import InputError, IntegrationError, Moment, SliderOffBeamError
 from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
 from paraflex.integrators.integrate import CAUSES
-from paraflex.integrators.jumps import hidden_from
 from paraflex.integrators.methods import METHODS, Family, Treatment
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.integrators.options import IntegrationOptions
@@ -29,7 +28,7 @@ from paraflex.kernel.variation_samples import PLACES, STEP, Variation, make_vari
 # Steps that are held at once.
 _CHUNK = 256
 # Where corrections of a stage are left larger than this part of what they correct, there is no derivative.
-_UNSETTLED = 1e-6
+_LARGEST_RESIDUAL = 1e-6
 
 
 class Direction(NamedTuple):
@@ -97,7 +96,7 @@ class RunDerivatives:
 
 
 def check_differentiable(options: IntegrationOptions) -> None:
-    """Nothing, if runs with these options can be differentiated.
+    """Check that runs with these options can be differentiated.
 
     Raises
     ------
@@ -200,7 +199,7 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
     history = make_history(_CHUNK, run.scheme.c.size, problem.system.n, problem.system.m)
     run.start()
     count, restart, code = 0, True, PAUSED
-    signals = _signals_from(problem, state.clock[TIME])
+    signals = problem.signals_from(state.clock[TIME])
     while True:
         before, accepted = float(state.clock[TIME]), state.counts[STEPS]
         code = run.march(1)
@@ -218,15 +217,9 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
         count, restart = count + 1, bool(np.any(jumps == state.clock[TIME]))
         if count == _CHUNK or restart:
             yield _Chunk(history, count, signals)
-            count, signals = 0, _signals_from(problem, state.clock[TIME])
+            count, signals = 0, problem.signals_from(state.clock[TIME])
     if count:
         yield _Chunk(history, count, signals)
-
-
-def _signals_from(problem: Problem, time: float) -> Signals:
-    """Signals as steps from that time on may see them, as in `NativeRun.march`."""
-    ahead = problem.jumps[problem.jumps > time]
-    return hidden_from(problem.signals, ahead[0]) if ahead.size else problem.signals
 
 
 class _Varied:
@@ -294,8 +287,8 @@ class _Varied:
     def _check(self, chunk: _Chunk, left: Array) -> None:
         left = left[: chunk.count]
         self.unsettled = max(self.unsettled, float(left.max()))
-        if not self.unsettled <= _UNSETTLED:
-            worst = int(np.argmax(~(left <= _UNSETTLED)))
+        if not self.unsettled <= _LARGEST_RESIDUAL:
+            worst = int(np.argmax(~(left <= _LARGEST_RESIDUAL)))
             raise IntegrationError(
                 "the equations of a step cannot be solved to rounding, as derivatives need,",
                 Moment(float(chunk.history.t[worst]), worst),
