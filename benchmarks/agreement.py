@@ -3,7 +3,8 @@
     python benchmarks/agreement.py [--write] [METHOD ...]
 
 The largest distance of the end-effector's path from a converged one, found by ESDIRK 5(4) and held against ESDIRK 4(3).
-Takes about ten minutes, most of them for Newmark of order 1 and the explicit methods.
+Takes about ten minutes, most of them for Newmark of order 1 and the explicit methods. SciPy's NDF, whose orders go up
+to 5, would take longer than all others together: these links are not damped.
 """
 
 from __future__ import annotations
@@ -32,7 +33,6 @@ SETTINGS = {
     "generalised-alpha": {"tolerance": 1e-6},
     "rk45": {"tolerance": 1e-5},
     "radau": {"tolerance": 1e-6},
-    "ndf": {"tolerance": 3e-5},
     "adams": {"tolerance": 1e-6},
     "bdf": {"tolerance": 1e-5},
     "ida": {"tolerance": 5e-6},

@@ -1,6 +1,6 @@
 """The picture of the README: RAParM-I on its square in three modes, second-order geometry in the pinned frame.
 
-    python docs/make_hero.py
+python docs/make_hero.py
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from paraflex.fem import ReferenceCondition
 from paraflex.files import load
 from paraflex.integrators import DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance, integrate
 from paraflex.integrators.crossing import advance
-from paraflex.integrators.gauges import deflection_rows, make_gauges
+from paraflex.integrators.event_functions import deflection_rows, event_functions
 from paraflex.integrators.run import Instant
 from paraflex.kernel.run_state import PAUSED
 from paraflex.mechanism import (
@@ -128,11 +128,11 @@ class Thrown:
 @pytest.mark.parametrize("shift", np.linspace(0.0, 0.9, 10))
 def test_a_limit_is_found_that_is_crossed_and_left_within_a_step(shift):
     system = build_system(pendulum())
-    gauges = make_gauges(system, np.array([0.0, 0.0, 1.0]), [JointLimit("pin", low=0.02)])
-    _, crossing = advance(Thrown(shift), gauges, 10)
+    functions = event_functions(system, np.array([0.0, 0.0, 1.0]), [JointLimit("pin", low=0.02)])
+    _, crossing = advance(Thrown(shift), functions, 10)
     assert crossing is not None
     assert crossing.t == pytest.approx(5.0 + shift - np.sqrt(0.02), abs=1e-12)
-    _, crossing = advance(Thrown(shift), make_gauges(system, np.ones(3), [JointLimit("pin", low=-1e-9)]), 10)
+    _, crossing = advance(Thrown(shift), event_functions(system, np.ones(3), [JointLimit("pin", low=-1e-9)]), 10)
     assert crossing is None
 
 

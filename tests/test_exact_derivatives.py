@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+import twins
 from paraflex.designs.derivatives.changes import Change
 from paraflex.designs.derivatives.plans import given, nominal_values, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
 from paraflex.designs.derivatives.steps import STEP, complex_step, part, with_fields
 from paraflex.designs.run import plan_task
-from paraflex.dynamics import blocks_of, build_system, numbers_of
+from paraflex.dynamics import build_system, numbers_of
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition, SpanProperties, beam_integrals, mesh_beam, modal_basis
 from paraflex.fem.assumed import AssumedShapes, Polynomial, Sine, assumed_integrals
@@ -196,11 +197,11 @@ def test_what_a_run_is_given(study, name):
         values[k] += 0.125 * place * size
         near, _ = plan_task(setting, task._replace(values=tuple(values)))
         systems.append(numbers_of(build_system(near.mechanism, like=planned.system).packed))
-        like = near.plan.feed_forward_like(nominal.torques)
+        like = twins.feed_forward_like(near.plan, nominal.torques)
         torques.append(like.evaluate(like.times))
     here = numbers_of(planned.system.packed)
     expected = 8.0 * STENCIL.derivative(systems).value
-    blocks = (blocks_of(planned.system.packed, x) for x in (found.direction.packed, expected, here))
+    blocks = (twins.blocks_of(planned.system.packed, x) for x in (found.direction.packed, expected, here))
     for exact, difference, value in zip(*blocks, strict=True):
         size_of_block = max(np.abs(difference).max(initial=0.0), np.abs(value).max(initial=0.0))
         assert np.abs(exact - difference).max(initial=0.0) <= 5e-11 * size_of_block

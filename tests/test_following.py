@@ -17,7 +17,7 @@ from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import load
 from paraflex.integrators import DeflectionLimit, IntegrationOptions
-from paraflex.integrators.gauges import make_gauges
+from paraflex.integrators.event_functions import event_functions
 from paraflex.kinematics import Circle, Line, PointPath, Polygon, length_fraction
 from paraflex.mechanism import (
     Assembly,
@@ -276,7 +276,7 @@ def test_a_deflection_is_from_the_chord_whatever_the_frame(reference, geometry):
     # What the reference conditions differ by is of the order of the slope's square.
     slope = load * 0.6**2 / (16.0 * stiffness)
     assert np.max(np.abs(deflections(system, q))) == pytest.approx(exact, rel=3.0 * slope**2)
-    limit = make_gauges(system, q[0], (DeflectionLimit("beam", 1.0),))[0]
+    limit = event_functions(system, q[0], (DeflectionLimit("beam", 1.0),))[0]
     assert limit.value(q)[0] == pytest.approx(np.max(np.abs(deflections(system, q))), rel=1e-9)
 
 

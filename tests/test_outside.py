@@ -295,8 +295,6 @@ def test_attempts_are_told_by_their_times():
     assert attempts([3.1, 3.1, 3.1], 3.0, 1) == 1
 
 
-def test_ndf_chooses_its_steps_by_the_order_it_may_have():
-    """Held at order 2 it still takes the step that suits that order: few are rejected."""
-    system = build_system(arm())
-    found = run(system, "ndf", tolerance=1e-4)
-    assert found.rejected < 0.1 * found.steps
+def test_ndf_is_scipys_as_it_is_and_its_order_no_parameter():
+    with pytest.raises(InputError, match=r"no parameter of ndf.*it is one of adams, bdf, ida"):
+        IntegrationOptions(method="ndf", parameters={"max_order": 2})

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import twins
 from command_line import paraflex
 from paraflex.cli.commands.studies import SensitivityRequest
 from paraflex.cli.sensitivity import sensitivity_command
@@ -103,7 +104,7 @@ class Design:
             values[k] *= 1.0 + place * step
             planned, options = plan_task(self.setting, self.task._replace(values=tuple(values)))
             planned = replace(planned, system=build_system(planned.mechanism, like=self.planned.system))
-            near = given_torques(planned, options, planned.plan.feed_forward_like(self.given.torques))
+            near = given_torques(planned, options, twins.feed_forward_like(planned.plan, self.given.torques))
             motions.append(run_derivatives(near.problem, options, []).motion)
         return [
             sum(weight * part for (_, weight), part in zip(PLACES, parts, strict=True)) / step

@@ -13,7 +13,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from paraflex.actuation.allocation import allocate, required_effort
+from paraflex.actuation.feed_forward import FeedForward, splines
 from paraflex.dynamics import constant_signals, pack_signals
+from paraflex.dynamics.numbers import _parts
 
 E = np.array([[0.0, -1.0], [1.0, 0.0]])
 # A complex step this small has no truncation error: h^2 is below the smallest number.
@@ -330,3 +333,22 @@ def still_signals(system, torques=None, end=1.0):
     """Signals of constant torques, zero by default, and of the mechanism's prescribed angles."""
     values = np.zeros(len(system.mechanism.motors)) if torques is None else torques
     return pack_signals(system.mechanism, constant_signals(values, end), end)[0]
+
+
+def blocks_of(record, numbers):
+    """Numbers as `dynamics.numbers_of` orders them by what they are: each field of a record, each row of a matrix."""
+    blocks, at = [], 0
+    for part in _parts(record):
+        # Matrices of so few rows hold another quantity in each.
+        rows = part.shape[0] if part.ndim == 2 and part.shape[0] <= 6 else 1
+        blocks += np.split(numbers[at : at + part.size], rows)
+        at += part.size
+    return blocks
+
+
+def feed_forward_like(plan, other):
+    """Torques of a plan through as many instants as another has, in proportion between knots: smooth in a change."""
+    times = np.interp(other.times, other.knots, plan.knots)
+    times[np.searchsorted(other.times, other.knots)] = plan.knots
+    torques = allocate(required_effort(plan.follow(times)), other.mode)
+    return FeedForward(other.mode, tuple(splines(times, torques, plan.knots)), plan.knots, times)

@@ -63,8 +63,8 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str =
         return ""
     style = f'style="text-align: left; border-bottom: {_RULE}"'
     head = "".join(f"<th {style}>{escape(heading)}</th>" for heading in headings)
-    told = f'<caption style="text-align: left">{escape(caption)}</caption>' if caption else ""
-    return f"<table>{told}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    title = f'<caption style="text-align: left">{escape(caption)}</caption>' if caption else ""
+    return f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def written(value: Any) -> str:

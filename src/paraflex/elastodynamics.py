@@ -22,10 +22,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.dynamics import BodyCoordinates, System, joint_coordinate, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
@@ -36,8 +36,6 @@ from paraflex.kernel.bodies import motion_forces, system_energy
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode, Geometry
 from paraflex.simulate import TrackingRun, TrackingTask
-
-Array = NDArray[np.float64]
 
 # A sample spacing may be this much longer than a whole number of steps: rounding of the division.
 _ROUNDING = 1e-9
@@ -123,8 +121,8 @@ def simulate_ked(
         status, message, failure = "failed", str(error), error
     figures = _figures(task, torques, np.array(reached), kept)
     if end is not None and reached[-1] == stop:
-        status, event = "stopped", str(end.gauge.event)
-        message = f"{end.gauge.reached(figures['q'][-1])} at t = {stop:.6g} s"
+        status, event = "stopped", str(end.function.event)
+        message = f"{end.function.reached(figures['q'][-1])} at t = {stop:.6g} s"
     wall_time = time.perf_counter() - began
     solution = Solution(
         **figures,

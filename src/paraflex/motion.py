@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import (
     State,
@@ -44,7 +44,7 @@ class MotionRun(Shown):
     """
 
     system: System
-    times: NDArray[np.float64]
+    times: Array
     torques: Mapping[str, float]
     solution: Solution
 
@@ -138,7 +138,7 @@ def simulate_motion(
     return run
 
 
-def _run(system: System, times: NDArray[np.float64], torques: Mapping[str, float], solution: Solution) -> MotionRun:
+def _run(system: System, times: Array, torques: Mapping[str, float], solution: Solution) -> MotionRun:
     return MotionRun(system, solution.t if solution.event else times, torques, solution)
 
 

@@ -8,10 +8,10 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
 from paraflex.arguments import checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import (
     State,
@@ -105,6 +105,32 @@ class TrackingTask:
     def torques(self, mode: str | ActuationMode) -> FeedForward:
         """Feed-forward torques of a mode: minimum norm, smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
+
+    def driven(self, mode: str, efforts: Array, condition: Array, actual: Array | None = None) -> Driven:
+        """What torques or forces (k, motors) of a mode do, at the first samples of the task.
+
+        Parameters
+        ----------
+        mode : str
+        efforts : (k, motors) array
+            [N m, N]
+        condition : (k,) array
+            Of the actuation matrix.
+        actual : (k, 2) array, optional
+            Of the end-effector [m]; where it is to be by default.
+        """
+        mechanism, desired = self.mechanism, self.motion.desired
+        names = [motor.name for motor in mechanism.motors]
+        wanted = desired.position if actual is None else desired.position[: len(actual)]
+        return Driven(
+            mode=mode,
+            desired=wanted,
+            actual=wanted if actual is None else actual,
+            acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
+            efforts=dict(zip(names, np.max(np.abs(efforts), axis=0).tolist(), strict=True)),
+            units=dict(zip(names, mechanism.motor_units(), strict=True)),
+            condition=float(np.max(condition)),
+        )
 
     @checked_arguments()
     def remodelled(self, mechanism: Mechanism) -> TrackingTask:
@@ -200,10 +226,10 @@ class TrackingRun(Shown):
 
     task: TrackingTask
     torques: FeedForward
-    condition: NDArray[np.float64]
+    condition: Array
     solution: Solution
     method: str = "TR-BDF2"
-    holding: NDArray[np.float64] | None = None
+    holding: Array | None = None
 
     @property
     def mode(self) -> ActuationMode:
@@ -211,7 +237,7 @@ class TrackingRun(Shown):
         return self.torques.mode
 
     @property
-    def applied(self) -> NDArray[np.float64]:
+    def applied(self) -> Array:
         """Torques of all motors, at every sample time of the task, or at the k reached where they were held [N m]."""
         return self.torques.evaluate(self.task.motion.t) if self.holding is None else self.holding
 
@@ -236,17 +262,8 @@ class TrackingRun(Shown):
         effector = task.mechanism.end_effector
         if effector is None or (self.holding is not None and not task.holds) or not k:
             return None
-        mechanism, desired = task.mechanism, task.motion.desired
-        names = [motor.name for motor in mechanism.motors]
-        return Driven(
-            mode=self.mode.name,
-            desired=desired.position[:k],
-            actual=marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0],
-            acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
-            efforts=dict(zip(names, np.max(np.abs(self.applied), axis=0).tolist(), strict=True)),
-            units=dict(zip(names, mechanism.motor_units(), strict=True)),
-            condition=float(np.max(self.condition[:k])),
-        )
+        actual = marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0]
+        return task.driven(self.mode.name, self.applied, self.condition[:k], actual)
 
     def _following(self) -> Following | None:
         """Deviation from the path and condition number, where torques drive the mechanism along it."""
@@ -398,7 +415,7 @@ def _planned(given: Mechanism | ModelWithPaths, path: Path | str) -> tuple[Mecha
 def _drive(
     task: TrackingTask,
     torques: FeedForward,
-    times: NDArray[np.float64],
+    times: Array,
     options: IntegrationOptions,
     on_progress: Callable[[float], None] | None,
 ) -> Solution:
@@ -414,7 +431,7 @@ def _drive(
 def _drive_and_hold(
     task: TrackingTask,
     torques: FeedForward,
-    condition: NDArray[np.float64],
+    condition: Array,
     options: IntegrationOptions,
     on_progress: Callable[[float], None] | None,
 ) -> TrackingRun:
@@ -472,7 +489,7 @@ def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str
     return State(float(motion.t[0]), q, v)
 
 
-def path_knots(path: Path, end: float) -> NDArray[np.float64]:
+def path_knots(path: Path, end: float) -> Array:
     """Times of a run to an end between which the motion along a path is smooth, both ends among them [s]."""
     knots = np.unique(np.concatenate([[0.0, end], [knot for knot in path.knots if 0.0 < knot < end]]))
     return knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import ActuationError, Moment, SingularActuationError
 from paraflex.kernel.arrays import apart
@@ -38,8 +39,8 @@ class Effort:
     """
 
     motion: RigidMotion
-    required: NDArray[np.float64]
-    matrix: NDArray[np.float64]
+    required: Array
+    matrix: Array
 
     def active(self, mode: ActuationMode) -> NDArray[np.bool_]:
         """Which motors a mode drives (motors,)."""
@@ -56,13 +57,13 @@ def required_effort(motion: RigidMotion) -> Effort:
     return Effort(motion, np.einsum("kij,kj->ki", transposed, forces), transposed @ motor_rows(motion))
 
 
-def motor_rows(motion: RigidMotion) -> NDArray[np.float64]:
+def motor_rows(motion: RigidMotion) -> Array:
     """Derivatives (k, n, motors) of the motors' joint coordinates by all coordinates."""
     rows = [joint_coordinate(motion.system, motor.joint, motion.q).rows for motor in motion.system.mechanism.motors]
     return np.stack(rows, axis=2) if rows else np.zeros((*motion.q.shape, 0))
 
 
-def add_springs_and_dampers(motion: RigidMotion, forces: NDArray[np.float64]) -> None:
+def add_springs_and_dampers(motion: RigidMotion, forces: Array) -> None:
     """What springs, dampers and friction at joints ask for besides inertia, into forces (k, n)."""
     for spring in motion.mechanism.springs:
         value, _, rows = joint_coordinate(motion.system, spring.joint, motion.q)
@@ -75,7 +76,7 @@ def add_springs_and_dampers(motion: RigidMotion, forces: NDArray[np.float64]) ->
         forces += (friction.limit * np.tanh(rate / friction.speed))[:, None] * rows
 
 
-def actuation_condition(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:
+def actuation_condition(effort: Effort, mode: ActuationMode) -> Array:
     """Condition number (k,) of the actuation matrix of a mode's motors; infinite where it loses rank."""
     values = _singular_values(effort, mode)
     with np.errstate(divide="ignore"):
@@ -86,7 +87,7 @@ def actuation_condition(effort: Effort, mode: ActuationMode) -> NDArray[np.float
 PAST_SINGULAR = "move the path, or add motors to the mode"
 
 
-def allocate(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:
+def allocate(effort: Effort, mode: ActuationMode) -> Array:
     """Torques (k, motors) of minimum norm over a mode's motors, zero for the passive ones [N m].
 
     Raises
@@ -135,7 +136,7 @@ def check_mode(effort: Effort, mode: ActuationMode) -> None:
         )
 
 
-def _singular_values(effort: Effort, mode: ActuationMode) -> NDArray[np.float64]:
+def _singular_values(effort: Effort, mode: ActuationMode) -> Array:
     active = effort.matrix[:, :, effort.active(mode)]
     values = np.linalg.svd(active, compute_uv=False)
     missing = effort.required.shape[1] - values.shape[1]

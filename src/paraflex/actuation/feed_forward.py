@@ -9,9 +9,9 @@ from math import factorial
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.actuation.allocation import PAST_SINGULAR, Effort, allocate, required_effort
+from paraflex.arrays import Array
 from paraflex.dynamics import InputSignals
 from paraflex.errors import Moment, NumericalError
 from paraflex.kinematics import RigidMotion
@@ -45,10 +45,10 @@ class FeedForward:
 
     mode: ActuationMode
     signals: tuple[InputSignals, ...]
-    knots: NDArray[np.float64]
-    times: NDArray[np.float64]
+    knots: Array
+    times: Array
 
-    def evaluate(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    def evaluate(self, t: Array) -> Array:
         """Torques (k, motors) at times t [N m]."""
         columns = []
         for signal in self.signals:
@@ -76,8 +76,8 @@ class TorquePlan:
     """
 
     fine: Effort
-    knots: NDArray[np.float64]
-    follow: Callable[[NDArray[np.float64]], RigidMotion]
+    knots: Array
+    follow: Callable[[Array], RigidMotion]
     finer: list[Effort] = field(default_factory=list, repr=False, compare=False)
 
     def feed_forward(self, mode: ActuationMode) -> FeedForward:
@@ -106,27 +106,6 @@ class TorquePlan:
             remedy=PAST_SINGULAR,
         )
 
-    def feed_forward_like(self, other: FeedForward) -> FeedForward:
-        """Torques of the same mode through as many instants: those of another plan, where its knots are these.
-
-        Between knots instants move in proportion. As a plan changes little its torques then change smoothly.
-
-        Parameters
-        ----------
-        other : FeedForward
-            Of a plan with as many knots.
-
-        Raises
-        ------
-        ActuationError, SingularActuationError
-            See `allocate`.
-        """
-        times = np.interp(other.times, other.knots, self.knots)
-        times[np.searchsorted(other.times, other.knots)] = self.knots
-        effort = required_effort(self.follow(times))
-        torques = allocate(effort, other.mode)
-        return FeedForward(other.mode, tuple(splines(times, torques, self.knots)), self.knots, times)
-
     def _effort(self, refined: int) -> Effort:
         """On the fine grid with every interval halved so often."""
         efforts = [self.fine, *self.finer]
@@ -139,7 +118,7 @@ class TorquePlan:
         return efforts[refined]
 
 
-def plan_torques(follow: Callable[[NDArray[np.float64]], RigidMotion], knots: NDArray[np.float64]) -> TorquePlan:
+def plan_torques(follow: Callable[[Array], RigidMotion], knots: Array) -> TorquePlan:
     """Efforts of a rigid motion on grids for `TorquePlan.feed_forward`.
 
     Parameters
@@ -149,16 +128,16 @@ def plan_torques(follow: Callable[[NDArray[np.float64]], RigidMotion], knots: ND
     knots : (j,) array
         Times between which the motion is smooth, its start and end among them [s].
     """
-    stretches = [np.linspace(a, b, max(_FEWEST, int(np.ceil((b - a) / _SPACING)) + 1)) for a, b in pairwise(knots)]
-    times = np.unique(np.concatenate(stretches))
+    intervals = [np.linspace(a, b, max(_FEWEST, int(np.ceil((b - a) / _SPACING)) + 1)) for a, b in pairwise(knots)]
+    times = np.unique(np.concatenate(intervals))
     return TorquePlan(required_effort(follow(_with_middles(times))), np.asarray(knots), follow)
 
 
-def _with_middles(t: NDArray[np.float64]) -> NDArray[np.float64]:
+def _with_middles(t: Array) -> Array:
     return _alternating(t, 0.5 * (t[1:] + t[:-1]))
 
 
-def _alternating(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _alternating(a: Array, b: Array) -> Array:
     """Rows of one array (k + 1, ...) and of another (k, ...) between them."""
     out = np.empty((len(a) + len(b), *a.shape[1:]))
     out[::2], out[1::2] = a, b
@@ -175,7 +154,7 @@ def _interleaved(effort: Effort, between: Effort) -> Effort:
     )
 
 
-def splines(t: NDArray[np.float64], values: NDArray[np.float64], knots: NDArray[np.float64]) -> list[InputSignals]:
+def splines(t: Array, values: Array, knots: Array) -> list[InputSignals]:
     """A quintic spline of each column between neighbouring knots, joined."""
     breaks, coefficients = [], []
     edges = np.searchsorted(t, knots)

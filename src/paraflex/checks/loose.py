@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System
-from paraflex.dynamics.points import point_motion
+from paraflex.dynamics.state import point_position
 from paraflex.findings import Finding
 from paraflex.mechanism import AxisJoint, Mechanism
 from paraflex.mechanism.joints import GROUND, PointRef
@@ -20,7 +20,7 @@ from paraflex.validity.numbers import mechanism_size
 NEAR = 0.2
 
 
-def loose_points(rigid: System, q: NDArray[np.float64]) -> Iterator[Finding]:
+def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
     """A point that nothing uses beside one of the same name on another body, at coordinates q of the rigid mechanism.
 
     B and B3 count as one name where both are unused.
@@ -39,7 +39,7 @@ def loose_points(rigid: System, q: NDArray[np.float64]) -> Iterator[Finding]:
     for one, other in product(unused, known):
         apart = one.body != other.body and frozenset((one.body, other.body)) not in direct
         if apart and (one.point == other.point or (other in unused and _stem(one) == _stem(other))):
-            gap = float(np.linalg.norm(_place(rigid, one, q) - _place(rigid, other, q)))
+            gap = float(np.linalg.norm(point_position(rigid, q, one) - point_position(rigid, q, other)))
             if gap < size * (1.0 if {one.body, other.body} & sliding else NEAR):
                 pairs.append((other not in unused, gap, one, other))
     # First those that are both unused, then the nearest.
@@ -64,10 +64,3 @@ def _unused(mechanism: Mechanism) -> list[PointRef]:
 
 def _stem(ref: PointRef) -> str:
     return re.sub(r"\d+$", "", ref.point)
-
-
-def _place(rigid: System, ref: PointRef, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    if ref.body == GROUND:
-        return np.array(rigid.mechanism.ground[ref.point], dtype=float)
-    rows = q[None]
-    return point_motion(rigid, ref, rows, np.zeros_like(rows), np.zeros_like(rows)).position[0]

@@ -12,12 +12,12 @@ from paraflex.errors import ActuationError, AssemblyError, InputError, Numerical
 from paraflex.files import Model
 from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
-from paraflex.mechanism import ActuationMode, AxisJoint, Mechanism
+from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
 from paraflex.simulate import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import GRAVITY, mechanism_mass, mechanism_size
-from paraflex.validity.plausibility import Driven, doubtful_efforts
+from paraflex.validity.plausibility import doubtful_efforts
 
 # Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
 ILL_CONDITIONED = 1e3
@@ -83,15 +83,19 @@ def study_findings(
         yield from _driven(model, task, modes)
 
 
-def task_findings(task: TrackingTask, modes: Sequence[ActuationMode]) -> Iterator[Finding]:
-    """How modes drive the mechanism along a planned path: singular positions, and friction beyond the motors."""
+def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, efforts: bool = False) -> Iterator[Finding]:
+    """How modes drive the mechanism along a planned path: singular positions, and friction beyond the motors.
+
+    With efforts also torques and forces that are far from plausible; a run says so of those it applied.
+    """
     for mode in modes:
         try:
             torques = task.torques(mode).evaluate(task.motion.t)
         except (ActuationError, NumericalError) as error:
             yield Finding("path-singular", f"mode.{mode.name}", str(error), "move the path, or add motors to the mode")
             continue
-        worst = float(np.max(actuation_condition(task.effort, mode)))
+        condition = actuation_condition(task.effort, mode)
+        worst = float(np.max(condition))
         if worst > ILL_CONDITIONED:
             yield Finding(
                 "path-ill-conditioned", f"mode.{mode.name}",
@@ -99,6 +103,8 @@ def task_findings(task: TrackingTask, modes: Sequence[ActuationMode]) -> Iterato
                 "move the path, or add motors to the mode",
             )  # fmt: skip
         yield from _friction(task.mechanism, mode, np.max(np.abs(torques), axis=0))
+        if efforts:
+            yield from doubtful_efforts(task.system, task.driven(mode.name, torques, condition))
 
 
 def path_findings(model: Model, path: Path, name: str, duration: float) -> Iterator[Finding]:
@@ -147,7 +153,7 @@ def _few_samples(model: Model) -> Iterator[Finding]:
     """A drive that turns between two samples so far that its motion is not to be seen."""
     duration, count = model.study.duration, model.study.samples
     for one in model.mechanism.prescribed:
-        if duration is None or isinstance(model.mechanism.joint(one.joint), AxisJoint):
+        if duration is None or model.mechanism.slides(one.joint):
             continue
         angle, _, _ = one.law.evaluate(np.array([0.0, duration]))
         turns = abs(float(angle[1] - angle[0])) / (2.0 * math.pi)
@@ -182,31 +188,7 @@ def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> It
             "mode-missing", "mode", f"there is a path and {what} to drive the mechanism along it",
             "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
         )  # fmt: skip
-    yield from task_findings(task, asked)
-    for mode in asked:
-        yield from _efforts(task, mode)
-
-
-def _efforts(task: TrackingTask, mode: ActuationMode) -> Iterator[Finding]:
-    """Torques and forces of a plan that are far from plausible; a run says so of those it applied."""
-    try:
-        torques = task.torques(mode).evaluate(task.motion.t)
-    except (ActuationError, NumericalError):
-        return
-    mechanism, desired = task.mechanism, task.motion.desired
-    names = [motor.name for motor in mechanism.motors]
-    yield from doubtful_efforts(
-        task.system,
-        Driven(
-            mode=mode.name,
-            desired=desired.position,
-            actual=desired.position,
-            acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
-            efforts=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
-            units=dict(zip(names, mechanism.motor_units(), strict=True)),
-            condition=float(np.max(actuation_condition(task.effort, mode))),
-        ),
-    )
+    yield from task_findings(task, asked, efforts=True)
 
 
 def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:

@@ -13,7 +13,7 @@ from paraflex.dynamics.joint_coordinates import (
     place_along_beam,
 )
 from paraflex.dynamics.linearise import Vibration, natural_frequencies
-from paraflex.dynamics.numbers import blocks_of, numbers_of, same_layout, with_numbers
+from paraflex.dynamics.numbers import numbers_of, same_layout, with_numbers
 from paraflex.dynamics.packing import records
 from paraflex.dynamics.quasi_static import JointMotion, balanced_state, joint_motions
 from paraflex.dynamics.rank import Dependence, dependence, redundant_rows
@@ -52,7 +52,6 @@ __all__ = [
     "across_chord",
     "axis_angle",
     "balanced_state",
-    "blocks_of",
     "brake",
     "build_system",
     "closure_of",

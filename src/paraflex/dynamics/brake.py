@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import sparse_mass
@@ -24,7 +24,7 @@ class HeldAngle:
     knots: tuple[float, ...] = ()
     breaks: tuple[float, ...] = ()
 
-    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
         """Value, rate and acceleration at times t."""
         return np.full(t.shape, self.value), np.zeros(t.shape), np.zeros(t.shape)
 
@@ -50,7 +50,7 @@ class Braked:
     energy: float
     rows: tuple[int, ...]
 
-    def efforts(self, multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def efforts(self, multipliers: Array) -> Array:
         """What the brakes hold with (k, joints), signed as motors' torques [N m, N], from multipliers (k, m)."""
         # Phi_q^T lambda stands on the left of the equations, a motor's torque on the right.
         return -multipliers[:, list(self.rows)]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from paraflex.arrays import Array
 
 
-def across_chord(stations: NDArray[np.float64], rest: NDArray[np.float64]) -> NDArray[np.float64]:
+def across_chord(stations: Array, rest: Array) -> Array:
     """How far stations of a bent body are from their places across its chord [m], (k, s); positive to the left.
 
     The chord is the line from the first station to the last. A station of a beam has its place on that line; one of a
@@ -27,7 +28,7 @@ def across_chord(stations: NDArray[np.float64], rest: NDArray[np.float64]) -> ND
     return _across(stations) - _across(rest[None])
 
 
-def _across(stations: NDArray[np.float64]) -> NDArray[np.float64]:
+def _across(stations: Array) -> Array:
     """Coordinates of stations across the line from the first to the last."""
     arms = stations - stations[:, :1]
     x, y = arms[:, -1:, 0], arms[:, -1:, 1]

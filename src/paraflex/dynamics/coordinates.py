@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.shapes import BodyShape, PointShape, beam_lumps, body_shape
 from paraflex.errors import InputError
 from paraflex.fem import (
@@ -50,7 +50,7 @@ class BodyCoordinates:
     modes: ModalBasis
     shape: BodyShape
     points: MassPoints | None = None
-    damping: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    damping: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def mesh(self) -> BeamMesh | None:
@@ -82,7 +82,7 @@ class BodyCoordinates:
         """Of every coordinate of the body in q."""
         return slice(self.offset, self.offset + 3 + self.nf)
 
-    def slopes(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slopes(self, q: Array) -> Array:
         """Slopes along the body, a beam's at its nodes [rad]; none for a rigid body."""
         return self.shape.slopes @ (self.integrals.D @ q[self.flexible])
 
@@ -106,17 +106,17 @@ class Marker:
     """
 
     body: int
-    x0: NDArray[np.float64]
-    N: NDArray[np.float64]
-    slope: NDArray[np.float64]
-    bending: NDArray[np.float64] | None = None
+    x0: Array
+    N: Array
+    slope: Array
+    bending: Array | None = None
 
     @property
     def on_frame(self) -> Marker:
         """The same place, fixed in the body frame: it does not follow the deformation."""
         return replace(self, N=np.zeros_like(self.N), slope=np.zeros_like(self.slope), bending=None)
 
-    def place(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def place(self, u: Array) -> Array:
         """Place in the body frame (2,) for flexible coordinates u (nf,)."""
         s = self.x0 + self.N @ u
         if self.bending is not None:
@@ -197,7 +197,7 @@ def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
     return Marker(index, np.array([x, 0.0]), N @ body.integrals.D, slope @ body.integrals.D, bending)
 
 
-def transverse_pieces(body: BodyCoordinates) -> NDArray[np.float64]:
+def transverse_pieces(body: BodyCoordinates) -> Array:
     """Transverse displacement of a beam's centre line per modal coordinate: (elements, 6, nf).
 
     Coefficients of ascending powers of the distance from the element's first node.

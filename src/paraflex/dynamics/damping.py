@@ -30,6 +30,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
 from paraflex.fem.eigen import eigenpairs
 from paraflex.mechanism import (
@@ -53,7 +54,7 @@ _ROUNDING = 1e-9
 
 def damping_matrix(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
-) -> NDArray[np.float64]:
+) -> Array:
     """Damping matrix of a body in its modal coordinates (nf, nf) [1/s], exactly diagonal where it is so to rounding.
 
     Parameters
@@ -136,7 +137,7 @@ def _conditions(
     driven = {prescribed.joint for prescribed in mechanism.prescribed}
     for joint in mechanism.joints:
         for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
-            if here.body != name or not _leads_to_ground(mechanism, there.body, name):
+            if here.body != name or GROUND not in mechanism.reached(there.body, past=name):
                 continue
             marker = make_marker(mechanism, bodies, index, here)
             if isinstance(joint, PrismaticJoint | WeldJoint) or (
@@ -173,18 +174,3 @@ def _place(marker: Marker) -> NDArray:
 
 def _slope(marker: Marker) -> NDArray:
     return np.concatenate([[0.0, 0.0, 1.0], marker.slope])
-
-
-def _leads_to_ground(mechanism: Mechanism, start: str, without: str) -> bool:
-    """Whether joints lead from a body to the ground past another one."""
-    seen, waiting = {start, without}, [start]
-    while waiting:
-        here = waiting.pop()
-        if here == GROUND:
-            return True
-        for joint in mechanism.joints:
-            for a, b in ((joint.a.body, joint.b.body), (joint.b.body, joint.a.body)):
-                if a == here and b not in seen:
-                    seen.add(b)
-                    waiting.append(b)
-    return False

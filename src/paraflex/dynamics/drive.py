@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass
 from paraflex.dynamics.state import State
@@ -70,7 +70,7 @@ def reach(system: System, state: State, freedoms: int) -> Reach:
     return Reach(freedoms, everything, modes, tuple(sets), more)
 
 
-def _rank(effect: NDArray[np.float64], chosen: Sequence[int]) -> int:
+def _rank(effect: Array, chosen: Sequence[int]) -> int:
     """Independent directions in which the chosen motors act."""
     values = np.linalg.eigvalsh(effect[np.ix_(chosen, chosen)]) if len(chosen) else np.zeros(0)
     return int(np.sum(values > _WEAK * values.max(initial=0.0)))

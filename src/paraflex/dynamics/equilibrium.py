@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import sparse_jacobian, stiffness_diagonal
@@ -39,7 +39,7 @@ _NO_MOVING_EQUILIBRIUM = (
 _SLOWER = "let the drives start more slowly, or make the links stiffer"
 
 # Velocities and accelerations (n,) at coordinates (n,).
-Motion = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
+Motion = Callable[[Array], tuple[Array, Array]]
 
 
 @checked_arguments()
@@ -66,7 +66,7 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
     return State(start.time, _find(system, start, held, None), np.zeros(system.n))
 
 
-def moving_equilibrium(system: System, start: State, motion: Motion) -> NDArray[np.float64]:
+def moving_equilibrium(system: System, start: State, motion: Motion) -> Array:
     """The pose (n,) nearest a start at which all forces balance those of inertia in a motion.
 
     The iteration of `static_equilibrium` with M a + h(q, v) among the forces, dampers and friction at joints too;
@@ -89,7 +89,7 @@ def moving_equilibrium(system: System, start: State, motion: Motion) -> NDArray[
     return _find(system, start, (), motion)
 
 
-def _find(system: System, start: State, held: Sequence[str], motion: Motion | None) -> NDArray[np.float64]:
+def _find(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
     solve = _sparse_equilibrium if system.n + system.m > _DENSE else _dense_equilibrium
     try:
         return solve(system, start, held, motion)
@@ -99,7 +99,7 @@ def _find(system: System, start: State, held: Sequence[str], motion: Motion | No
         raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial, _SLOWER) from None
 
 
-def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> NDArray[np.float64]:
+def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
     n, m = system.n, system.m
     residual = _Residual(system, start, held)
     z = np.concatenate([start.q, np.zeros(m + len(held))])
@@ -125,12 +125,10 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), z[:n], _HOLD)
 
 
-def _sparse_equilibrium(
-    system: System, start: State, held: Sequence[str], motion: Motion | None
-) -> NDArray[np.float64]:
+def _sparse_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
     """The same with sparse matrices; springs at joints are stiffness here, not multipliers."""
     forces, elastic = RestingForces(system, start.time), stiffness_diagonal(system)
-    signals, still = moment_signals(system.mechanism, start.time), np.zeros(system.n)
+    signals = moment_signals(system.mechanism, start.time)
     kept = [float(joint_coordinate(system, name, start.q[None]).value[0]) for name in held]
     rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
     q, mu = start.q.copy(), np.zeros(rigid.size + len(held))
@@ -143,7 +141,7 @@ def _sparse_equilibrium(
         lam = forces.compliant(q)
         lam[rigid] = mu[: rigid.size]
         f = forces(q, lam)[0] + elastic * q + holding.T @ mu[rigid.size :]
-        phi, _ = system.constraints(signals, start.time, q, still)
+        phi, _ = system.constraints(signals, start.time, q)
         K = scipy.sparse.csr_matrix(pose_stiffness(system, start.time, q, lam) + scipy.sparse.diags(elastic))
         C = scipy.sparse.csr_matrix(scipy.sparse.vstack([sparse_jacobian(system, q)[rigid], holding]))
         try:
@@ -161,9 +159,7 @@ def _sparse_equilibrium(
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), q, _HOLD)
 
 
-def _solve(
-    K: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, f: NDArray[np.float64], r: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _solve(K: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, f: Array, r: Array) -> tuple[Array, Array]:
     """[K, C^T; C, 0] [x; mu] = [f; r]. K is indefinite: unlike `sparse.Saddle` this regularises nothing."""
     size = max(1.0, float(abs(K).max()))
     matrix = scipy.sparse.csc_matrix(scipy.sparse.bmat([[K / size, C.T], [C, None]]))
@@ -173,7 +169,7 @@ def _solve(
     return z[: f.size], z[f.size :] * size
 
 
-def _largest_move(system: System, change: NDArray[np.float64]) -> float:
+def _largest_move(system: System, change: Array) -> float:
     """How far a change of coordinates moves links [sizes of the mechanism, rad]."""
     return max(float(np.max(np.abs(change / system.units)[body.offset : body.offset + 3])) for body in system.bodies)
 
@@ -187,23 +183,23 @@ class _Residual:
         self.kept = self.joints(start.q)[0]
         self.signals = moment_signals(mechanism, start.time)
         self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
-        self.v, self.a, self.still = np.zeros((3, system.n))
+        self.v, self.a = np.zeros((2, system.n))
         self.largest_torque = 0.0
         # Rows of friction come with a scale of their own, none by default.
         self.workspace.compliance[:] = system.packed.rows["compliance"]
 
-    def joints(self, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def joints(self, q: Array) -> tuple[Array, Array]:
         """Coordinates of the held joints (held,) and their derivatives (held, n)."""
         found = [joint_coordinate(self.system, name, q[None]) for name in self.held]
         rows = np.array([joint.rows[0] for joint in found]).reshape(-1, self.system.n)
         return np.array([joint.value[0] for joint in found]), rows
 
-    def __call__(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        system, ws, still = self.system, self.workspace, self.still
+    def __call__(self, z: Array) -> Array:
+        system, ws = self.system, self.workspace
         q, lam, torque = np.split(z, [system.n, system.n + system.m])
         q, lam = np.ascontiguousarray(q), np.ascontiguousarray(lam)
         equations(system.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, ws)
-        phi, _ = system.constraints(self.signals, self.time, q, still)
+        phi, _ = system.constraints(self.signals, self.time, q)
         # Rows of springs, dampers and friction have no second derivatives in them.
         closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
         value, rows = self.joints(q)

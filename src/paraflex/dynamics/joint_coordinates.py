@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
 from paraflex.dynamics.system import System
 from paraflex.mechanism import AxisJoint, PointRef, SlidingJoint
@@ -15,14 +15,12 @@ from paraflex.mechanism import AxisJoint, PointRef, SlidingJoint
 class JointCoordinate(NamedTuple):
     """A joint's coordinate over time [rad, m], (k,), its rate, and its derivative by all coordinates, (k, n)."""
 
-    value: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    rows: NDArray[np.float64]
+    value: Array
+    rate: Array
+    rows: Array
 
 
-def joint_coordinate(
-    system: System, name: str, q: NDArray[np.float64], v: NDArray[np.float64] | None = None
-) -> JointCoordinate:
+def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None) -> JointCoordinate:
     """The coordinate of a joint for coordinates (k, n) and velocities (k, n); at rest without these.
 
     Slopes of beams are included. Angle: that of body b less that of body a. Travel: e . (p_b - p_a), e the axis.
@@ -45,7 +43,7 @@ def joint_coordinate(
     return JointCoordinate(np.sum(e * d, axis=1), np.sum(rows * v, axis=1), rows)
 
 
-def place_along_beam(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def place_along_beam(system: System, name: str, q: Array) -> Array:
     """How far from its beam's first end (k,) the point of a sliding joint stands in the undeformed beam [m]."""
     joint = system.mechanism.joint(name)
     return joint_coordinate(system, name, q).value + system.marker(joint.a).x0[0]
@@ -57,24 +55,22 @@ def axis_marker(system: System, joint: AxisJoint) -> Marker:
     return marker.on_frame if isinstance(joint, SlidingJoint) else marker
 
 
-def axis_angle(system: System, joint: AxisJoint, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def axis_angle(system: System, joint: AxisJoint, q: Array) -> Array:
     """Angle (k,) of a joint's axis in the ground frame [rad]."""
     return _marker_angle(system, axis_marker(system, joint), q)[0] + joint.direction
 
 
-def material_angle(system: System, ref: PointRef, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def material_angle(system: System, ref: PointRef, q: Array) -> Array:
     """Angle (k,) of the material at a point, of its body and the slope there; zero on the ground [rad]."""
     return _angle(system, ref, q)[0]
 
 
-def _angle(system: System, ref: PointRef, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _angle(system: System, ref: PointRef, q: Array) -> tuple[Array, Array]:
     """Angle of the material at a point (k,), and its derivative (k, n)."""
     return _marker_angle(system, system.marker(ref), q)
 
 
-def _marker_angle(
-    system: System, marker: Marker, q: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _marker_angle(system: System, marker: Marker, q: Array) -> tuple[Array, Array]:
     rows = np.zeros(q.shape, dtype=np.result_type(q, marker.slope))
     if marker.body == GROUND_INDEX:
         return np.zeros(q.shape[0]), rows
@@ -84,9 +80,7 @@ def _marker_angle(
     return np.sum(rows * q, axis=1), rows
 
 
-def marker_place(
-    system: System, marker: Marker, q: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def marker_place(system: System, marker: Marker, q: Array) -> tuple[Array, Array]:
     """Position (k, 2) of a material point in the ground frame, and its derivative (k, 2, n): [1, R E s, R ds/du]."""
     rows = np.zeros((q.shape[0], 2, q.shape[1]), dtype=np.result_type(q, marker.x0, marker.N))
     if marker.body == GROUND_INDEX:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
@@ -26,7 +26,6 @@ from paraflex.dynamics.system import System
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix as Sparse
 
-Array = NDArray[np.float64]
 
 # More coordinates than these make a dense eigenvalue problem a matter of minutes: then the lowest are sought.
 DENSE_COORDINATES, LOWEST = 600, 10

@@ -8,28 +8,17 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-# Matrices of so few rows hold another quantity in each.
-_SHORT = 6
+from paraflex.arrays import Array
 
 R = TypeVar("R", bound=tuple)
 
 
-def numbers_of(record: tuple) -> NDArray[np.float64]:
+def numbers_of(record: tuple) -> Array:
     """Every floating-point number of a named tuple of arrays, records and numbers, in order: a vector."""
     return np.concatenate([np.zeros(0), *(np.ravel(part) for part in _parts(record))])
 
 
-def blocks_of(record: tuple, numbers: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Numbers in the order of `numbers_of` by what they are: each field of a record, each row of a short matrix."""
-    blocks, at = [], 0
-    for part in _parts(record):
-        rows = part.shape[0] if part.ndim == 2 and part.shape[0] <= _SHORT else 1
-        blocks += np.split(numbers[at : at + part.size], rows)
-        at += part.size
-    return blocks
-
-
-def with_numbers(record: R, numbers: NDArray[np.float64]) -> R:
+def with_numbers(record: R, numbers: Array) -> R:
     """The same named tuple with other numbers, as `numbers_of` orders them; whole numbers stay."""
     fields, at = [], 0
     for field in record:
@@ -54,7 +43,7 @@ def _parts(record: tuple) -> Iterator[Any]:
                 yield field
 
 
-def _replaced(field: Any, numbers: NDArray[np.float64], at: int) -> tuple[Any, int]:
+def _replaced(field: Any, numbers: Array, at: int) -> tuple[Any, int]:
     if isinstance(field, float):
         return float(numbers[at]), at + 1
     if not isinstance(field, np.ndarray) or (field.dtype.names is None and field.dtype.kind != "f"):

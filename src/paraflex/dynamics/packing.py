@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.constraints import Constraint, axis_of
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
 from paraflex.dynamics.scale import mechanism_size
@@ -187,7 +189,7 @@ class _Packer:
                 self.efforts[self.index[ref.body]].append(record)
 
 
-def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], NDArray[np.float64], NDArray[np.float64]]:
+def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
     """Deflections of beams that points slide on: records, breaks and coefficients."""
     records, breaks, coefficients = [], [np.zeros(0)], [np.zeros(0)]
     for body in bodies:
@@ -211,7 +213,7 @@ def _load_record(load: Load) -> dict[str, float]:
     return {"torque": load.torque}
 
 
-def _modal_rows(body: BodyCoordinates) -> NDArray[np.float64]:
+def _modal_rows(body: BodyCoordinates) -> Array:
     s = body.integrals
     return np.vstack([s.S2, s.I1, s.G1 + s.Jf, body.modes.omega**2, np.diag(body.damping)])
 
@@ -221,13 +223,13 @@ def _is_full(body: BodyCoordinates) -> bool:
     return body.points is not None or _coupled_damping(body).size > 0
 
 
-def _coupled_damping(body: BodyCoordinates) -> NDArray[np.float64]:
+def _coupled_damping(body: BodyCoordinates) -> Array:
     """Damping matrix of a body without its diagonal, rows padded; no rows where nothing is left."""
     rest = body.damping - np.diag(np.diag(body.damping))
     return _padded(rest) if np.any(rest) else np.zeros((0, padded(body.nf)))
 
 
-def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _padded(matrix: Array) -> Array:
     """The matrix with columns of zeros up to whole vectors."""
     rows, columns = matrix.shape
     out = np.zeros((rows, padded(columns)), dtype=matrix.dtype)
@@ -235,7 +237,7 @@ def _padded(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
-def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[NDArray[np.float64]]:
+def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[Array]:
     """What coordinates give to the sums of each body, (nf, width): see `kernel.sums`."""
     rows = [[_modal_rows(body)[:FIRST_MARKER]] for body in bodies]
     for marker in markers:
@@ -243,25 +245,25 @@ def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list
     return [_padded(np.vstack(parts).T) for parts in rows]
 
 
-def _products(body: BodyCoordinates) -> NDArray[np.float64]:
+def _products(body: BodyCoordinates) -> Array:
     """Columns of G2 and I2 of a body, one after the other, padded: (nf, 2 stride)."""
     return np.hstack([_padded(body.integrals.G2.T), _padded(body.integrals.I2.T)])
 
 
-def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> NDArray[np.float64] | None:
+def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> Array | None:
     if not any(_is_full(body) for body in bodies):
         return None
     return np.concatenate([np.zeros(0), *(_padded(m.bending).ravel() for m in markers if m.bending is not None)])
 
 
-def _mass_weights(body: BodyCoordinates) -> list[NDArray[np.float64]]:
+def _mass_weights(body: BodyCoordinates) -> list[Array]:
     """Weights of each mass point, as far as they are not zero."""
     if body.points is None:
         return []
     return [row[: 1 + int(np.max(np.nonzero(row)[0], initial=-1))] for row in body.points.weights]
 
 
-def _places(body: BodyCoordinates) -> NDArray[np.float64]:
+def _places(body: BodyCoordinates) -> Array:
     """Nx, Ny and N2' of all mass points by coordinate, (nf, 3 pitch)."""
     if body.points is None:
         return np.zeros((body.nf, 0))
@@ -269,18 +271,18 @@ def _places(body: BodyCoordinates) -> NDArray[np.float64]:
     return np.hstack([_padded(rows.T) for rows in (N[:, 0], N[:, 1], body.points.slope)])
 
 
-def _spans(body: BodyCoordinates) -> NDArray[np.float64]:
+def _spans(body: BodyCoordinates) -> Array:
     """Weights of all mass points by Gauss point, (slopes, pitch)."""
     return np.zeros((0, 0)) if body.points is None else _padded(body.points.weights.T)
 
 
-def _inertias(body: BodyCoordinates) -> NDArray[np.float64]:
+def _inertias(body: BodyCoordinates) -> Array:
     """Place along the beam, mass and moment of inertia of all mass points, (3, pitch)."""
     points = body.points
     return np.zeros((3, 0)) if points is None else _padded(np.stack([points.x, points.mass, points.inertia]))
 
 
-def _mass_rows(body: BodyCoordinates) -> NDArray[np.float64]:
+def _mass_rows(body: BodyCoordinates) -> Array:
     if body.points is None:
         return np.zeros((3, 0))
     rows = np.concatenate([body.points.N, body.points.slope[:, None]], axis=1)
@@ -319,67 +321,59 @@ def records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
 
 
 def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
-    values = []
-    flex = square = port = effort = block = mass = dense = inverse = first = products = jac = 0
-    places = spans = inertias = damping = 0
+    values: list[dict] = []
+    start: Counter[str] = Counter()
     for body, body_ports, body_efforts, matrix in zip(bodies, ports, efforts, columns, strict=True):
-        s = body.integrals
-        parts = sum(port["parts"] for port in body_ports)
-        # Three lanes more for the rigid coordinates.
-        lanes, size, stride = padded(parts + 3), 3 + body.nf, padded(body.nf)
-        coupled, full = _coupled_damping(body).size, _is_full(body)
-        masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
+        s, parts = body.integrals, sum(port["parts"] for port in body_ports)
+        own = _stretches(body, parts) | {"port": len(body_ports), "effort": len(body_efforts), "columns": matrix.size}
+        starts = {name: start[name] for name in own}
+        start.update(own)
         values.append(
-            {
+            starts
+            | {f"{name}_end": start[name] for name in ("port", "effort", "mass")}
+            | {
                 "offset": body.offset,
                 "nf": body.nf,
-                "flex": flex,
-                "square": square,
-                "port": port,
-                "port_end": port + len(body_ports),
-                "effort": effort,
-                "effort_end": effort + len(body_efforts),
-                "columns": first,
                 "width": matrix.shape[1],
-                "products": products,
-                "stride": stride,
-                "damping": damping if coupled else -1,
-                "block": block,
+                "stride": padded(body.nf),
+                "damping": starts["damping"] if own["damping"] else -1,
                 "parts": parts,
-                "lanes": lanes,
-                "jac": jac,
-                "mass": mass,
-                "mass_end": mass + masses,
-                "slopes": slopes,
-                "pitch": padded(masses),
-                "places": places,
-                "spans": spans,
-                "inertias": inertias,
-                "full": int(full),
-                "dense": dense,
-                "inverse": inverse,
+                "lanes": _lanes(parts),
+                "slopes": 0 if body.points is None else body.points.weights.shape[1],
+                "pitch": padded(own["mass"]),
+                "full": int(_is_full(body)),
                 "m": s.m,
                 "S1x": s.S1[0],
                 "S1y": s.S1[1],
                 "I0": s.I0 + s.J,
             }
         )
-        flex += body.nf
-        square += body.nf**2
-        port += len(body_ports)
-        effort += len(body_efforts)
-        first += matrix.size
-        products += 2 * body.nf * stride
-        damping += coupled
-        block += parts * lanes
-        jac += size * lanes
-        mass += masses
-        places += body.nf * 3 * padded(masses)
-        spans += slopes * padded(masses)
-        inertias += 3 * padded(masses)
-        dense += size**2 if full else 0
-        inverse += size * padded(size) if full else 0
     return records(BODY, values)
+
+
+def _lanes(parts: int) -> int:
+    """Lanes of a body's Jacobian rows, with three more for its rigid coordinates."""
+    return padded(parts + 3)
+
+
+def _stretches(body: BodyCoordinates, parts: int) -> dict[str, int]:
+    """How much of each array is a body's own, by the field that says where that starts."""
+    size, full = 3 + body.nf, _is_full(body)
+    masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
+    return {
+        "flex": body.nf,
+        "square": body.nf**2,
+        "products": 2 * body.nf * padded(body.nf),
+        "damping": _coupled_damping(body).size,
+        "block": parts * _lanes(parts),
+        "jac": size * _lanes(parts),
+        "mass": masses,
+        "places": 3 * body.nf * padded(masses),
+        "spans": slopes * padded(masses),
+        "inertias": 3 * padded(masses),
+        "dense": size**2 if full else 0,
+        "inverse": size * padded(size) if full else 0,
+    }
 
 
 def _marker_records(markers: list[Marker]) -> NDArray[np.void]:

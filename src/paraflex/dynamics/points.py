@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import Marker, end_markers
 from paraflex.dynamics.system import System
 from paraflex.mechanism import PointRef
@@ -15,21 +15,17 @@ from paraflex.mechanism import PointRef
 class PointMotion(NamedTuple):
     """Position [m], velocity [m/s], acceleration [m/s^2] in the ground frame, each (k, 2)."""
 
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
+    position: Array
+    velocity: Array
+    acceleration: Array
 
 
-def point_motion(
-    system: System, ref: PointRef, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
-) -> PointMotion:
+def point_motion(system: System, ref: PointRef, q: Array, v: Array, a: Array) -> PointMotion:
     """Motion of a named point for coordinates (k, n) and their derivatives."""
     return marker_motion(system, system.marker(ref), q, v, a)
 
 
-def marker_motion(
-    system: System, marker: Marker, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
-) -> PointMotion:
+def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) -> PointMotion:
     """Motion of a material point of a body for coordinates (k, n) and their derivatives.
 
     p = r + R s, p' = r' + R (phi' E s + N u'), p'' = r'' + R (phi'' E s - phi'^2 s + 2 phi' E N u' + N u'').
@@ -38,10 +34,10 @@ def marker_motion(
     phi, w, dw = q[:, body.angle], v[:, body.angle, None], a[:, body.angle, None]
     c, s = np.cos(phi)[:, None], np.sin(phi)[:, None]
 
-    def turned(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def turned(x: Array) -> Array:
         return np.hstack([c * x[:, :1] - s * x[:, 1:], s * x[:, :1] + c * x[:, 1:]])
 
-    def quarter(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def quarter(x: Array) -> Array:
         return np.column_stack([-x[:, 1], x[:, 0]])
 
     u, du, ddu = q[:, body.flexible], v[:, body.flexible], a[:, body.flexible]
@@ -58,7 +54,7 @@ def marker_motion(
     )
 
 
-def tip_deflection(system: System, name: str, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def tip_deflection(system: System, name: str, q: Array) -> Array:
     """Axial [m] and transverse [m] displacement and slope [rad] of a beam's last end: (k, 3).
 
     From where it would be were the beam straight along its tangent at the first end, whatever its reference condition.

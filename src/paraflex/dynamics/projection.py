@@ -1,18 +1,35 @@
-"""Steps back onto the constraints: the least change of coordinates or rates, and what to say where there is none."""
+"""A mechanism put together: coordinates onto Phi = 0, then rates onto Phi' = 0, by the least change of either.
+
+Every pose of this package that is not a step of a run is found here: assemblies, starts, poses near a path.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence, involved, joint_of_row
-from paraflex.dynamics.sparse import Saddle, body_masses, elastic_stiffness, sparse_jacobian, sparse_mass
+from paraflex.arrays import Array
+from paraflex.dynamics.rank import DENSE_ROWS, Dependence, constraint_jacobian, dependence, involved, joint_of_row
+from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import InconsistentConstraintsError, Moment
+from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
+from paraflex.kernel.stage import equations
 
+Sparse = scipy.sparse.csr_matrix
+# The smallest change that rows (m,) ask for, and the weights (n, n) it is small in at coordinates (n,).
+LeastChange = Callable[[Array], Array]
+Metric = Callable[[Array], Sparse]
+
+_MAX_ITERATIONS = 50
+# Closure error that counts as closed [rad], and as a part of the mechanism's size: thousands of rounding errors.
+CLOSED = 1e-12
+# Projections of rates: what rounding left of the first the second takes away.
+_PROJECTIONS = 2
 # Joints named in an error.
 NAMED = 6
 _UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
@@ -22,55 +39,118 @@ AGREE = "leave one of these joints or prescribed motions out, or choose places a
 _CONFLICT = 1e-6
 
 
-def least_change(
+def assemble(
     system: System,
-    q: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    stiffness: float = 0.0,
-    damping: float = 0.0,
+    signals: Signals,
+    t: float,
+    q: Array,
+    metric: Metric,
     *,
-    every_spring: bool = False,
-) -> NDArray[np.float64]:
-    """The smallest d in the metric M + stiffness K with Phi_q d = residual; least squares for dependent rows.
+    free: NDArray[np.bool_] | None = None,
+    longest: float = math.inf,
+) -> tuple[Array, Array]:
+    """Newton's iteration on Phi(q, t) = 0, each step the least change in a metric.
 
-    K keeps links in shape; with every spring also those at joints.
+    Parameters
+    ----------
+    system : System
+    signals : Signals
+    t : float
+        [s]
+    q : (n,) array
+        Where it begins.
+    metric : callable
+        Weights (n, n) at coordinates (n,), say `link_metric`.
+    free : (n,) array of bool, optional
+        Coordinates that may change; all by default.
+    longest : float
+        No step is longer [sizes of the mechanism, rad].
+
+    Returns
+    -------
+    q, phi
+        Coordinates, and what is left of the constraints there: see `closed`.
+    """
+    q, free = q.copy(), np.ones(system.n, dtype=bool) if free is None else free
+    phi, _ = system.constraints(signals, t, q)
+    for _ in range(_MAX_ITERATIONS):
+        if closed(system, q, phi) or not np.any(free):
+            break
+        rows = constraint_jacobian(system, q)[:, free]
+        change = least_change(metric(q)[free][:, free], rows, system.row_units)(phi)
+        q[free] -= change * shortened(change / system.units[free], longest)
+        phi, _ = system.constraints(signals, t, q)
+    return q, phi
+
+
+def closed(system: System, q: Array, phi: Array) -> bool:
+    """Whether what constraints (m,) leave open at q is rounding: of the size of the mechanism, or of places far off."""
+    far = max(float(np.max(np.abs(q[body.position]), initial=system.size)) for body in system.bodies) / system.size
+    return system.gap(phi) < CLOSED * far
+
+
+def shortened(step: Array, longest: float) -> float:
+    """The part of a step without dimension that is no longer than the longest."""
+    return min(1.0, longest / max(float(np.max(np.abs(step), initial=0.0)), np.finfo(float).tiny))
+
+
+def link_metric(system: System, q: Array, stiffness: float, *, every_spring: bool = False) -> Sparse:
+    """M + stiffness K: with the stiffness [s^2] links move and keep their shape; with every spring those at joints."""
+    mass = sparse_mass(system, q)
+    if not stiffness:
+        return mass
+    return Sparse(mass + stiffness * elastic_stiffness(system, q, every_spring=every_spring))
+
+
+def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.0) -> LeastChange:
+    """From wanted (m,) to the smallest x in a metric with rows x = wanted; least squares for dependent rows.
 
     With damping it goes less far, as Levenberg and Marquardt have it: a fraction of the mean diagonal entry of
-    Phi_q (M + stiffness K)^-1 Phi_q^T.
+    rows metric^-1 rows^T.
+
+    Parameters
+    ----------
+    metric, rows : (n, n) and (m, n) sparse matrices
+    units : (m,) array
+        Of the rows: angles and lengths would differ by the square of the mechanism's size.
+    damping : float
     """
-    if system.m > DENSE_ROWS:
-        return _sparse_change(system, q, residual, stiffness, damping, every_spring)
-    jacobian = system.jacobian(q)
-    metric = np.asarray(scipy.linalg.block_diag(*body_masses(system, q)))
-    if stiffness:
-        metric = metric + stiffness * elastic_stiffness(system, q, every_spring=every_spring).toarray()
-    weighted = np.linalg.solve(metric, jacobian.T)
-    # Without dimension: rows of angles and of lengths would differ by the square of the mechanism's size.
-    units = system.row_units
-    schur = (jacobian @ weighted) / np.outer(units, units)
+    rows = Sparse(scipy.sparse.diags(1.0 / units) @ rows)
+    if units.size > DENSE_ROWS:
+        mean = float(np.mean(rows.multiply(rows) @ (1.0 / np.asarray(metric.diagonal(), dtype=float))))
+        saddle = Saddle(metric, rows, np.full(units.size, damping * mean))
+        return lambda wanted: saddle.solve(r=wanted / units)[0]
+    dense = rows.toarray()
+    weighted = np.linalg.solve(metric.toarray(), dense.T)
+    schur = dense @ weighted
     if damping:
-        schur += damping * np.mean(np.diag(schur)) * np.eye(system.m)
-    return weighted @ (np.linalg.lstsq(schur, residual / units, rcond=1e-12)[0] / units)
+        schur += damping * np.mean(np.diag(schur)) * np.eye(units.size)
+    return lambda wanted: weighted @ np.linalg.lstsq(schur, wanted / units, rcond=1e-12)[0]
 
 
-def _sparse_change(
-    system: System,
-    q: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    stiffness: float,
-    damping: float,
-    every_spring: bool,
-) -> NDArray[np.float64]:
-    jacobian = sparse_jacobian(system, q)
-    metric = sparse_mass(system, q)
-    if stiffness:
-        metric = scipy.sparse.csr_matrix(metric + stiffness * elastic_stiffness(system, q, every_spring=every_spring))
-    jacobian = scipy.sparse.csr_matrix(scipy.sparse.diags(1.0 / system.row_units) @ jacobian)
-    mean = float(np.mean(jacobian.multiply(jacobian) @ (1.0 / np.asarray(metric.diagonal(), dtype=float))))
-    return Saddle(metric, jacobian, np.full(system.m, damping * mean)).solve(r=residual / system.row_units)[0]
+def constraint_change(
+    system: System, q: Array, stiffness: float = 0.0, damping: float = 0.0, *, every_spring: bool = False
+) -> LeastChange:
+    """`least_change` in `link_metric` with the rows Phi_q."""
+    metric = link_metric(system, q, stiffness, every_spring=every_spring)
+    return least_change(metric, constraint_jacobian(system, q), system.row_units, damping)
 
 
-def joint_gaps(system: System, phi: NDArray[np.float64]) -> dict[str, float]:
+def project(change: LeastChange, x: Array, left: Callable[[Array], Array]) -> Array:
+    """The rates nearest to x (n,) of which nothing is `left` (m,), in which they are linear."""
+    for _ in range(_PROJECTIONS):
+        x = x - change(left(x))
+    return x
+
+
+def second_rates(system: System, signals: Signals, t: float, q: Array, v: Array, a: Array) -> Array:
+    """Phi'' (m,) at accelerations (n,); zero in the rows of springs and dampers."""
+    workspace, torques = system.workspace(), np.zeros(len(system.mechanism.motors))
+    equations(system.packed, signals, t, INDEX_1, q, v, a, np.zeros(system.m), torques, workspace)
+    return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
+
+
+def joint_gaps(system: System, phi: Array) -> dict[str, float]:
     """What is left open at joints and prescribed motions by name [m, rad]: the largest first, down to a tenth of it."""
     gaps: dict[str, float] = {}
     for row, value in zip(system.rows, phi.tolist(), strict=True):
@@ -79,14 +159,12 @@ def joint_gaps(system: System, phi: NDArray[np.float64]) -> dict[str, float]:
     return {name: gap for name, gap in sorted(gaps.items(), key=lambda item: -item[1]) if gap >= 0.1 * largest}
 
 
-def gap_unit(system: System, phi: NDArray[np.float64]) -> str:
+def gap_unit(system: System, phi: Array) -> str:
     """The unit of the largest number among constraint rows (m,)."""
     return "rad" if system.rows[int(np.argmax(np.abs(phi)))].endswith(" angle") else "m"
 
 
-def refuse_conflict(
-    system: System, what: str, t: float, q: NDArray[np.float64], wanted: NDArray[np.float64], left: NDArray[np.float64]
-) -> None:
+def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array, left: Array) -> None:
     """Raise where a projection leaves more of what the rows want (m,) than rounding explains.
 
     Raises
@@ -100,7 +178,7 @@ def refuse_conflict(
     raise InconsistentConstraintsError(cause, Moment(t, 0), remedy=AGREE)
 
 
-def contradiction(system: System, wanted: NDArray[np.float64], found: Dependence, what: str) -> str:
+def contradiction(system: System, wanted: Array, found: Dependence, what: str) -> str:
     """Who contradicts whom, and by how much: the dropped row furthest from what its sources have it want."""
     if found.dropped.size:
         conflict = np.abs(found.conflict(wanted))

@@ -4,31 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.brake import HeldAngle
 from paraflex.dynamics.equilibrium import moving_equilibrium, static_equilibrium
 from paraflex.dynamics.joint_coordinates import joint_coordinate
-from paraflex.dynamics.projection import least_change
+from paraflex.dynamics.projection import LeastChange, constraint_change, project, second_rates
 from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import State
 from paraflex.dynamics.system import System, build_system
-from paraflex.kernel.packed import CONSTRAINT, INDEX_1
-from paraflex.kernel.stage import equations
 from paraflex.mechanism import AngleLaw, PrescribedAngle
-
-Array = NDArray[np.float64]
 
 # Weight of stiffness against mass [s^2]: that of `dynamics.state`, links move and do not begin to bend.
 _STIFFNESS = 1e3
 # How far the mechanism moves for a central difference [m, rad].
 _MOVE = 1e-3
-# Projections onto the constraints: what rounding left of the first the second takes away.
-_PROJECTIONS = 2
 
 
 class JointMotion(NamedTuple):
@@ -134,32 +129,23 @@ class _Motion:
     """Velocities and accelerations that drives give a system, its links keeping the shape they have."""
 
     def __init__(self, system: System, time: float) -> None:
-        self.system, self.time = system, time
-        self.signals, self.workspace = moment_signals(system.mechanism, time), system.workspace()
-        self.torques, self.none = np.zeros(len(system.mechanism.motors)), np.zeros(system.m)
-        self.fixed = system.packed.rows["kind"] == CONSTRAINT
+        self.system, self.time, self.signals = system, time, moment_signals(system.mechanism, time)
 
     def __call__(self, q: Array) -> tuple[Array, Array]:
         """Velocities and accelerations (n,) at coordinates (n,)."""
-        v, a = self.velocities(q), np.zeros(self.system.n)
-        for _ in range(_PROJECTIONS):
-            a = a - least_change(self.system, q, self._accelerations(q, v, a), _STIFFNESS, every_spring=True)
-        return v, a
+        change, rest = self._change(q), np.zeros(self.system.n)
+        v = project(change, rest, partial(self._rates, q))
+        return v, project(change, rest, partial(second_rates, self.system, self.signals, self.time, q, v))
 
     def velocities(self, q: Array, near: Array | None = None) -> Array:
         """Those allowed (n,) at coordinates (n,) that are nearest to others, to none by default."""
-        v = np.zeros(self.system.n) if near is None else near
-        for _ in range(_PROJECTIONS):
-            v = v - least_change(
-                self.system, q, self.system.constraints(self.signals, self.time, q, v)[1], _STIFFNESS, every_spring=True
-            )
-        return v
+        return project(self._change(q), np.zeros(self.system.n) if near is None else near, partial(self._rates, q))
 
-    def _accelerations(self, q: Array, v: Array, a: Array) -> Array:
-        """Phi'' (m,), zero in rows of springs and dampers."""
-        ws = self.workspace
-        equations(self.system.packed, self.signals, self.time, INDEX_1, q, v, a, self.none, self.torques, ws)
-        return np.where(self.fixed, ws.rows, 0.0)
+    def _change(self, q: Array) -> LeastChange:
+        return constraint_change(self.system, q, _STIFFNESS, every_spring=True)
+
+    def _rates(self, q: Array, v: Array) -> Array:
+        return self.system.constraints(self.signals, self.time, q, v)[1]
 
 
 def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> System:

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.sparse import body_masses, sparse_jacobian
 from paraflex.dynamics.system import System
 from paraflex.kernel.linear import factor_system
@@ -37,7 +38,7 @@ class Dependence:
 
     kept: NDArray[np.int64]
     dropped: NDArray[np.int64]
-    coefficients: NDArray[np.float64]
+    coefficients: Array
 
     @property
     def rank(self) -> int:
@@ -49,11 +50,11 @@ class Dependence:
         part = np.abs(self.coefficients[:, k])
         return self.kept[part > _NO_PART * max(1.0, part.max(initial=0.0))]
 
-    def conflict(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    def conflict(self, residual: Array) -> Array:
         """What each dropped row asks for beyond what the rows it follows from give it; residual (m,)."""
         return residual[self.dropped] - self.coefficients.T @ residual[self.kept]
 
-    def least_norm(self, multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def least_norm(self, multipliers: Array) -> Array:
         """Multipliers (m,) of the same constraint forces with the least sum of squares."""
         out = multipliers.copy()
         if self.dropped.size:
@@ -63,9 +64,12 @@ class Dependence:
         return out
 
 
-def dependence(
-    system: System, q: NDArray[np.float64], threshold: float = DEPENDENT, count: int | None = None
-) -> Dependence:
+def constraint_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
+    """Phi_q (m, n) at q as a sparse matrix; zero in the rows of springs and dampers."""
+    return sparse_jacobian(system, q) if system.m > DENSE_ROWS else scipy.sparse.csr_matrix(system.jacobian(q))
+
+
+def dependence(system: System, q: Array, threshold: float = DEPENDENT, count: int | None = None) -> Dependence:
     """Constraint rows that follow from others at q.
 
     Parameters
@@ -85,9 +89,7 @@ def dependence(
     return _sparse(system, q, rigid, threshold, count)
 
 
-def _dense(
-    system: System, q: NDArray[np.float64], rigid: NDArray[np.int64], threshold: float, count: int | None
-) -> Dependence:
+def _dense(system: System, q: Array, rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
     """By a QR factorisation of Phi_q^T with pivots, without dimension."""
     units = system.row_units[rigid]
     jacobian = system.jacobian(q)[rigid] * system.units / units[:, None]
@@ -100,9 +102,7 @@ def _dense(
     return Dependence(rigid[kept], rigid[dropped], coefficients / units[kept][:, None] * units[dropped])
 
 
-def _sparse(
-    system: System, q: NDArray[np.float64], rigid: NDArray[np.int64], threshold: float, count: int | None
-) -> Dependence:
+def _sparse(system: System, q: Array, rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
     """By the Cholesky factor of Phi_q M^-1 Phi_q^T that runs use, row by row within its envelope."""
     workspace = system.workspace()
     factor_system(system.packed, 0.0, q, workspace)
@@ -125,7 +125,7 @@ def _sparse(
     return Dependence(rigid[kept], rigid[dropped], coefficients)
 
 
-def redundant_rows(system: System, q: NDArray[np.float64], threshold: float = DEPENDENT) -> list[str]:
+def redundant_rows(system: System, q: Array, threshold: float = DEPENDENT) -> list[str]:
     """Names of constraint rows that follow from the others at q: see `dependence`."""
     return sorted(system.rows[i] for i in dependence(system, q, threshold).dropped)
 

@@ -76,17 +76,21 @@ def _missed(body: BodyCoordinates, system: System, point: PointRef) -> float:
 
 def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
     """Points of bodies at which joints or loads bring in moments, and what does so."""
-    turning = [(f"the prescribed motion {one.name}", one.joint) for one in mechanism.prescribed]
-    turning += [(f"the motor {one.name}", one.joint) for one in mechanism.motors]
-    turning += [(f"the spring {one.name}", one.joint) for one in mechanism.springs]
-    turning += [(f"the damper {one.name}", one.joint) for one in mechanism.dampers]
-    turning += [(f"the friction {one.name}", one.joint) for one in mechanism.frictions]
+    groups = {
+        "prescribed motion": mechanism.prescribed,
+        "motor": mechanism.motors,
+        "spring": mechanism.springs,
+        "damper": mechanism.dampers,
+        "friction": mechanism.frictions,
+    }
+    pins = [
+        (f"the {kind} {one.name}", mechanism.joint(one.joint)) for kind, members in groups.items() for one in members
+    ]
     causes = [
         (f"the {'weld' if isinstance(joint, WeldJoint) else 'rail'} {joint.name}", joint)
         for joint in mechanism.joints
         if isinstance(joint, WeldJoint | PrismaticJoint)
     ]
-    pins = [(cause, mechanism.joint(name)) for cause, name in turning]
     causes += [(cause, joint) for cause, joint in pins if not isinstance(joint, AxisJoint)]
     for cause, joint in causes:
         for point in (joint.a, joint.b):

@@ -7,12 +7,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.fem import BeamMesh, Lump, ShapeIntegrals, beam_integrals, rigid_integrals
 from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam, ModalBody, RigidBody
-
-Array = NDArray[np.float64]
 
 
 class PointShape(NamedTuple):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.mechanism import AngleLaw, Mechanism, PrescribedAngle
@@ -23,13 +23,11 @@ _DEGREE = 5
 class InputSignals:
     """One piecewise polynomial: breaks (k + 1,) and coefficients (k, 6), ascending powers of t - break."""
 
-    breaks: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
+    breaks: Array
+    coefficients: Array
 
 
-def piecewise_quintic(
-    t: NDArray[np.float64], value: NDArray[np.float64], rate: NDArray[np.float64], acceleration: NDArray[np.float64]
-) -> InputSignals:
+def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array) -> InputSignals:
     """The quintic Hermite interpolant of values with two derivatives; each of them is reproduced at t.
 
     Parameters
@@ -113,7 +111,7 @@ def moment_signals(mechanism: Mechanism, time: float) -> Signals:
     return _pack(signals)
 
 
-def _grid(law: AngleLaw, a: float, b: float, end: float) -> NDArray[np.float64]:
+def _grid(law: AngleLaw, a: float, b: float, end: float) -> Array:
     """Breaks of a law's pieces on [a, b]: its own where it is a quintic between them, else many."""
     breaks = getattr(law, "breaks", None)
     if breaks is None:
@@ -123,9 +121,7 @@ def _grid(law: AngleLaw, a: float, b: float, end: float) -> NDArray[np.float64]:
     return np.array([a, *(t for t in breaks if a + margin < t < b - margin), b])
 
 
-def _evaluate(
-    prescribed: PrescribedAngle, t: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _evaluate(prescribed: PrescribedAngle, t: Array) -> tuple[Array, Array, Array]:
     try:
         return prescribed.law.evaluate(t)
     except InputError as error:

@@ -8,12 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT
-from paraflex.mechanism import AxisJoint
-
-Array = NDArray[np.float64]
 
 # Rows with a smaller singular value than this follow from others everywhere; loops close far better.
 _DEPENDENT = 1e-6
@@ -98,7 +96,7 @@ class SingularityMeasure:
     def _joints(self, *, slides: bool) -> list[str]:
         mechanism = self.system.mechanism
         joints = [motor.joint for motor in mechanism.motors if motor.name in self.motors]
-        return [joint for joint in joints if isinstance(mechanism.joint(joint), AxisJoint) is slides]
+        return [joint for joint in joints if mechanism.slides(joint) is slides]
 
     @cached_property
     def _bodies(self) -> _Bodies:

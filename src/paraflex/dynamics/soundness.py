@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.projection import joint_gaps
 from paraflex.dynamics.rank import Dependence, dependence, involved, joint_of_row
 from paraflex.dynamics.signals import moment_signals
@@ -16,8 +17,6 @@ from paraflex.dynamics.state import State, close_downhill, consistent_state, ref
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, InconsistentConstraintsError
 from paraflex.mechanism import Assembly
-
-Array = NDArray[np.float64]
 
 # How far a body turns, or moves as a part of the mechanism's size, to look whether a pose is a special one.
 _NUDGE = 1e-2
@@ -67,17 +66,15 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
 
     Take the rigid mechanism to learn what lengths and places allow: beams are not stretched to fit.
     """
-    signals, still = moment_signals(system.mechanism, time), np.zeros(system.n)
+    signals, nan = moment_signals(system.mechanism, time), math.nan
     q = reference_pose(system, assembly)
-    before = max(joint_gaps(system, system.constraints(signals, time, q, still)[0]).values(), default=0.0)
+    before = max(joint_gaps(system, system.constraints(signals, time, q)[0]).values(), default=0.0)
     try:
         state = consistent_state(system, assembly, time=time)
     except AssemblyError as error:
-        gaps = joint_gaps(system, system.constraints(signals, time, error.partial, still)[0])
-        gap, nan = max(gaps.values()), float("nan")
-        return Closure(assembly.name, before, nan, nan, gap, tuple(gaps), error.cause, None)
+        gaps = joint_gaps(system, system.constraints(signals, time, error.partial)[0])
+        return Closure(assembly.name, before, nan, nan, max(gaps.values()), tuple(gaps), error.cause, None)
     except InconsistentConstraintsError as error:
-        nan = float("nan")
         return Closure(assembly.name, before, nan, nan, 0.0, (), error.cause, None)
     phi, rate = system.constraints(signals, time, state.q, state.v)
     position, velocity = (float(np.max(np.abs(part), initial=0.0)) for part in (phi, rate))
@@ -195,7 +192,7 @@ def _poses_nearby(system: System, state: State) -> Iterator[Array]:
         move *= _NUDGE / max(np.max(np.abs(move[angles])), np.max(np.abs(move[places])) / size)
         for sign in (1.0, -1.0):
             q = close_downhill(system, signals, state.time, state.q + sign * move)
-            gap = system.gap(system.constraints(signals, state.time, q, np.zeros(system.n))[0])
+            gap = system.gap(system.constraints(signals, state.time, q)[0])
             gone = q - state.q
             # A pose that cannot be left: closing the loops leads back to it.
             if gap < _CLOSED and move @ (M @ move) < _BACK**2 * (gone @ (M @ gone)):

@@ -6,10 +6,13 @@ frequencies) then costs what the entries cost, not the square of the coordinates
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.dynamics.system import System
@@ -38,7 +41,7 @@ def without_stiffness(packed: PackedSystem) -> PackedSystem:
     return packed._replace(modal=modal)
 
 
-def body_masses(system: System, q: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def body_masses(system: System, q: Array) -> list[Array]:
     """Mass matrix (3 + nf, 3 + nf) of every body at q.
 
     The equations of motion are linear in the accelerations, and no body's depend on another's: a unit acceleration of
@@ -55,12 +58,12 @@ def body_masses(system: System, q: NDArray[np.float64]) -> list[NDArray[np.float
     return [forces[: 3 + body.nf, body.all].T for body in system.bodies]
 
 
-def sparse_mass(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:
+def sparse_mass(system: System, q: Array) -> scipy.sparse.csr_matrix:
     """Mass matrix (n, n) at q, one block a body."""
     return scipy.sparse.csr_matrix(scipy.sparse.block_diag(body_masses(system, q), format="csr"))
 
 
-def stiffness_diagonal(system: System) -> NDArray[np.float64]:
+def stiffness_diagonal(system: System) -> Array:
     """Elastic stiffness (n,) of each coordinate: omega^2 of modal ones, zero of rigid ones."""
     diagonal = np.zeros(system.n)
     for body in system.bodies:
@@ -68,7 +71,7 @@ def stiffness_diagonal(system: System) -> NDArray[np.float64]:
     return diagonal
 
 
-def elastic_stiffness(system: System, q: NDArray[np.float64], *, every_spring: bool = False) -> scipy.sparse.csr_matrix:
+def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -> scipy.sparse.csr_matrix:
     """Stiffness (n, n) that keeps links in shape: omega^2 of modes, J^T k J of the springs between finite segments.
 
     With every spring those at other joints as well.
@@ -82,7 +85,7 @@ def elastic_stiffness(system: System, q: NDArray[np.float64], *, every_spring: b
     return scipy.sparse.csr_matrix(stiffness)
 
 
-def sparse_jacobian(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_matrix:
+def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
     """Phi_q (m, n) at q; zero in the rows of springs and dampers.
 
     Phi' at rest but for one coordinate is a column. Bodies that no row ties are moved at once, so that the number of
@@ -91,7 +94,7 @@ def sparse_jacobian(system: System, q: NDArray[np.float64]) -> scipy.sparse.csr_
     row, owner = tied_bodies(system)
     offset = np.array([body.offset for body in system.bodies])
     size = np.array([3 + body.nf for body in system.bodies])
-    colour = _colours(row, owner, len(system.bodies))
+    colour = greedy_colours(neighbours(system))
     still, scratch = no_signals(system.packed), make_scratch(system.packed)
     phi, rate = np.zeros((2, system.m))
     rows, columns, values = [], [], []
@@ -124,16 +127,16 @@ def tied_bodies(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return pairs[:, 0], pairs[:, 1]
 
 
-def _colours(row: NDArray[np.int64], owner: NDArray[np.int64], bodies: int) -> NDArray[np.int64]:
-    """A colour of every body, another than that of any body it shares a row with."""
-    touched: dict[int, list[int]] = {}
-    for r, body in zip(row.tolist(), owner.tolist(), strict=True):
-        touched.setdefault(r, []).append(body)
-    neighbours: list[set[int]] = [set() for _ in range(bodies)]
-    for group in touched.values():
+def neighbours(system: System, more: Iterable[Sequence[int]] = ()) -> list[set[int]]:
+    """For each body itself, all that share a row with it, and all that share one of more groups of bodies."""
+    rows: dict[int, list[int]] = {}
+    for row, body in zip(*(part.tolist() for part in tied_bodies(system)), strict=True):
+        rows.setdefault(row, []).append(body)
+    found = [{i} for i in range(len(system.bodies))]
+    for group in (*rows.values(), *more):
         for body in group:
-            neighbours[body].update(group)
-    return greedy_colours(neighbours)
+            found[body].update(group)
+    return found
 
 
 def greedy_colours(neighbours: list[set[int]]) -> NDArray[np.int64]:
@@ -158,9 +161,7 @@ class Saddle:
         In the scale of C W^-1 C^T.
     """
 
-    def __init__(
-        self, W: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, damping: NDArray[np.float64] | None = None
-    ) -> None:
+    def __init__(self, W: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, damping: Array | None = None) -> None:
         diagonal = np.abs(W.diagonal())
         diagonal[diagonal == 0.0] = 1.0
         self._column = 1.0 / np.sqrt(diagonal)
@@ -176,9 +177,7 @@ class Saddle:
         regular = np.concatenate([np.zeros(self._n), np.full(self._row.size, -_REGULAR)])
         self._factor = scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(self._matrix + scipy.sparse.diags(regular)))
 
-    def solve(
-        self, f: NDArray[np.float64] | float = 0.0, r: NDArray[np.float64] | float = 0.0
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def solve(self, f: Array | float = 0.0, r: Array | float = 0.0) -> tuple[Array, Array]:
         """Solve for x (n,) and mu (m,) with right-hand sides f (n,) and r (m,); either may be zero."""
         right = np.concatenate([self._column * f, self._row * r])
         z = self._factor.solve(right)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,18 +11,18 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.joint_coordinates import marker_place
-from paraflex.dynamics.rank import DENSE_ROWS
+from paraflex.dynamics.projection import assemble, least_change, link_metric, project
+from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian, sparse_mass
-from paraflex.dynamics.state import State, closed, reference_pose
+from paraflex.dynamics.state import State, reference_pose
 from paraflex.dynamics.system import System
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start, check_start
 
-_MAX_ITERATIONS = 50
 # What joints may be open by at a start that is given [sizes of the mechanism, rad], and velocities by, as a fraction
 # of them.
 _GAP = 1e-6
@@ -38,7 +39,7 @@ def start_state(
     start: Start,
     assembly: Assembly | str | None = None,
     *,
-    q: NDArray[np.float64] | None = None,
+    q: Array | None = None,
     time: float = 0.0,
 ) -> State:
     """The state a start describes; bodies it does not place come from an assembly, joints closed.
@@ -68,7 +69,7 @@ def start_state(
     return State(time, q, _velocities(system, signals, start, time, q))
 
 
-def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> NDArray[np.float64]:
+def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> Array:
     """Modal coordinates (nf,) of a beam of least elastic energy at given deflections of its points.
 
     Deflections count from the tangent at the first end, whatever the reference condition; of a body of given shapes
@@ -111,7 +112,7 @@ def static_shape(system: System, name: str, points: Mapping[str, Deflection]) ->
     return u
 
 
-def _root_rows(system: System, name: str) -> NDArray[np.float64]:
+def _root_rows(system: System, name: str) -> Array:
     """Displacement and slope of a beam's first end in its frame (3, nf); zero for bodies of given shapes."""
     body = system.body(name)
     if body.mesh is None:
@@ -120,14 +121,12 @@ def _root_rows(system: System, name: str) -> NDArray[np.float64]:
     return np.vstack([first.N, first.slope])
 
 
-def point_rows(system: System, q: NDArray[np.float64], ref: PointRef) -> NDArray[np.float64]:
+def point_rows(system: System, q: Array, ref: PointRef) -> Array:
     """Rows (2, n) that take velocities of the coordinates to the velocity of a point of a body at q."""
     return marker_place(system, system.marker(ref), q[None])[1][0]
 
 
-def _coordinates(
-    system: System, signals: Signals, start: Start, assembly: Assembly | None, time: float
-) -> NDArray[np.float64]:
+def _coordinates(system: System, signals: Signals, start: Start, assembly: Assembly | None, time: float) -> Array:
     if set(start.coordinates) == set(system.index):
         q = np.zeros(system.n)
     elif assembly is None:
@@ -157,19 +156,10 @@ def _coordinates(
     return _closed(system, signals, time, q, held)
 
 
-def _closed(
-    system: System, signals: Signals, time: float, q: NDArray[np.float64], held: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArray[np.bool_]) -> Array:
     """Joints closed by the least change of the coordinates that are not held."""
-    free, still, q = ~held, np.zeros(system.n), q.copy()
-    scale = scipy.sparse.diags(1.0 / system.row_units)
-    phi, _ = system.constraints(signals, time, q, still)
-    for _ in range(_MAX_ITERATIONS):
-        if not np.any(free) or closed(system, q, phi):
-            break
-        metric = _metric(system, q, _POSITION_STIFFNESS)[free][:, free]
-        q[free] -= _least(metric, scale @ sparse_jacobian(system, q)[:, free], scale @ phi)
-        phi, _ = system.constraints(signals, time, q, still)
+    metric = partial(link_metric, system, stiffness=_POSITION_STIFFNESS)
+    q, phi = assemble(system, signals, time, q, metric, free=~held)
     worst = int(np.argmax(np.abs(phi) / system.row_units)) if phi.size else 0
     if system.gap(phi) > _GAP:
         raise InputError(
@@ -181,32 +171,26 @@ def _closed(
     return q
 
 
-def _velocities(
-    system: System, signals: Signals, start: Start, time: float, q: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    _, rate = system.constraints(signals, time, q, np.zeros(system.n))
+def _velocities(system: System, signals: Signals, start: Start, time: float, q: Array) -> Array:
+    _, rate = system.constraints(signals, time, q)
     given = _given_velocities(system, start, q)
-    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([sparse_jacobian(system, q), *(entry.row for entry in given)]))
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([constraint_jacobian(system, q), *(entry.row for entry in given)]))
     wanted = np.concatenate([-rate, [entry.value for entry in given]])
-    # Rows without dimension: those of lengths by the size of the mechanism.
     units = np.concatenate([system.row_units, [entry.unit for entry in given]])
-    C, wanted = scipy.sparse.csr_matrix(scipy.sparse.diags(1.0 / units) @ C), wanted / units
     if set(start.rates) == set(system.index):
         v = np.zeros(system.n)
         for name, values in start.rates.items():
             body = system.body(name)
             v[body.all] = _all_values(body, values, f"start.rates.{name}")
     else:
-        metric = _metric(system, q, _VELOCITY_STIFFNESS)
-        v = _least(metric, C, wanted)
-        # Stiffness and mass lie many powers of ten apart: what rounding left is taken away.
-        v += _least(metric, C, wanted - C @ v)
+        change = least_change(link_metric(system, q, _VELOCITY_STIFFNESS), C, units)
+        v = project(change, np.zeros(system.n), lambda v: C @ v - wanted)
     slip = np.abs(C @ v - wanted)
-    # What is left beside the terms that a row adds up.
-    size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted))
-    bad = slip > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SLIP)
+    # What is left beside the terms that a row adds up, lengths in sizes of the mechanism.
+    size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted)) / units
+    bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SLIP)
     if np.any(bad):
-        _refuse_velocities(system, given, slip * units, bad)
+        _refuse_velocities(system, given, slip, bad)
     return v
 
 
@@ -219,7 +203,7 @@ class _Given(NamedTuple):
     field: str
 
 
-def _given_velocities(system: System, start: Start, q: NDArray[np.float64]) -> list[_Given]:
+def _given_velocities(system: System, start: Start, q: Array) -> list[_Given]:
     unit = scipy.sparse.csr_matrix(scipy.sparse.identity(system.n))
     given = [
         _Given(unit[system.body(name).angle], rate, 1.0, f"start.velocity.angular.{name}")
@@ -237,7 +221,7 @@ def _given_velocities(system: System, start: Start, q: NDArray[np.float64]) -> l
     return given
 
 
-def _refuse_velocities(system: System, given: list[_Given], slip: NDArray[np.float64], bad: NDArray[np.bool_]) -> None:
+def _refuse_velocities(system: System, given: list[_Given], slip: Array, bad: NDArray[np.bool_]) -> None:
     worst = int(np.argmax(np.where(bad, slip, 0.0)))
     where = system.rows[worst] if worst < system.m else "what is given"
     of_given = slip[system.m :]
@@ -251,7 +235,7 @@ def _refuse_velocities(system: System, given: list[_Given], slip: NDArray[np.flo
     )
 
 
-def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> NDArray[np.float64]:
+def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> Array:
     """A body's coordinates as they stand in q, or their rates."""
     frame = [values.x, values.y, values.phi]
     if values.flexible is None:
@@ -273,16 +257,3 @@ def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> NDArra
             remedy="keep all modes, or give a shape of those kept",
         )  # fmt: skip
     return np.concatenate([frame, eta])
-
-
-def _metric(system: System, q: NDArray[np.float64], stiffness: float) -> scipy.sparse.csr_matrix:
-    return scipy.sparse.csr_matrix(sparse_mass(system, q) + stiffness * elastic_stiffness(system, q))
-
-
-def _least(metric: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, wanted: NDArray) -> NDArray[np.float64]:
-    """The smallest d in a metric with C d = wanted; least squares for dependent rows."""
-    if wanted.size > DENSE_ROWS:
-        return Saddle(metric, C).solve(r=wanted)[0]
-    dense = C.toarray()
-    weighted = np.linalg.solve(metric.toarray(), dense.T)
-    return weighted @ np.linalg.lstsq(dense @ weighted, wanted, rcond=1e-12)[0]

@@ -5,29 +5,37 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.dynamics.projection import NAMED, gap_unit, joint_gaps, least_change, refuse_conflict
+from paraflex.arrays import Array
+from paraflex.dynamics.projection import (
+    NAMED,
+    assemble,
+    closed,
+    constraint_change,
+    gap_unit,
+    joint_gaps,
+    link_metric,
+    project,
+    refuse_conflict,
+    second_rates,
+)
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
-from paraflex.kernel.stage import equations
+from paraflex.kernel.packed import Signals
 from paraflex.mechanism import GROUND, Assembly, PointJoint, PointRef
 from paraflex.mechanism.poses import approximate_poses
 
-_MAX_ITERATIONS = 50
 # Where Newton's iteration fails, a damped one goes downhill to the smallest gap: how it begins and ends.
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
 # How far links are turned aside before that [rad].
 _ASIDE = 1e-2
-# Closure error that counts as closed [rad], and as a part of the mechanism's size: thousands of rounding errors.
-CLOSED = 1e-12
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
 _POSITION_STIFFNESS = 1.0
 # Links that must be deflected by more than this part of their size for loops to close do not fit together.
@@ -42,16 +50,16 @@ class State:
     """Coordinates q and velocities v of a system at a time."""
 
     time: float
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
+    q: Array
+    v: Array
 
 
-def mass_matrix(system: System, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def mass_matrix(system: System, q: Array) -> Array:
     """Dense mass matrix (n, n) at q; of many bodies see `dynamics.sparse.sparse_mass`."""
     return np.asarray(scipy.linalg.block_diag(*body_masses(system, q)))
 
 
-def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
+def momentum(system: System, state: State) -> tuple[Array, float]:
     """Linear momentum (2,) [kg m/s] and angular momentum about the ground frame's origin [kg m^2/s]."""
     p = sparse_mass(system, state.q) @ state.v
     linear, angular = np.zeros(2), 0.0
@@ -63,7 +71,7 @@ def momentum(system: System, state: State) -> tuple[NDArray[np.float64], float]:
     return linear, angular
 
 
-def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
+def reference_pose(system: System, assembly: Assembly) -> Array:
     """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
 
     Bodies whose places follow from the assembly's points are there. Loops are not closed yet.
@@ -99,7 +107,7 @@ def reference_pose(system: System, assembly: Assembly) -> NDArray[np.float64]:
     return q
 
 
-def point_position(system: System, q: NDArray[np.float64], ref) -> NDArray[np.float64]:
+def point_position(system: System, q: Array, ref) -> Array:
     """Ground-frame position (2,) of a named point at q [m]."""
     marker = system.marker(ref)
     if ref.on_ground:
@@ -110,7 +118,7 @@ def point_position(system: System, q: NDArray[np.float64], ref) -> NDArray[np.fl
     return q[body.position] + np.array([c * local[0] - s * local[1], s * local[0] + c * local[1]])
 
 
-def project_position(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def project_position(system: System, signals: Signals, t: float, q: Array) -> Array:
     """The nearest coordinates, in the metric of mass and stiffness, at which the constraints hold.
 
     Raises
@@ -118,30 +126,18 @@ def project_position(system: System, signals: Signals, t: float, q: NDArray[np.f
     AssemblyError
         The loops cannot be closed from there; its partial result is where they come closest to it.
     """
-    start, q = q, q.copy()
-    zero = np.zeros(system.n)
-    for _ in range(_MAX_ITERATIONS):
-        phi, _ = system.constraints(signals, t, q, zero)
-        if closed(system, q, phi):
-            if _keeps_shape(system, start, q):
-                return q
-            break
-        q -= least_change(system, q, phi, stiffness=_POSITION_STIFFNESS)
-    closest = _closest(system, signals, t, start)
-    phi = system.constraints(signals, t, closest, zero)[0]
+    closest, phi = assemble(system, signals, t, q, partial(link_metric, system, stiffness=_POSITION_STIFFNESS))
+    if closed(system, closest, phi) and _keeps_shape(system, q, closest):
+        return closest
+    closest = _closest(system, signals, t, q)
+    phi, _ = system.constraints(signals, t, closest)
     gaps = joint_gaps(system, phi)
     gap, where = f"{max(gaps.values()):.3g} {gap_unit(system, phi)}", " and ".join(list(gaps)[:NAMED])
     cause = f"the loops do not close: a gap of {gap} remains in {where}"
     raise AssemblyError(cause, Moment(t, 0), closest, "correct angles of the assembly, lengths or places of points")
 
 
-def closed(system: System, q: NDArray[np.float64], phi: NDArray[np.float64]) -> bool:
-    """Whether what constraints (m,) leave open at q is rounding: of the size of the mechanism, or of places far off."""
-    far = max(float(np.max(np.abs(q[body.position]), initial=system.size)) for body in system.bodies) / system.size
-    return system.gap(phi) < CLOSED * far
-
-
-def _keeps_shape(system: System, start: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
+def _keeps_shape(system: System, start: Array, q: Array) -> bool:
     """Whether closing bends no link out of the shape it had: in linear theory any loop closes by stretching."""
     for body in system.bodies:
         markers = [system.marker(PointRef(body.name, point)) for point in system.mechanism.points[body.name]]
@@ -157,7 +153,7 @@ def _keeps_shape(system: System, start: NDArray[np.float64], q: NDArray[np.float
     return True
 
 
-def _closest(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Where loops that do not close come closest to it, downhill from q.
 
     All joints share the gap there; put together along the tree of joints, undeformed, those that close loops have it.
@@ -171,19 +167,18 @@ def _closest(system: System, signals: Signals, t: float, q: NDArray[np.float64])
     return reference_pose(system, Assembly("closest", {body.name: float(q[body.angle]) for body in system.bodies}))
 
 
-def close_downhill(system: System, signals: Signals, t: float, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Coordinates near q at which the gaps of all joints are smallest, by the method of Levenberg and Marquardt.
 
     Slower than `project_position` and not as exact, but at home near singular positions and where loops cannot close.
     """
-    still = np.zeros(system.n)
-    phi = system.constraints(signals, t, q, still)[0]
+    phi, _ = system.constraints(signals, t, q)
     damping = _FIRST_DAMPING
     for _ in range(_MAX_DESCENT):
         if closed(system, q, phi) or damping > _LARGEST_DAMPING:
             break
-        trial = q - least_change(system, q, phi, _POSITION_STIFFNESS, damping)
-        gap = system.constraints(signals, t, trial, still)[0]
+        trial = q - constraint_change(system, q, _POSITION_STIFFNESS, damping)(phi)
+        gap, _ = system.constraints(signals, t, trial)
         gain = 1.0 - np.linalg.norm(gap / system.row_units) / np.linalg.norm(phi / system.row_units)
         if gain > 0.0:
             q, phi = trial, gap
@@ -193,14 +188,7 @@ def close_downhill(system: System, signals: Signals, t: float, q: NDArray[np.flo
     return q
 
 
-def project_velocity(
-    system: System,
-    signals: Signals,
-    t: float,
-    q: NDArray[np.float64],
-    v: NDArray[np.float64],
-    stiffness: float = 0.0,
-) -> NDArray[np.float64]:
+def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Array, stiffness: float = 0.0) -> Array:
     """The nearest velocities, in the metric of mass, at which the constraints' first derivative vanishes.
 
     That is what a blow does. With a weight of stiffness [s^2] against mass links move and do not begin to bend.
@@ -210,10 +198,13 @@ def project_velocity(
     InconsistentConstraintsError
         There are none: two prescribed laws contradict one another.
     """
-    _, rate = system.constraints(signals, t, q, v)
-    v = v - least_change(system, q, rate, stiffness)
-    refuse_conflict(system, "velocities", t, q, rate, system.constraints(signals, t, q, v)[1])
-    return v
+
+    def left(v: Array) -> Array:
+        return system.constraints(signals, t, q, v)[1]
+
+    found = project(constraint_change(system, q, stiffness), v, left)
+    refuse_conflict(system, "velocities", t, q, left(v), left(found))
+    return found
 
 
 @checked_arguments()
@@ -221,8 +212,8 @@ def consistent_state(
     system: System,
     assembly: Assembly | str | None,
     *,
-    deflection: Mapping[str, NDArray[np.float64]] | None = None,
-    velocity: NDArray[np.float64] | None = None,
+    deflection: Mapping[str, Array] | None = None,
+    velocity: Array | None = None,
     time: float = 0.0,
 ) -> State:
     """A start: an assembly closed, with an initial deflection and velocity if given.
@@ -263,9 +254,7 @@ def consistent_state(
     return State(time, q, v)
 
 
-def check_accelerations(
-    system: System, signals: Signals, t: float, q: NDArray[np.float64], v: NDArray[np.float64]
-) -> None:
+def check_accelerations(system: System, signals: Signals, t: float, q: Array, v: Array) -> None:
     """Whether there are accelerations that all constraints allow at a consistent position and velocity.
 
     Raises
@@ -273,13 +262,9 @@ def check_accelerations(
     InconsistentConstraintsError
         There are none: two prescribed laws, or a singular position in motion.
     """
-    workspace, torques = system.workspace(), np.zeros(len(system.mechanism.motors))
-    no_force = np.zeros(system.m)
-
-    def rows(a: NDArray[np.float64]) -> NDArray[np.float64]:
-        equations(system.packed, signals, t, INDEX_1, q, v, a, no_force, torques, workspace)
-        return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
-
-    wanted = rows(np.zeros(system.n))
+    rest = np.zeros(system.n)
+    wanted = second_rates(system, signals, t, q, v, rest)
     if np.any(wanted):
-        refuse_conflict(system, "accelerations", t, q, wanted, rows(-least_change(system, q, wanted)))
+        left = partial(second_rates, system, signals, t, q, v)
+        found = project(constraint_change(system, q), rest, left)
+        refuse_conflict(system, "accelerations", t, q, wanted, left(found))

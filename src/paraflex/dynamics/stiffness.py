@@ -6,14 +6,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import greedy_colours, tied_bodies, without_stiffness
+from paraflex.dynamics.sparse import greedy_colours, neighbours, tied_bodies, without_stiffness
 from paraflex.dynamics.state import point_position
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING
 from paraflex.kernel.stage import equations
-
-Array = NDArray[np.float64]
 
 # Differences of fourth order: places and weights, for a step of one.
 _STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
@@ -71,8 +70,10 @@ def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.s
         Multipliers of constraints and torques of springs at joints at that pose.
     """
     forces, steps = RestingForces(system, time), _steps(system, q)
-    neighbours, spring_rows = _neighbours(system), _spring_rows(system, forces.springs)
-    colour = greedy_colours([set().union(*(neighbours[other] for other in others)) for others in neighbours])
+    springs = system.mechanism.linear_springs
+    stretched = [[system.index[ref.body] for ref in (one.a, one.b) if not ref.on_ground] for one in springs]
+    tied, spring_rows = neighbours(system, stretched), _spring_rows(system, forces.springs)
+    colour = greedy_colours([set().union(*(tied[other] for other in others)) for others in tied])
     stiffness, slopes = _Entries(), _Entries()
     for group in range(int(colour.max(initial=-1)) + 1):
         members = np.nonzero(colour == group)[0].tolist()
@@ -81,7 +82,7 @@ def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.s
             columns = [system.bodies[i].offset + local for i in moved]
             df, dr = _difference(forces, q, lam, np.array(columns), steps)
             for i, column in zip(moved, columns, strict=True):
-                for other in neighbours[i]:
+                for other in tied[i]:
                     stiffness.add(np.arange(*system.bodies[other].all.indices(system.n)), column, df, steps[column])
                 slopes.add(np.array(spring_rows[i], dtype=int), column, dr, steps[column])
     K = stiffness.matrix(system.n, system.n)
@@ -135,22 +136,6 @@ def _steps(system: System, q: Array) -> Array:
         # Modes of unit mass displace points by about one over the square root of the mass.
         steps[body.flexible] *= np.sqrt(body.integrals.m)
     return steps
-
-
-def _neighbours(system: System) -> list[set[int]]:
-    """For each body itself and all that a joint or a spring ties to it."""
-    neighbours = [{i} for i in range(len(system.bodies))]
-    row, owner = tied_bodies(system)
-    tied: dict[int, list[int]] = {}
-    for r, body in zip(row.tolist(), owner.tolist(), strict=True):
-        tied.setdefault(r, []).append(body)
-    groups = list(tied.values())
-    for spring in system.mechanism.linear_springs:
-        groups.append([system.index[ref.body] for ref in (spring.a, spring.b) if not ref.on_ground])
-    for group in groups:
-        for body in group:
-            neighbours[body].update(group)
-    return neighbours
 
 
 def _spring_rows(system: System, springs: NDArray[np.int64]) -> list[list[int]]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.dynamics.constraints import row_order
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
 from paraflex.dynamics.damping import damping_matrix
@@ -69,7 +70,7 @@ class System:
         return float(self.packed.size)
 
     @cached_property
-    def units(self) -> NDArray[np.float64]:
+    def units(self) -> Array:
         """What one of each coordinate (n,) is compared with: the size of the mechanism for places, 1 for all others."""
         units = np.ones(self.n)
         for body in self.bodies:
@@ -77,11 +78,11 @@ class System:
         return units
 
     @cached_property
-    def row_units(self) -> NDArray[np.float64]:
+    def row_units(self) -> Array:
         """The same of each constraint row (m,): the size for lengths, 1 for angles."""
         return np.real(self.packed.rows["unit"]).astype(float)
 
-    def gap(self, phi: NDArray[np.float64]) -> float:
+    def gap(self, phi: Array) -> float:
         """The largest violation among constraint rows (m,), lengths in sizes of the mechanism, angles in rad."""
         return float(np.max(np.abs(phi) / self.row_units, initial=0.0))
 
@@ -102,13 +103,14 @@ class System:
         """A fresh workspace for the kernels."""
         return make_workspace(self.packed)
 
-    def constraints(self, signals: Signals, t: float, q: NDArray, v: NDArray) -> tuple[NDArray, NDArray]:
-        """Phi and Phi' at (t, q, v), each (m,); zero in the rows of springs."""
+    def constraints(self, signals: Signals, t: float, q: NDArray, v: NDArray | None = None) -> tuple[NDArray, NDArray]:
+        """Phi and Phi' at (t, q, v), each (m,), at rest without v; zero in the rows of springs."""
         phi, rate = np.zeros(self.m), np.zeros(self.m)
+        v = np.zeros(self.n) if v is None else v
         constraint_values(self.packed, signals, t, q, v, make_scratch(self.packed), phi, rate)
         return phi, rate
 
-    def jacobian(self, q: NDArray) -> NDArray[np.float64]:
+    def jacobian(self, q: NDArray) -> Array:
         """Phi_q at q, dense (m, n); zero in the rows of springs."""
         jacobian = np.zeros((self.m, self.n))
         fill_jacobian(self.packed, q, jacobian)

@@ -9,12 +9,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics.points import PointMotion
 from paraflex.fem import BeamMesh, SpanProperties
 from paraflex.mechanism import Joint, PointRef
 from paraflex.results.outlines import Outline
 
-Array = NDArray[np.float64]
 Columns = NDArray[np.int64]
 
 # Points of Gauss quadrature: as many as Exudyn takes for a cable's virtual work, and what mass of sixth degree needs.

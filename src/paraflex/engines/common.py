@@ -6,8 +6,8 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError
 from paraflex.mechanism import FlexibleBeam, Mechanism, RevoluteJoint, given_shapes
@@ -19,7 +19,7 @@ ENGINES = tuple(_PRINTED)
 
 
 def check_dwell(name: str, task: TrackingTask) -> None:
-    """Nothing, if motors are free after the path: engines have no brakes here.
+    """Check that motors are free after the path: engines have no brakes here.
 
     Raises
     ------
@@ -31,31 +31,29 @@ def check_dwell(name: str, task: TrackingTask) -> None:
 
 
 def check_engine(name: str, mechanism: Mechanism) -> None:
-    """Nothing, if an engine is installed and can express a mechanism.
+    """Check that an engine is installed and can express a mechanism.
 
     Raises
     ------
     InputError
         It is not, or cannot.
     """
-    for body in given_shapes(mechanism.bodies):
-        refuse(_PRINTED[name], "a flexible body of given shapes", f"body.{body}")
-    for prescribed in mechanism.prescribed:
-        refuse(_PRINTED[name], "a prescribed angle", f"prescribed.{prescribed.name}")
-    for joint in mechanism.joints:
-        if not isinstance(joint, RevoluteJoint):
-            refuse(_PRINTED[name], "a joint that is not revolute", f"joint.{joint.name}")
-    for damper in mechanism.dampers:
-        refuse(_PRINTED[name], "a damper", f"damper.{damper.name}")
-    for friction in mechanism.frictions:
-        refuse(_PRINTED[name], "dry friction", f"friction.{friction.name}")
-    for body in mechanism.bodies:
-        if isinstance(body, FlexibleBeam) and body.damping is not None:
-            refuse(_PRINTED[name], "structural damping", f"body.{body.name}.damping")
-    for spring in mechanism.linear_springs:
-        refuse(_PRINTED[name], "a spring between points", f"linear_spring.{spring.name}")
-    for load in mechanism.loads:
-        refuse(_PRINTED[name], "a load", f"load.{load.name}")
+    beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam)]
+    beyond = {
+        "a flexible body of given shapes": [f"body.{body}" for body in given_shapes(mechanism.bodies)],
+        "a prescribed angle": [f"prescribed.{one.name}" for one in mechanism.prescribed],
+        "a joint that is not revolute": [
+            f"joint.{joint.name}" for joint in mechanism.joints if not isinstance(joint, RevoluteJoint)
+        ],
+        "a damper": [f"damper.{one.name}" for one in mechanism.dampers],
+        "dry friction": [f"friction.{one.name}" for one in mechanism.frictions],
+        "structural damping": [f"body.{beam.name}.damping" for beam in beams if beam.damping is not None],
+        "a spring between points": [f"linear_spring.{one.name}" for one in mechanism.linear_springs],
+        "a load": [f"load.{one.name}" for one in mechanism.loads],
+    }
+    for what, fields in beyond.items():
+        if fields:
+            refuse(_PRINTED[name], what, fields[0])
     if name == "mujoco":
         closing = {joint.name for joint in spanning_tree(mechanism).closing}
         for spring in mechanism.springs:
@@ -93,7 +91,7 @@ def refuse(engine: str, what: str, field: str) -> NoReturn:
     )
 
 
-def steps_between(times: NDArray[np.float64], step: float) -> int:
+def steps_between(times: Array, step: float) -> int:
     """The fewest equal steps between two samples that are no longer than a step.
 
     Raises

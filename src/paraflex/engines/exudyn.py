@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.arrays import Array
 from paraflex.dynamics import System
-from paraflex.engines.cables import Array, Cable, Columns, Ground, Link, Linkage, RigidLink, RigidState, Trajectory
+from paraflex.engines.cables import Cable, Columns, Ground, Link, Linkage, RigidLink, RigidState, Trajectory
 from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring

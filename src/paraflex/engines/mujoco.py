@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.arrays import Array
 from paraflex.dynamics import System, constant_signals, pack_signals
 from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
 from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
@@ -160,9 +161,9 @@ def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, s
 class _JointMotion:
     """What MuJoCo said at the samples it reached: positions, velocities, accelerations of its joints; energies."""
 
-    joints: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-    energy: NDArray[np.float64]
-    work: NDArray[np.float64]
+    joints: tuple[Array, Array, Array]
+    energy: Array
+    work: Array
     trouble: str
 
     @property

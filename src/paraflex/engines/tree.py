@@ -1,12 +1,12 @@
-"""A mechanism as a tree of bodies on hinges, as engines in joint coordinates see it, and its motion told of bodies."""
+"""A mechanism as a tree of bodies on hinges, as engines in joint coordinates see it, and its motion body by body."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Joint, Mechanism, PointRef
@@ -57,9 +57,9 @@ class Tree:
 
     links: tuple[Link, ...]
     closing: tuple[Joint, ...]
-    angles: dict[str, NDArray[np.float64]]
+    angles: dict[str, Array]
 
-    def relative_angle(self, joint: Joint) -> NDArray[np.float64]:
+    def relative_angle(self, joint: Joint) -> Array:
         """Weights (links,) of the hinges' angles in the angle of a joint of the mechanism."""
         return self.angles[joint.b.body] - self.angles[joint.a.body]
 
@@ -117,15 +117,15 @@ def _split(joints: list[Joint]) -> tuple[list[Joint], list[Joint]]:
     return kept, closing
 
 
-def place(system: System, ref: PointRef) -> NDArray[np.float64]:
+def place(system: System, ref: PointRef) -> Array:
     """Place (2,) of a named point in its rigid body, or in the ground frame [m]."""
     return system.marker(ref).x0
 
 
-def joint_state(task: TrackingTask, tree: Tree) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def joint_state(task: TrackingTask, tree: Tree) -> tuple[Array, Array]:
     """Angles and rates of the hinges at the task's start, each (links,)."""
 
-    def angle(state: NDArray[np.float64], name: str) -> float:
+    def angle(state: Array, name: str) -> float:
         return 0.0 if name == GROUND else state[task.system.body(name).angle]
 
     q, v = (
@@ -135,14 +135,12 @@ def joint_state(task: TrackingTask, tree: Tree) -> tuple[NDArray[np.float64], ND
     return q, v
 
 
-def body_motion(
-    system: System, tree: Tree, hinges: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def body_motion(system: System, tree: Tree, hinges: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
     """Coordinates of rigid bodies, velocities and accelerations (k, n) from those of the hinges (k, links)."""
     k = hinges[0].shape[0]
     q, v, a = out = tuple(np.zeros((k, system.n)) for _ in range(3))
 
-    def arm(ref: PointRef) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def arm(ref: PointRef) -> tuple[Array, Array, Array]:
         """From a body's origin to a point of it, and the derivatives."""
         angle = system.body(ref.body).angle
         x, y = place(system, ref)

@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.fem.integrals import ShapeIntegrals, SpanProperties, bar_integrals
 
@@ -24,8 +25,6 @@ _MARGIN = 16
 _DEPENDENT = 1e-10
 # A combination of functions this much less strained than the most strained one, at equal mass, moves rigidly.
 _RIGID = 1e-7
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

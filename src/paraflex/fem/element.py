@@ -10,7 +10,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
+
+from paraflex.arrays import Array
 
 COORDINATES_PER_NODE = 4
 AXIAL, TRANSVERSE, SLOPE, CURVATURE = range(COORDINATES_PER_NODE)
@@ -34,13 +35,13 @@ _AXIAL_COLUMNS = [AXIAL, 4 + AXIAL]
 
 
 @cache
-def _coefficients(derivative: int) -> NDArray[np.float64]:
+def _coefficients(derivative: int) -> Array:
     """Of the derivatives of the Hermite polynomials with respect to z: (powers, 6)."""
     rows = np.polynomial.polynomial.polyder(_HERMITE, derivative, axis=1)
     return np.ascontiguousarray(rows.T, dtype=np.float64)
 
 
-def axial_shape(x: NDArray[np.float64], length: float, derivative: int = 0) -> NDArray[np.float64]:
+def axial_shape(x: Array, length: float, derivative: int = 0) -> Array:
     """Axial displacement per nodal coordinate (first row of Eq. 5) or its x-derivative.
 
     Parameters
@@ -65,7 +66,7 @@ def axial_shape(x: NDArray[np.float64], length: float, derivative: int = 0) -> N
     return rows
 
 
-def transverse_shape(x: NDArray[np.float64], length: float, derivative: int = 0) -> NDArray[np.float64]:
+def transverse_shape(x: Array, length: float, derivative: int = 0) -> Array:
     """Transverse displacement per nodal coordinate (second row of Eq. 5) or its x-derivative.
 
     Parameters

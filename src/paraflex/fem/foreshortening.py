@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.fem.element import axial_shape, transverse_shape
 from paraflex.fem.integrals import GAUSS_POINTS, Lump, SpanProperties
 from paraflex.fem.mesh import BeamMesh
@@ -36,22 +36,20 @@ class MassPoints:
         f of each point is weights @ (slope of the Gauss points @ u)^2.
     """
 
-    x: NDArray[np.float64]
-    mass: NDArray[np.float64]
-    inertia: NDArray[np.float64]
-    N: NDArray[np.float64]
-    slope: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    x: Array
+    mass: Array
+    inertia: Array
+    N: Array
+    slope: Array
+    weights: Array
 
-    def bending(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    def bending(self, weights: Array) -> Array:
         """The matrix (nf, nf) of the quadratic form f at a point of these weights (g,)."""
         slopes = self.slope[: weights.size]
         return slopes.T @ (weights[:, None] * slopes)
 
 
-def mass_points(
-    mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence[Lump], basis: NDArray[np.float64]
-) -> MassPoints:
+def mass_points(mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence[Lump], basis: Array) -> MassPoints:
     """Mass points of a beam, the same quadrature as its shape integrals.
 
     Parameters
@@ -93,9 +91,7 @@ def mass_points(
     )
 
 
-def slope_squares(
-    mesh: BeamMesh, basis: NDArray[np.float64], x: NDArray[np.float64], u: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def slope_squares(mesh: BeamMesh, basis: Array, x: Array, u: Array) -> Array:
     """f(x) = int_0^x (N2' u)^2 dx at places along a beam [m]: (k, places), exactly.
 
     Parameters
@@ -108,9 +104,7 @@ def slope_squares(
     return slope_square_integrals(mesh, basis, x)(u)
 
 
-def slope_square_integrals(
-    mesh: BeamMesh, basis: NDArray[np.float64], x: NDArray[np.float64]
-) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def slope_square_integrals(mesh: BeamMesh, basis: Array, x: Array) -> Callable[[Array], Array]:
     """`slope_squares` as a function of the flexible coordinates alone, for who asks often.
 
     Parameters
@@ -128,7 +122,7 @@ def slope_square_integrals(
     places = knots[:-1, None] + halves[:, None] * (z + 1.0)
     slopes, ends = mesh.shapes_at(places.ravel())[1] @ basis, np.searchsorted(knots, x)
 
-    def integrals(u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def integrals(u: Array) -> Array:
         squares = (u @ slopes.T) ** 2
         pieces = (squares.reshape(len(u), halves.size, z.size) @ w) * halves
         return np.concatenate([np.zeros((len(u), 1)), np.cumsum(pieces, axis=1)], axis=1)[:, ends]
@@ -136,7 +130,7 @@ def slope_square_integrals(
     return integrals
 
 
-def node_weights(mesh: BeamMesh, node: int) -> NDArray[np.float64]:
+def node_weights(mesh: BeamMesh, node: int) -> Array:
     """Weights (g,) of the Gauss points in f at a node: all of the elements before it, exactly."""
     _, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     weights = np.zeros((mesh.n_elements, GAUSS_POINTS), dtype=mesh.nodes.dtype)
@@ -144,7 +138,7 @@ def node_weights(mesh: BeamMesh, node: int) -> NDArray[np.float64]:
     return weights.ravel()
 
 
-def _cumulative(z: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cumulative(z: Array) -> Array:
     """Integrals from -1 to z_i of the Lagrange polynomials on the nodes z: (g, g)."""
     # Columns of the inverse Vandermonde matrix are the polynomials' coefficients in Legendre form.
     legendre = np.polynomial.legendre

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.fem.element import axial_shape, transverse_shape
 from paraflex.fem.mesh import BeamMesh
 from paraflex.fem.reference import ReferenceCondition, reference_basis
@@ -81,18 +81,18 @@ class ShapeIntegrals:
     """
 
     m: float
-    S1: NDArray[np.float64]
-    S2: NDArray[np.float64]
+    S1: Array
+    S2: Array
     I0: float
-    I1: NDArray[np.float64]
-    I2: NDArray[np.float64]
-    G1: NDArray[np.float64]
-    G2: NDArray[np.float64]
+    I1: Array
+    I2: Array
+    G1: Array
+    G2: Array
     J: float
-    Jf: NDArray[np.float64]
-    Jff: NDArray[np.float64]
-    K: NDArray[np.float64]
-    D: NDArray[np.float64]
+    Jf: Array
+    Jff: Array
+    K: Array
+    D: Array
 
     @property
     def nf(self) -> int:
@@ -100,11 +100,11 @@ class ShapeIntegrals:
         return self.K.shape[0]
 
     @property
-    def Mff(self) -> NDArray[np.float64]:
+    def Mff(self) -> Array:
         """Mass matrix of the flexible coordinates, I2 + Jff, constant."""
         return self.I2 + self.Jff
 
-    def in_basis(self, basis: NDArray[np.float64]) -> ShapeIntegrals:
+    def in_basis(self, basis: Array) -> ShapeIntegrals:
         """The same body in other flexible coordinates, u_old = basis @ u_new."""
         return ShapeIntegrals(
             m=self.m,
@@ -205,10 +205,10 @@ def _beam_integrals(
 
 
 def bar_integrals(
-    points: Iterable[tuple[float, NDArray[np.float64], float]],
-    turning: Iterable[tuple[NDArray[np.float64], float]],
-    stiffness: NDArray[np.float64],
-    basis: NDArray[np.float64],
+    points: Iterable[tuple[float, Array, float]],
+    turning: Iterable[tuple[Array, float]],
+    stiffness: Array,
+    basis: Array,
 ) -> ShapeIntegrals:
     """Integrals of a straight bar as sums over its mass points.
 

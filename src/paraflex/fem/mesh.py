@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.fem.element import (
     AXIAL,
@@ -40,7 +41,7 @@ class BeamMesh:
         its own on either side, and at the last node it is free.
     """
 
-    nodes: NDArray[np.float64]
+    nodes: Array
     spans: NDArray[np.int64]
     points: Mapping[str, int]
     separate: tuple[int, ...] = ()
@@ -56,7 +57,7 @@ class BeamMesh:
         return int(self.spans[-1]) + 1
 
     @property
-    def knots(self) -> NDArray[np.float64]:
+    def knots(self) -> Array:
         """Ends of the spans (n_spans + 1,) [m]."""
         return self.nodes[np.searchsorted(self.spans, np.arange(self.n_spans + 1))]
 
@@ -86,7 +87,7 @@ class BeamMesh:
         """Index of a nodal coordinate; negative nodes count from the end."""
         return COORDINATES_PER_NODE * (node % self.nodes.size) + coordinate
 
-    def scatter(self, element: int, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def scatter(self, element: int, rows: Array) -> Array:
         """Rows per element coordinate (n, 8) as rows per nodal coordinate (n, n_nodal): the Boolean B of Eq. 8."""
         wide = np.zeros((rows.shape[0], self.n_nodal), dtype=rows.dtype)
         start = COORDINATES_PER_NODE * element
@@ -105,12 +106,12 @@ class BeamMesh:
         """The same mesh with curvature separate on either side of these nodes, and free at the last if it is one."""
         return replace(self, separate=tuple(sorted(set(nodes))))
 
-    def shape_at(self, x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def shape_at(self, x: float) -> tuple[Array, Array]:
         """Shape matrix N (2, n_nodal) and slope row N2' (n_nodal,) of the point at x [m]."""
         N, slope = self.shapes_at(np.array([x]))
         return N[0], slope[0]
 
-    def shapes_at(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def shapes_at(self, x: Array) -> tuple[Array, Array]:
         """`shape_at` of many points: (k, 2, n_nodal) and (k, n_nodal)."""
         elements = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.n_elements - 1)
         kind = np.result_type(x, self.nodes)
@@ -124,7 +125,7 @@ class BeamMesh:
             slope[own] = self.scatter(element, transverse_shape(local, length, derivative=1))
         return N, slope
 
-    def shape_at_node(self, node: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def shape_at_node(self, node: int) -> tuple[Array, Array]:
         """`shape_at` of a node, whose coordinates are displacement and slope themselves."""
         rows = np.zeros((3, self.n_nodal))
         rows[[0, 1, 2], [self.column(node, AXIAL), self.column(node, TRANSVERSE), self.slope_column(node)]] = 1.0

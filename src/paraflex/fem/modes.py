@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.fem.eigen import eigenpairs
 from paraflex.fem.integrals import ShapeIntegrals
 
@@ -24,14 +24,14 @@ class ModalBasis:
         Columns V with V^T Mff V = 1 and V^T K V = diag(omega^2); square where all modes are kept.
     """
 
-    omega: NDArray[np.float64]
-    vectors: NDArray[np.float64]
+    omega: Array
+    vectors: Array
 
     def lowest(self, count: int) -> ModalBasis:
         """The modes of lowest frequency alone: the modal reduction."""
         return ModalBasis(self.omega[:count], self.vectors[:, :count])
 
-    def like(self, other: ModalBasis, Mff: NDArray[np.float64]) -> ModalBasis:
+    def like(self, other: ModalBasis, Mff: Array) -> ModalBasis:
         """Those of these modes that are nearest to the modes of a body little different, in their order and signs.
 
         Frequencies may cross as a body changes, and eigenvectors have no sign: told by overlap, modes change smoothly.
@@ -58,6 +58,6 @@ def modal_basis(body: ShapeIntegrals) -> ModalBasis:
     return ModalBasis(omega=np.sqrt(np.maximum(squares, 0.0)), vectors=vectors * np.sign(np.real(largest)))
 
 
-def natural_frequencies(body: ShapeIntegrals) -> NDArray[np.float64]:
+def natural_frequencies(body: ShapeIntegrals) -> Array:
     """Angular frequencies of a body with its frame held [rad/s], ascending."""
     return modal_basis(body).omega

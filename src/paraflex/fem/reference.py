@@ -10,8 +10,8 @@ from __future__ import annotations
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import as_enum
 from paraflex.fem.eigen import eigenpairs
 from paraflex.fem.element import AXIAL, CURVATURE, SLOPE, TRANSVERSE
@@ -37,9 +37,7 @@ class ReferenceCondition(Enum):
     FREE = "free"
 
 
-def reference_basis(
-    mesh: BeamMesh, condition: ReferenceCondition | str, mass: NDArray[np.float64], stiffness: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def reference_basis(mesh: BeamMesh, condition: ReferenceCondition | str, mass: Array, stiffness: Array) -> Array:
     """Transformation D from independent flexible coordinates to nodal coordinates (Eq. 7).
 
     Parameters

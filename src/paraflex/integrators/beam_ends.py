@@ -7,24 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import State, System
 from paraflex.errors import InputError, Moment, UnreachablePathError
 from paraflex.findings import Finding
 from paraflex.integrators.crossing import Crossing, first_crossing
+from paraflex.integrators.event_functions import EventFunction, beam_end_functions
 from paraflex.integrators.events import BeamEnd
-from paraflex.integrators.gauges import Gauge, beam_end_gauges
 from paraflex.mechanism import AtEnd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Leaving:
     """A point that comes to the end of its beam, and when [s]."""
 
-    gauge: Gauge
+    function: EventFunction
     time: float
 
 
@@ -45,27 +43,29 @@ class BeamEnds:
     def __init__(self, system: System, start: State) -> None:
         self._left: list[Leaving] = []
         within = []
-        for gauge in beam_end_gauges(system):
-            if gauge.inside(start.q[None])[0] > 0.0:
-                within.append(gauge)
-            elif gauge.ends_run:
-                raise _off_at_start(gauge, start.time, start.q)
+        for function in beam_end_functions(system):
+            if function.inside(start.q[None])[0] > 0.0:
+                within.append(function)
+            elif function.ends_run:
+                raise _off_at_start(function, start.time, start.q)
             else:
-                self._left.append(Leaving(gauge, start.time))
-        self.gauges = tuple(within)
+                self._left.append(Leaving(function, start.time))
+        self.functions = tuple(within)
 
-    def pass_over(self, crossing: Crossing, gauges: Sequence[Gauge]) -> tuple[tuple[Gauge, ...], Crossing | None]:
-        """Gauges that a run goes on with after a crossing, and the crossing that ends it, in the same step, or None."""
-        left, found = tuple(gauges), crossing
-        while found is not None and not found.gauge.ends_run:
-            self._left.append(Leaving(found.gauge, found.t))
-            left = tuple(gauge for gauge in left if gauge is not found.gauge)
+    def pass_over(
+        self, crossing: Crossing, functions: Sequence[EventFunction]
+    ) -> tuple[tuple[EventFunction, ...], Crossing | None]:
+        """What a run goes on to look at after a crossing, and the crossing that ends it in the same step, or None."""
+        left, found = tuple(functions), crossing
+        while found is not None and not found.function.ends_run:
+            self._left.append(Leaving(found.function, found.t))
+            left = tuple(function for function in left if function is not found.function)
             found = first_crossing(left, found.before, found.after)
         return left, found
 
     def findings(self, q: Array) -> tuple[Finding, ...]:
         """One for each point that left its beam; samples q (k, n) say how far it came."""
-        return tuple(_finding(one, one.gauge.value(q)) for one in self._left)
+        return tuple(_finding(one, one.function.value(q)) for one in self._left)
 
 
 # What helps where a point comes to the end of its beam and its joint asks for an error.
@@ -82,11 +82,11 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
     """
     leavings = list(_leavings(system, t, q, v))
     for one, k in leavings:
-        end = one.gauge.event
+        end = one.function.event
         assert isinstance(end, BeamEnd)
         if end.at_end is AtEnd.ERROR:
             moment = Moment(one.time, k)
-            raise UnreachablePathError(_planned(end, one.gauge.value(q)), moment, remedy=STAY_ON_BEAM)
+            raise UnreachablePathError(_planned(end, one.function.value(q)), moment, remedy=STAY_ON_BEAM)
     return _going_on(leavings, q)
 
 
@@ -103,32 +103,32 @@ def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Leaving | Non
     InputError
         It is off its beam at the start.
     """
-    ending = [(one, k) for one, k in _leavings(system, t, q, v) if one.gauge.ends_run]
+    ending = [(one, k) for one, k in _leavings(system, t, q, v) if one.function.ends_run]
     for one, k in ending:
         if k == 0:
-            raise _off_at_start(one.gauge, one.time, q[0])
+            raise _off_at_start(one.function, one.time, q[0])
     return min((one for one, _ in ending), key=lambda one: one.time, default=None)
 
 
 def _going_on(leavings: Iterable[tuple[Leaving, int]], q: Array) -> tuple[Finding, ...]:
-    return tuple(_finding(one, one.gauge.value(q)) for one, _ in leavings if not one.gauge.ends_run)
+    return tuple(_finding(one, one.function.value(q)) for one, _ in leavings if not one.function.ends_run)
 
 
 def _leavings(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Leaving, int]]:
     """Points that a motion takes off their beams, each with the first sample outside."""
-    for gauge in beam_end_gauges(system):
-        outside = np.nonzero(gauge.inside(q) <= 0.0)[0]
+    for function in beam_end_functions(system):
+        outside = np.nonzero(function.inside(q) <= 0.0)[0]
         if outside.size:
             k = int(outside[0])
-            yield Leaving(gauge, float(t[0]) if k == 0 else _first_outside(gauge, t, q, v, k)), k
+            yield Leaving(function, float(t[0]) if k == 0 else _first_outside(function, t, q, v, k)), k
 
 
-def _first_outside(gauge: Gauge, t: Array, q: Array, v: Array, k: int) -> float:
+def _first_outside(function: EventFunction, t: Array, q: Array, v: Array, k: int) -> float:
     """When a motion comes to a bound between its samples k - 1 and k."""
     path = scipy.interpolate.CubicHermiteSpline(t[k - 1 : k + 1], q[k - 1 : k + 1], v[k - 1 : k + 1])
 
     def inside(time: float) -> float:
-        return float(gauge.inside(path(time)[None])[0])
+        return float(function.inside(path(time)[None])[0])
 
     return float(scipy.optimize.brentq(inside, t[k - 1], t[k]))
 
@@ -141,10 +141,10 @@ def _planned(end: BeamEnd, places: Array) -> str:
     )
 
 
-def _off_at_start(gauge: Gauge, time: float, q: Array) -> InputError:
-    end = gauge.event
+def _off_at_start(function: EventFunction, time: float, q: Array) -> InputError:
+    end = function.event
     assert isinstance(end, BeamEnd)
-    place = float(gauge.value(q[None])[0])
+    place = float(function.value(q[None])[0])
     return InputError(
         f"its point is off the beam at the start, t = {time:.6g} s: {place:.6g} m from the first end of "
         f"{end.beam}, which is {end.length:.6g} m long",
@@ -154,7 +154,7 @@ def _off_at_start(gauge: Gauge, time: float, q: Array) -> InputError:
 
 
 def _finding(one: Leaving, places: Array) -> Finding:
-    end = one.gauge.event
+    end = one.function.event
     assert isinstance(end, BeamEnd)
     beyond = np.maximum(-places, places - end.length)
     far = f", as far as {places[np.argmax(beyond)]:.6g} m from its first end" if np.max(beyond, initial=0.0) > 0 else ""

@@ -7,18 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import State
 from paraflex.integrators import native
-from paraflex.integrators.gauges import Gauge
+from paraflex.integrators.event_functions import EventFunction
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Instant, Problem, Run
 from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import PAUSED, Samples
-
-Array = NDArray[np.float64]
 
 # Places within a step at which events are looked for, its end last: an excursion between two of them is overlooked.
 _PLACES = np.array([0.25, 0.5, 0.75, 1.0])
@@ -35,14 +33,14 @@ class Crossing:
 
     Attributes
     ----------
-    gauge : Gauge
+    function : EventFunction
     before, after : Instant
         Ends of the step.
     fraction : float
         Of the step until the event.
     """
 
-    gauge: Gauge
+    function: EventFunction
     before: Instant
     after: Instant
     fraction: float
@@ -55,7 +53,7 @@ class Crossing:
     @property
     def reached(self) -> str:
         """What was reached."""
-        return self.gauge.reached(_poses(self.before, self.after, self.fraction)[0])
+        return self.function.reached(_poses(self.before, self.after, self.fraction)[0])
 
     @property
     def message(self) -> str:
@@ -63,22 +61,22 @@ class Crossing:
         return f"{self.reached} at t = {self.t:.6g} s"
 
 
-def advance(run: Run, gauges: Sequence[Gauge], attempts: int) -> tuple[int, Crossing | None]:
+def advance(run: Run, functions: Sequence[EventFunction], attempts: int) -> tuple[int, Crossing | None]:
     """March by so many attempted steps, or to the first event among them; the code of the last one."""
-    if not gauges:
+    if not functions:
         return run.march(attempts), None
     code, before = PAUSED, run.now()
-    inside = _inside(gauges, before)
+    inside = _inside(functions, before)
     change = np.full(inside.size, np.inf)
     for _ in range(attempts):
         code = run.march(1)
         after = run.now()
         if after.t > before.t:
             then, last_change = inside, change
-            inside = _inside(gauges, after)
+            inside = _inside(functions, after)
             change = np.abs(inside - then)
             near = np.minimum(inside, then) <= _NEAR * (change + last_change)
-            found = first_crossing([gauge for gauge, x in zip(gauges, near, strict=True) if x], before, after)
+            found = first_crossing([function for function, x in zip(functions, near, strict=True) if x], before, after)
             if found is not None:
                 return code, found
         if code != PAUSED:
@@ -87,20 +85,20 @@ def advance(run: Run, gauges: Sequence[Gauge], attempts: int) -> tuple[int, Cros
     return code, None
 
 
-def _inside(gauges: Sequence[Gauge], instant: Instant) -> Array:
-    """How far inside its bounds each gauge is."""
-    return np.array([gauge.inside(instant.q[None])[0] for gauge in gauges])
+def _inside(functions: Sequence[EventFunction], instant: Instant) -> Array:
+    """How far inside its bounds each function is."""
+    return np.array([function.inside(instant.q[None])[0] for function in functions])
 
 
-def first_crossing(gauges: Sequence[Gauge], before: Instant, after: Instant) -> Crossing | None:
+def first_crossing(functions: Sequence[EventFunction], before: Instant, after: Instant) -> Crossing | None:
     """The first event of a step that starts inside all bounds; None for none."""
     found = []
-    for gauge in gauges:
-        outside = np.nonzero(gauge.inside(_poses(before, after, _PLACES)) <= 0.0)[0]
+    for function in functions:
+        outside = np.nonzero(function.inside(_poses(before, after, _PLACES)) <= 0.0)[0]
         if outside.size:
             last = float(_PLACES[outside[0]])
             first = float(_PLACES[outside[0] - 1]) if outside[0] else 0.0
-            found.append(Crossing(gauge, before, after, _root(gauge, before, after, first, last)))
+            found.append(Crossing(function, before, after, _root(function, before, after, first, last)))
     return min(found, key=lambda crossing: crossing.fraction, default=None)
 
 
@@ -114,10 +112,10 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     taken = run.samples.times[: run.reached]
     kept = slice(0, int(np.searchsorted(taken, crossing.t)))
     before = crossing.before
-    first = _settled(problem, before.t, before.q, before.v)
+    first = _begun_at(problem, before.t, before.q, before.v)
     # Where something given jumps accelerations do: the step began with those after the jump.
     before = replace(before, a=first.samples.a[0])
-    middle, last = (_settled(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
+    middle, last = (_begun_at(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
     # Simpson's rule: powers that jump do so at the ends of steps.
     powers = [one.state.power[0] for one in (first, middle, last)]
     width = crossing.t - before.t
@@ -129,7 +127,7 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     return Samples(*(np.concatenate([old[kept], new]) for old, new in zip(run.samples, end, strict=True)))
 
 
-def _settled(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
+def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
     """A run begun at a state: what its first sample holds, and the power there, follow from the state alone."""
     here = replace(problem, initial=State(t, q, v), times=np.array([t]), stops=np.array([t + problem.span]))
     begun = native.prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))
@@ -156,10 +154,10 @@ def _cubic(y0: Array, dy0: Array, y1: Array, dy1: Array, h: float, x: Array | fl
     return y * y * ((1.0 + 2.0 * x) * y0 + h * x * dy0) + x * x * ((1.0 + 2.0 * y) * y1 - h * y * dy1)
 
 
-def _root(gauge: Gauge, before: Instant, after: Instant, first: float, last: float) -> float:
+def _root(function: EventFunction, before: Instant, after: Instant, first: float, last: float) -> float:
     """The fraction of a step between two others, inside and outside, at which the bound is met."""
 
     def inside(x: float) -> float:
-        return float(gauge.inside(_poses(before, after, x))[0])
+        return float(function.inside(_poses(before, after, x))[0])
 
     return float(scipy.optimize.root_scalar(inside, bracket=(first, last), method="brentq", xtol=_FOUND).root)

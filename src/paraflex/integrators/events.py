@@ -134,7 +134,7 @@ def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:
 
 
 def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:
-    """Nothing, if events are such as this mechanism can have.
+    """Check that events are such as this mechanism can have.
 
     Raises
     ------

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System, dependence
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import DEPENDENT_PART, MEMORY, Problem
@@ -25,8 +26,6 @@ from paraflex.kernel.ode import (
 )
 from paraflex.kernel.packed import OMEGA2
 from paraflex.kernel.tangent import make_tangent
-
-Array = NDArray[np.float64]
 
 # An error that does not count [any unit].
 _IGNORED = 1e20

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.dynamics import State, System, redundant_rows
 from paraflex.errors import (
     ConstraintDriftError,
@@ -21,8 +21,8 @@ from paraflex.errors import (
 from paraflex.integrators import native, outside
 from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
 from paraflex.integrators.crossing import Crossing, advance, samples_until
+from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
-from paraflex.integrators.gauges import make_gauges
 from paraflex.integrators.methods import Family
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.pace import Pace, too_slow
@@ -66,9 +66,9 @@ def integrate(
     system: System,
     signals: Signals,
     initial: State,
-    times: NDArray[np.float64],
+    times: Array,
     *,
-    knots: NDArray[np.float64] | None = None,
+    knots: Array | None = None,
     options: IntegrationOptions | None = None,
     begun: Solution | None = None,
     on_progress: Callable[[float], None] | None = None,
@@ -117,7 +117,7 @@ def integrate(
     options = options or IntegrationOptions()
     problem = make_problem(system, signals, initial, times, knots)
     ends, crossing = BeamEnds(system, initial), None
-    gauges = (*make_gauges(system, initial.q, options.events), *ends.gauges)
+    functions = (*event_functions(system, initial.q, options.events), *ends.functions)
     run = prepare(problem, options)
     status, message, bent, drift, slow = "complete", "", None, None, None
     native_method = options.description.family in _NATIVE
@@ -131,9 +131,9 @@ def integrate(
         while code == PAUSED:
             if run.attempts >= most:
                 break
-            code, crossing = advance(run, gauges, min(_SLICE, most - run.attempts))
+            code, crossing = advance(run, functions, min(_SLICE, most - run.attempts))
             if crossing is not None:
-                gauges, crossing = ends.pass_over(crossing, gauges)
+                functions, crossing = ends.pass_over(crossing, functions)
             if crossing is not None:
                 status, message = "stopped", crossing.message
                 break
@@ -177,7 +177,7 @@ def _failed(error: IntegrationError) -> IntegrationError:
 def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
     """Raise where a run ends at the end of a beam and its joint asks for an error."""
     if crossing is None or not (
-        isinstance(crossing.gauge.event, BeamEnd) and crossing.gauge.event.at_end is AtEnd.ERROR
+        isinstance(crossing.function.event, BeamEnd) and crossing.function.event.at_end is AtEnd.ERROR
     ):
         return
     moment = Moment(crossing.t, solution.steps)
@@ -238,5 +238,5 @@ def _solution(
         singular_positions=tuple(figures.passages.mean(axis=0).tolist()),
         method=options.method,
         evaluations=figures.evaluations,
-        event="" if crossing is None else str(crossing.gauge.event),
+        event="" if crossing is None else str(crossing.function.event),
     )

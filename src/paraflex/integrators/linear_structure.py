@@ -14,10 +14,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators.newmark import NewmarkNumbers
-
-Array = NDArray[np.float64]
 
 # Instants whose linear algebra is done at once: some megabytes for a dozen bodies.
 _CHUNK = 128

@@ -97,32 +97,16 @@ def _esdirk(name: str, title: str, order: int, source: str) -> Method:
 
 def _newmark(name: str, title: str, order: int, source: str, treatment: Treatment, **parameters: Parameter) -> Method:
     return Method(
-        name,
-        title,
-        Family.NEWMARK,
-        _INDEX_3,
-        order,
-        (treatment,),
-        parameters=parameters,
-        fixed_step=True,
-        source=source,
+        name, title, Family.NEWMARK, _INDEX_3, order, (treatment,), parameters, fixed_step=True, source=source
     )
 
 
-def _scipy(
-    name: str, title: str, order: int, source: str, *, explicit: bool = False, **parameters: Parameter
-) -> Method:
-    return Method(
-        name, title, Family.SCIPY, _ODE_FORM, order, _ODE, parameters=parameters, explicit=explicit, source=source
-    )
-
-
-def _max_order(default: float, most: float, meaning: str) -> Parameter:
-    return Parameter(default, 1.0, most, meaning)
+def _scipy(name: str, title: str, order: int, source: str, *, explicit: bool = False) -> Method:
+    return Method(name, title, Family.SCIPY, _ODE_FORM, order, _ODE, explicit=explicit, source=source)
 
 
 # Of the backward difference formulas only those of orders 1 and 2 are stable for undamped vibrations of any frequency.
-_A_STABLE = _max_order(2.0, 5.0, "highest order; above 2 vibrations that hardly decay dictate the step")
+_A_STABLE = Parameter(2.0, 1.0, 5.0, "highest order; above 2 vibrations that hardly decay dictate the step")
 
 _ALL = (
     _esdirk("tr-bdf2", "TR-BDF2", 2, "Hosea and Shampine (1996), Appl. Numer. Math. 20, 21-37"),
@@ -149,13 +133,10 @@ _ALL = (
     ),
     _scipy("rk45", "Runge-Kutta 4(5)", 5, "Dormand and Prince (1980), through SciPy", explicit=True),
     _scipy("radau", "Radau IIA", 5, "Hairer and Wanner (1996), IV.8, through SciPy"),
-    _scipy(
-        "ndf", "NDF", 2, "Shampine and Reichelt (1997), SIAM J. Sci. Comput. 18, 1-22, through SciPy",
-        max_order=_A_STABLE,
-    ),
+    _scipy("ndf", "NDF", 5, "Shampine and Reichelt (1997), SIAM J. Sci. Comput. 18, 1-22, through SciPy"),
     Method(
         "adams", "Adams", Family.SUNDIALS, _ODE_FORM, 12, _ODE, explicit=True,
-        parameters={"max_order": _max_order(12.0, 12.0, "highest order; up to 2 stiffness limits no step")},
+        parameters={"max_order": Parameter(12.0, 1.0, 12.0, "highest order; up to 2 stiffness limits no step")},
         source="CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396",
     ),
     Method(
@@ -200,9 +181,10 @@ def check_parameters(method: Method, given: Mapping[str, float]) -> dict[str, fl
     """
     for name in given:
         if name not in method.parameters:
+            others = ", ".join(other.name for other in METHODS.values() if name in other.parameters)
             raise InputError(
                 f"no parameter of {method.name}", field="parameters", value=name,
-                remedy=suggestion(name, method.parameters),
+                remedy=suggestion(name, method.parameters) + (f"; it is one of {others}" if others else ""),
             )  # fmt: skip
     values = {name: float(given.get(name, parameter.default)) for name, parameter in method.parameters.items()}
     for name, parameter in method.parameters.items():

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.newmark import newmark_numbers, newmark_scheme
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, MEMORY, Figures, Instant, Problem, empty_samples
-from paraflex.integrators.stretches import hidden_from
 from paraflex.integrators.tableaux import TABLEAUX
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
@@ -118,10 +117,11 @@ class NativeRun:
         if np.any(jumps == now):
             self._resume()
         ahead = jumps[jumps > now]
-        signals, stops = self.problem.signals, self.problem.stops
+        stops = self.problem.stops
         if ahead.size:
-            signals, stops = hidden_from(signals, ahead[0]), stops[stops <= ahead[0]]
-        arguments = (self.problem.system.packed, signals, self.scheme, self.controls, stops, attempts)
+            stops = stops[stops <= ahead[0]]
+        given = (self.problem.system.packed, self.problem.signals_from(now))
+        arguments = (*given, self.scheme, self.controls, stops, attempts)
         code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
         return PAUSED if code == FINISHED and ahead.size else code
 
@@ -166,7 +166,7 @@ def _scheme(options: IntegrationOptions) -> Tableau:
     return newmark_scheme(newmark_numbers(options.method, options.all_parameters))
 
 
-def _mark_redundant(system: System, q: NDArray[np.float64], workspace: Workspace) -> int:
+def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
     """Note the rows that follow from others at a pose; their number."""
     packed = system.packed
     count = int(factor_system(packed, 0.0, q, workspace))

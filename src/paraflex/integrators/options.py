@@ -105,7 +105,7 @@ class IntegrationOptions(CheckedFields):
         """What keeps the constraints."""
         return self.description.treatments[0] if self.constraints is None else Treatment(self.constraints)
 
-    def told(self) -> dict[str, str]:
+    def to_dict(self) -> dict[str, str]:
         """Method, parameters, treatment of constraints, step and events in words, for provenance."""
         return {
             "integration_method": self.method,

@@ -5,24 +5,22 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
 from paraflex.integrators.methods import Family, Treatment
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
 from paraflex.integrators.scipy_methods import ScipyStepper
+from paraflex.integrators.spectra import MULTISTEP
 from paraflex.integrators.stepper import Stepper, Steps
 from paraflex.integrators.stiffness import warn_if_stiff
-from paraflex.integrators.stretches import hidden_from
 from paraflex.integrators.sundials import CvodeStepper, IdaStepper
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.ode import stored_energy
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import FINISHED, PAUSED
-
-Array = NDArray[np.float64]
 
 # What the estimated error of a step may be, of the tolerance: estimates say how far a solver errs in a step, not how
 # errors add up. Measured on RAParM-I, a soft arm and a falling platform, whose ends err by 0.01 to 2 tolerances.
@@ -102,8 +100,7 @@ class OutsideRun:
     def _begin(self, t: float, q: Array, v: Array, work: float) -> None:
         """Start anew, with what acts from t on as far as the next jump."""
         problem, form = self.problem, self._stepper.form
-        ahead = problem.jumps[problem.jumps > t]
-        form.signals = hidden_from(problem.signals, ahead[0]) if ahead.size else problem.signals
+        form.signals = problem.signals_from(t)
         solved = form.solve(t, q, v)
         self._instant = Instant(t, q.copy(), v.copy(), solved.a, solved.multipliers, work)
         self._stepper.begin(t, form.pack(t, q, v, work), float(problem.stops[problem.stops > t][0]))
@@ -177,7 +174,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
 
 def _stepper(problem: Problem, options: IntegrationOptions) -> Stepper:
     method, order, error = options.method, _max_order(options), _PER_STEP[options.method] * options.tolerance
-    if "max_order" in options.description.parameters:
+    if method in MULTISTEP:
         error *= (options.tolerance / _REFERENCE) ** (1.0 / order)
     steps = Steps(min(FIRST_STEP * problem.span, options.max_step), options.max_step, order)
     if method == "ida":

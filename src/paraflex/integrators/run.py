@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import State, System
 from paraflex.errors import InputError
-from paraflex.integrators.stretches import jump_times
+from paraflex.integrators.jumps import hidden_from, jump_times
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import Samples
-
-Array = NDArray[np.float64]
 
 # Where the first step starts from, as a fraction of the run; error control takes over at once.
 FIRST_STEP = 1e-6
@@ -55,6 +53,11 @@ class Problem:
     def span(self) -> float:
         """From the start to the end [s]."""
         return float(self.stops[-1] - self.initial.time)
+
+    def signals_from(self, time: float) -> Signals:
+        """Signals as steps from a time on may see them: none of what follows the next jump."""
+        ahead = self.jumps[self.jumps > time]
+        return hidden_from(self.signals, ahead[0]) if ahead.size else self.signals
 
 
 @dataclass(frozen=True)

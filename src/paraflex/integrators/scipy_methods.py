@@ -4,36 +4,20 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
-from types import FunctionType
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
 
-Array = NDArray[np.float64]
-
-
-def _ndf(highest: int) -> Callable[..., scipy.integrate.OdeSolver]:
-    """SciPy's NDF up to an order, which SciPy takes from a constant of its module.
-
-    An order lowered from outside would not do: the step would still be that of the order wished for, and be rejected.
-    """
-    step = scipy.integrate.BDF._step_impl
-    limited = FunctionType(step.__code__, {**step.__globals__, "MAX_ORDER": highest}, "_step_impl")
-    return type("Ndf", (scipy.integrate.BDF,), {"_step_impl": limited})
-
-
-# Of each method: the solver by its highest order, at how many times of a step it evaluates, evaluations of an iteration
-# (none: explicit).
-_SOLVERS: dict[str, tuple[Callable[[int], Callable[..., scipy.integrate.OdeSolver]], int, int]] = {
-    "rk45": (lambda _: scipy.integrate.RK45, 5, 0),
-    "radau": (lambda _: scipy.integrate.Radau, 3, 3),
-    "ndf": (_ndf, 1, 1),
+# Of each method: the solver, at how many times of a step it evaluates, evaluations of an iteration (none: explicit).
+_SOLVERS: dict[str, tuple[type[scipy.integrate.OdeSolver], int, int]] = {
+    "rk45": (scipy.integrate.RK45, 5, 0),
+    "radau": (scipy.integrate.Radau, 3, 3),
+    "ndf": (scipy.integrate.BDF, 1, 1),
 }
 # The least relative tolerance that SciPy takes without a warning.
 _RELATIVE = 1e-13
@@ -43,8 +27,7 @@ class ScipyStepper:
     """Steps by one of SciPy's solvers, the absolute tolerances given: see `Stepper`."""
 
     def __init__(self, method: str, form: OdeForm, tolerances: Array, steps: Steps) -> None:
-        solver, self._places, self._stages = _SOLVERS[method]
-        self._class = solver(steps.order)
+        self._class, self._places, self._stages = _SOLVERS[method]
         self.form, self._tolerances, self._steps = form, tolerances, steps
         self._seen: list[float] = []
         self._past, self._rejected, self._dense = SolverCounts(0, 0, 0, 0), 0, None

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.findings import Finding
 
 
@@ -53,14 +53,14 @@ class Solution:
         What makes it doubtful: points that slid off their beams.
     """
 
-    t: NDArray[np.float64]
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
-    multipliers: NDArray[np.float64]
-    kinetic_energy: NDArray[np.float64]
-    strain_energy: NDArray[np.float64]
-    work: NDArray[np.float64]
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    kinetic_energy: Array
+    strain_energy: Array
+    work: Array
     status: str
     message: str
     steps: int
@@ -83,7 +83,7 @@ class Solution:
         """When the event was that stopped the run [s]; NaN for none."""
         return float(self.t[-1]) if self.event else math.nan
 
-    def followed_by(self, other: Solution, samples: int, multipliers: NDArray[np.float64], energy: float) -> Solution:
+    def followed_by(self, other: Solution, samples: int, multipliers: Array, energy: float) -> Solution:
         """One run of this one and of another that goes on from its last state, once brakes have taken energy.
 
         Parameters

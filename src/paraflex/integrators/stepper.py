@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.integrators.forms import OdeForm
-
-Array = NDArray[np.float64]
 
 # Times within a step that differ by less than this fraction of it are one.
 _SAME = 1e-9

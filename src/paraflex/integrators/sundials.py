@@ -10,14 +10,12 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.integrators.forms import DescriptorForm, OdeForm
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PAUSED
-
-Array = NDArray[np.float64]
 
 # The least relative tolerance that SUNDIALS recommends.
 _RELATIVE = 1e-15

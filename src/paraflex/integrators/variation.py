@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import numbers_of, with_numbers
 from paraflex.errors import InputError, IntegrationError, Moment, SliderOffBeamError
 from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
@@ -17,7 +17,6 @@ from paraflex.integrators.methods import METHODS, Family, Treatment
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Problem, empty_samples
-from paraflex.integrators.stretches import hidden_from
 from paraflex.kernel.krylov import make_krylov
 from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
 from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
@@ -26,12 +25,10 @@ from paraflex.kernel.tangent import make_tangent
 from paraflex.kernel.variation import make_piece, vary_steps
 from paraflex.kernel.variation_samples import PLACES, STEP, Variation, make_variation
 
-Array = NDArray[np.float64]
-
 # Steps that are held at once.
 _CHUNK = 256
 # Where corrections of a stage are left larger than this part of what they correct, there is no derivative.
-_UNSETTLED = 1e-6
+_LARGEST_RESIDUAL = 1e-6
 
 
 class Direction(NamedTuple):
@@ -99,7 +96,7 @@ class RunDerivatives:
 
 
 def check_differentiable(options: IntegrationOptions) -> None:
-    """Nothing, if runs with these options can be differentiated.
+    """Check that runs with these options can be differentiated.
 
     Raises
     ------
@@ -168,12 +165,12 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
 
 def _check_on_beams(problem: Problem, motion: Motion) -> None:
     """Raise where a sliding point is off its beam at a sample, and the run would not have gone on."""
-    for gauge in BeamEnds(problem.system, problem.initial).gauges:
-        outside = np.nonzero(gauge.inside(motion.q) <= 0.0)[0]
-        if outside.size and gauge.ends_run:
+    for function in BeamEnds(problem.system, problem.initial).functions:
+        outside = np.nonzero(function.inside(motion.q) <= 0.0)[0]
+        if outside.size and function.ends_run:
             first = int(outside[0])
             moment = Moment(float(problem.times[first]), first)
-            raise SliderOffBeamError(gauge.reached(motion.q[first]), moment, remedy=STAY_ON_BEAM)
+            raise SliderOffBeamError(function.reached(motion.q[first]), moment, remedy=STAY_ON_BEAM)
 
 
 def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Array:
@@ -202,7 +199,7 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
     history = make_history(_CHUNK, run.scheme.c.size, problem.system.n, problem.system.m)
     run.start()
     count, restart, code = 0, True, PAUSED
-    signals = _signals_from(problem, state.clock[TIME])
+    signals = problem.signals_from(state.clock[TIME])
     while True:
         before, accepted = float(state.clock[TIME]), state.counts[STEPS]
         code = run.march(1)
@@ -220,15 +217,9 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
         count, restart = count + 1, bool(np.any(jumps == state.clock[TIME]))
         if count == _CHUNK or restart:
             yield _Chunk(history, count, signals)
-            count, signals = 0, _signals_from(problem, state.clock[TIME])
+            count, signals = 0, problem.signals_from(state.clock[TIME])
     if count:
         yield _Chunk(history, count, signals)
-
-
-def _signals_from(problem: Problem, time: float) -> Signals:
-    """Signals as steps from that time on may see them, as in `NativeRun.march`."""
-    ahead = problem.jumps[problem.jumps > time]
-    return hidden_from(problem.signals, ahead[0]) if ahead.size else problem.signals
 
 
 class _Varied:
@@ -296,8 +287,8 @@ class _Varied:
     def _check(self, chunk: _Chunk, left: Array) -> None:
         left = left[: chunk.count]
         self.unsettled = max(self.unsettled, float(left.max()))
-        if not self.unsettled <= _UNSETTLED:
-            worst = int(np.argmax(~(left <= _UNSETTLED)))
+        if not self.unsettled <= _LARGEST_RESIDUAL:
+            worst = int(np.argmax(~(left <= _LARGEST_RESIDUAL)))
             raise IntegrationError(
                 "the equations of a step cannot be solved to rounding, as derivatives need,",
                 Moment(float(chunk.history.t[worst]), worst),

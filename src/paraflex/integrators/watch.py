@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System, dependence
 from paraflex.dynamics.projection import AGREE, NAMED, contradiction, gap_unit, joint_gaps
-from paraflex.dynamics.rank import DENSE_ROWS
-from paraflex.dynamics.sparse import sparse_jacobian
+from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.integrators.methods import Treatment
 from paraflex.kernel.packed import Signals
 
@@ -30,7 +29,7 @@ class Breakdown(NamedTuple):
     remedy: str
 
 
-def bent_too_far(system: System, q: NDArray[np.float64]) -> Breakdown | None:
+def bent_too_far(system: System, q: Array) -> Breakdown | None:
     """Which beam is bent beyond what the theory can describe, and how far; None for none."""
     for body in system.bodies:
         slope = float(np.max(np.abs(body.slopes(q)), initial=0.0))
@@ -47,7 +46,7 @@ def come_apart(
     system: System,
     signals: Signals,
     t: float,
-    q: NDArray[np.float64],
+    q: Array,
     dependent: int,
     tolerance: float,
     treatment: Treatment,
@@ -68,7 +67,7 @@ def come_apart(
     treatment : Treatment
         What keeps the constraints in the run.
     """
-    phi, _ = system.constraints(signals, t, q, np.zeros(system.n))
+    phi, _ = system.constraints(signals, t, q)
     if not system.gap(phi) > max(_CONTRADICTION if dependent else _APART, tolerance / system.size):
         return None
     if dependent:
@@ -82,9 +81,7 @@ def come_apart(
     )
 
 
-def least_norm(
-    system: System, q: NDArray[np.float64], multipliers: NDArray[np.float64], dependent: int
-) -> NDArray[np.float64]:
+def least_norm(system: System, q: Array, multipliers: Array, dependent: int) -> Array:
     """Multipliers (k, m) at poses (k, n) with the least sum of squares, where so many rows are dependent.
 
     They exert the same forces. Near a singular position other rows nearly depend on one another too, and none of them
@@ -94,7 +91,7 @@ def least_norm(
         return multipliers
     out = multipliers.copy()
     for pose, lam in zip(q, out, strict=True):
-        jacobian = sparse_jacobian(system, pose) if system.m > DENSE_ROWS else system.jacobian(pose)
+        jacobian = constraint_jacobian(system, pose)
         least = dependence(system, pose, count=dependent).least_norm(lam)
         if np.linalg.norm(jacobian.T @ (least - lam)) <= _SAME_FORCES * np.linalg.norm(jacobian.T @ lam):
             lam[:] = least

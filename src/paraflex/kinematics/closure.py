@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.dynamics import (
     System,
     build_system,
@@ -69,11 +70,11 @@ class RigidMotion:
     mechanism: Mechanism
     system: System
     path: Path
-    t: NDArray[np.float64]
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
-    basis: NDArray[np.float64]
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    basis: Array
 
     @property
     def desired(self) -> PathMotion:
@@ -91,7 +92,7 @@ class RigidMotion:
 def follow_path(
     mechanism: Mechanism,
     path: Path,
-    times: Sequence[float] | NDArray[np.float64],
+    times: Sequence[float] | Array,
     *,
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
@@ -137,7 +138,7 @@ def path_follower(
     *,
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
-) -> Callable[[Sequence[float] | NDArray[np.float64]], RigidMotion]:
+) -> Callable[[Sequence[float] | Array], RigidMotion]:
     """`follow_path` for several sets of times: what does not depend on them is made once.
 
     Parameters
@@ -154,7 +155,7 @@ def path_follower(
     """
     closure, assembled = _assembled(mechanism, path, end, assembly, orientation)
 
-    def follow(times: Sequence[float] | NDArray[np.float64]) -> RigidMotion:
+    def follow(times: Sequence[float] | Array) -> RigidMotion:
         times = np.ascontiguousarray(times, dtype=float)
         grid, keep = _no_long_steps(times)
         return closure.walk(path, closure.approach(path, assembled, times[0], times[-1]), grid, keep)
@@ -164,7 +165,7 @@ def path_follower(
 
 def _assembled(
     mechanism: Mechanism, path: Path, end: float, assembly: str | Assembly | None, orientation: float
-) -> tuple[PathClosure, NDArray[np.float64]]:
+) -> tuple[PathClosure, Array]:
     """What closes loops along a path, and the pose of the assembly; errors as of `follow_path`."""
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
@@ -182,7 +183,7 @@ def _assembled(
 def reach_shortfall(
     mechanism: Mechanism,
     path: Path,
-    times: Sequence[float] | NDArray[np.float64] | None = None,
+    times: Sequence[float] | Array | None = None,
     *,
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
@@ -212,7 +213,7 @@ def reach_shortfall(
     return closure.reach.shortfall(times, closure.target(path, times)[:, 0], pose, closure.other_poses())
 
 
-def _no_long_steps(times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Times and more between them where they are further apart than closure steps; which of them were there."""
     pieces = np.maximum(1, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9))).astype(int)
     first = np.concatenate([[0], np.cumsum(pieces)])
@@ -265,17 +266,17 @@ class PathClosure:
             remedy="name as many task coordinates as there are degrees of freedom",
         )
 
-    def assemble(self, assembly: Assembly) -> NDArray[np.float64]:
+    def assemble(self, assembly: Assembly) -> Array:
         """The pose of an assembly, loops closed."""
         return project_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
-    def task(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def task(self, q: Array) -> Array:
         """Task coordinates of a pose."""
         zero, out = np.zeros_like(q), apart((3, self.coordinates.size))
         task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero, out)
         return out[0]
 
-    def target(self, path: Path, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    def target(self, path: Path, t: Array) -> Array:
         """(times, 3, tasks): the task coordinates chosen from x, y, angle."""
         motion, turning = path.evaluate(t), _turning(path, t)
         if turning is None:
@@ -284,7 +285,7 @@ class PathClosure:
         full = np.concatenate([np.stack(motion), turning[:, :, None]], axis=2)
         return np.ascontiguousarray(full[:, :, self.coordinates].transpose(1, 0, 2))
 
-    def run(self, times: NDArray[np.float64], target: NDArray[np.float64], pose: NDArray[np.float64]):
+    def run(self, times: Array, target: Array, pose: Array):
         """Closure along targets; status, index, residual, and what was computed."""
         k, n = times.size, self.system.n
         q, v, a = apart((3, k, n))
@@ -305,7 +306,7 @@ class PathClosure:
         )
         return status, int(index), residual, (q, v, a, basis)
 
-    def approach(self, path: Path, pose: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+    def approach(self, path: Path, pose: Array, start: float, end: float) -> Array:
         """Move the end-effector from where the assembly has it to the start of the path, staying in that assembly."""
         goal = self.target(path, np.array([start]))[0, 0]
         here = self.task(pose)
@@ -324,7 +325,7 @@ class PathClosure:
             cause, detail = "the path's start is not reached from the assembly's pose", _OTHER
         raise self._unreachable(cause, detail, found, start, 0, None)
 
-    def walk(self, path: Path, pose: NDArray[np.float64], grid: NDArray[np.float64], keep: NDArray[np.bool_]):
+    def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]):
         """The motion at the instants of the grid to keep, with more instants between where steps prove too long."""
         stretches = []
         while True:
@@ -355,7 +356,7 @@ class PathClosure:
             detail = _OTHER
         raise self._unreachable(cause, detail, found, at, motion.t.size, motion)
 
-    def shortfall(self, path: Path, start: float, end: float, pose: NDArray[np.float64]) -> Shortfall:
+    def shortfall(self, path: Path, start: float, end: float, pose: Array) -> Shortfall:
         """How far a path lies from what can be reached, from a pose near its start onwards."""
         end = max(start, min(end, path.duration))
         knots = [knot for knot in path.knots if start < knot < end]
@@ -369,7 +370,7 @@ class PathClosure:
         closer = np.setdiff1d(np.linspace(*span, _MORE_LOOKS + 2)[1:-1], times)
         return found.joined(self.reach.shortfall(closer, self.target(path, closer)[:, 0], pose, others))
 
-    def other_poses(self) -> list[NDArray[np.float64]]:
+    def other_poses(self) -> list[Array]:
         """Poses of the assemblies that close."""
         poses = []
         for assembly in self.mechanism.assemblies:
@@ -395,7 +396,7 @@ class PathClosure:
         )  # fmt: skip
 
 
-def _turning(path: Path, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _turning(path: Path, t: Array) -> Array | None:
     """How the end-effector turns at times t (3, k), where a path says so."""
     says = getattr(path, "turning", None)
     return None if says is None else says(t)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
+
+from paraflex.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class TrapezoidalLaw:
         T = self.period
         return (0.0, 0.5 * T, T, 1.5 * T)
 
-    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
         """Length covered [m], speed and acceleration at times t [s]; at rest outside the motion."""
         T, a = self.period, self.max_acceleration
         t = np.clip(t, 0.0, self.duration)

@@ -10,9 +10,9 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.kinematics.laws import TrapezoidalLaw
 
@@ -23,9 +23,9 @@ _LENGTH_POINTS = 40
 class PathMotion(NamedTuple):
     """Position [m], velocity [m/s] and acceleration [m/s^2] in the ground frame, each (k, 2)."""
 
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
+    position: Array
+    velocity: Array
+    acceleration: Array
 
 
 @given_as("a path", "a path: Polygon, Line, Circle or PointPath, or one that paraflex.load_path reads")
@@ -43,7 +43,7 @@ class Path(Protocol):
         """Times between which the motion is smooth [s]."""
         ...
 
-    def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
+    def evaluate(self, t: Array) -> PathMotion:
         """The motion at times t [s]; values, velocities and accelerations are exact derivatives of one another."""
         ...
 
@@ -84,12 +84,12 @@ class Polygon(CheckedFields):
                 )
 
     @cached_property
-    def _vertices(self) -> NDArray[np.float64]:
+    def _vertices(self) -> Array:
         corners = np.array(self.corners)
         return np.vstack([corners, corners[:1]]) if self.closed else corners
 
     @cached_property
-    def _lengths(self) -> NDArray[np.float64]:
+    def _lengths(self) -> Array:
         return np.sqrt(np.sum(np.diff(self._vertices, axis=0) ** 2, axis=1))
 
     @cached_property
@@ -97,7 +97,7 @@ class Polygon(CheckedFields):
         return [TrapezoidalLaw(length.item(), self.max_acceleration) for length in self._lengths]
 
     @cached_property
-    def _starts(self) -> NDArray[np.float64]:
+    def _starts(self) -> Array:
         return np.cumsum([0.0] + [law.duration for law in self._laws])
 
     @property
@@ -112,7 +112,7 @@ class Polygon(CheckedFields):
         times = [start + knot for start, law in zip(self._starts, self._laws, strict=False) for knot in law.knots[:-1]]
         return (*times, self.duration)
 
-    def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
+    def evaluate(self, t: Array) -> PathMotion:
         """The motion at times t."""
         t = np.atleast_1d(t) * 1.0
         kind = np.result_type(t, self._starts, self._vertices)
@@ -193,7 +193,7 @@ class Circle(CheckedFields):
         """Ends of the phases of the law [s]."""
         return self._law.knots
 
-    def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
+    def evaluate(self, t: Array) -> PathMotion:
         """The motion at times t."""
         s, speed, rate = self._law.evaluate(np.atleast_1d(t) * 1.0)
         sense = np.sign(np.real(self.sweep)) / self.radius
@@ -253,15 +253,15 @@ class PointPath(CheckedFields):
         """The spline is smooth between its ends [s]."""
         return (0.0, self.motion_time)
 
-    def evaluate(self, t: NDArray[np.float64]) -> PathMotion:
+    def evaluate(self, t: Array) -> PathMotion:
         """The motion at times t."""
         return PathMotion(*self._motion(t)[:, :, :2])
 
-    def turning(self, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def turning(self, t: Array) -> Array | None:
         """Angle [rad] of the end-effector, its rate and acceleration at times t (3, k); None without angles."""
         return self._motion(t)[:, :, 2] if len(self.points[0]) > 2 else None
 
-    def _motion(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _motion(self, t: Array) -> Array:
         t = np.atleast_1d(np.asarray(t, dtype=float))
         inside = ((t >= 0.0) & (t <= self.motion_time))[:, None]
         x = np.clip(t, 0.0, self.motion_time)
@@ -290,9 +290,7 @@ def _pair(value: Sequence[float], field: str) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def _points(
-    values: Sequence[Sequence[float]], field: str, at_least: int, columns: Sequence[int] = (2,)
-) -> NDArray[np.float64]:
+def _points(values: Sequence[Sequence[float]], field: str, at_least: int, columns: Sequence[int] = (2,)) -> Array:
     try:
         points = np.array(values, dtype=float)
     except (TypeError, ValueError):

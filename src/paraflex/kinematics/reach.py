@@ -7,24 +7,23 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.joint_coordinates import marker_place, material_angle
+from paraflex.dynamics.projection import assemble, closed, shortened
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PointRef
 
-Array = NDArray[np.float64]
-
 # A place nearer than this part of the mechanism's size to a pose is reached.
 REACHED = 1e-8
-# Newton's iteration on the distance: how many, the longest step [sizes of the mechanism, rad], the shortest, and the
-# difference that second derivatives are taken by.
+# Newton's iteration on the distance: how many, the longest step [sizes of the mechanism, rad], also where loops are
+# closed, the shortest, and the difference that second derivatives are taken by.
 _MAX_ITERATIONS, _LONGEST, _SHORTEST, _DIFFERENCE = 60, 0.5, 1e-12, 1e-6
 # A slope of the distance, or a curvature, below this is none.
 _FLAT = 1e-10
-# Loops are closed to this by so many corrections, none of them longer than half a size or radian.
-_CLOSED, _CORRECTIONS = 1e-11, 30
 # Poses from bodies turned at random that are tried besides.
 _SCATTERED = 4
 # Singular values below this part of the largest are of redundant constraints.
@@ -157,14 +156,10 @@ class PoseSearch:
 
     def closed(self, t: float, q: Array) -> Array | None:
         """The pose with loops closed from there by least changes; None where they do not close."""
-        system, still = self.system, np.zeros(self.system.n)
-        for _ in range(_CORRECTIONS):
-            phi = system.constraints(self.signals, t, q, still)[0] / system.row_units
-            if np.max(np.abs(phi), initial=0.0) <= _CLOSED * float(np.max(np.abs(q) / system.units, initial=1.0)):
-                return q
-            change = np.linalg.lstsq(self._jacobian(q), -phi, rcond=_DEPENDENT)[0]
-            q = q + system.units * change * min(1.0, _LONGEST / max(np.max(np.abs(change)), _LONGEST))
-        return None
+        system = self.system
+        weights = scipy.sparse.csr_matrix(scipy.sparse.diags(1.0 / system.units**2))
+        pose, phi = assemble(system, self.signals, t, q, lambda _: weights, longest=_LONGEST)
+        return pose if closed(system, pose, phi) else None
 
     def tracked(self, times: Sequence[float] | Array, goals: Array, q: Array) -> list[Nearest]:
         """The nearest poses to goals (k, tasks) at times (k,), each from the one before."""
@@ -253,4 +248,4 @@ class PoseSearch:
         if values.size and np.max(np.abs(along)) <= _FLAT and values[0] < -np.sqrt(_FLAT):
             move[0] = longest
         step = free @ (vectors @ move)
-        return step * min(1.0, longest / max(float(np.max(np.abs(step), initial=0.0)), longest))
+        return step * shortened(step, longest)

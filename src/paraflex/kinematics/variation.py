@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import make_closure_scratch
 from paraflex.kernel.closure_residuals import closure_residuals
 from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.kinematics.closure import PathClosure, RigidMotion
-
-Array = NDArray[np.float64]
 
 
 class Nearby(NamedTuple):

@@ -26,7 +26,9 @@ def check_mechanism(mechanism: Members) -> None:
     for body in mechanism.bodies:
         check_body(body)
     check_ground(mechanism)
-    check_references(mechanism)
+    check_joints(mechanism)
+    check_members_at_joints(mechanism)
+    check_assemblies(mechanism)
     check_connected(mechanism)
     check_task(mechanism)
     check_loads(mechanism)
@@ -66,32 +68,27 @@ def check_ground(mechanism: Members) -> None:
         finite(position, f"ground.{name}")
 
 
-def check_references(mechanism: Members) -> None:
-    """Joints, motors, end-effector, assemblies and modes name things that exist."""
-    joints = {joint.name: joint for joint in mechanism.joints}
-    motors = {motor.name: motor for motor in mechanism.motors}
-    bodies = {body.name: body for body in mechanism.bodies}
+def check_joints(mechanism: Members) -> None:
+    """Joints hold points that exist, of two bodies."""
     for joint in mechanism.joints:
-        _known_point(mechanism, joint.a, f"joint.{joint.name}")
-        _known_point(mechanism, joint.b, f"joint.{joint.name}")
-        if joint.a.body == joint.b.body:
-            raise InputError(
-                "a joint needs two different bodies",
-                field=f"joint.{joint.name}",
-                value=f"{joint.a}, {joint.b}",
-                remedy="one side must lie on another body or on the ground",
-            )
+        field = f"joint.{joint.name}"
+        _two_bodies(mechanism, joint.a, joint.b, field, "a joint", "one side must lie on another body or on the ground")
         if isinstance(joint, SlidingJoint):
             body = None if joint.a.on_ground else mechanism.body(joint.a.body)
             if not isinstance(body, FlexibleBeam):
                 raise InputError(
                     "a sliding joint needs a beam to slide on",
-                    field=f"joint.{joint.name}",
+                    field=field,
                     value=str(joint.a),
                     remedy='name a point of a beam first; on other bodies use a "slot"',
                 )
-        finite([getattr(joint, "direction", 0.0)], f"joint.{joint.name}.direction")
-        finite([getattr(joint, "angle", 0.0)], f"joint.{joint.name}.angle")
+        finite([getattr(joint, "direction", 0.0)], f"{field}.direction")
+        finite([getattr(joint, "angle", 0.0)], f"{field}.angle")
+
+
+def check_members_at_joints(mechanism: Members) -> None:
+    """Motors, prescribed motions, springs, dampers and friction are at joints that move; modes name motors."""
+    joints = {joint.name: joint for joint in mechanism.joints}
     groups = {
         "motor": mechanism.motors,
         "prescribed": mechanism.prescribed,
@@ -103,7 +100,7 @@ def check_references(mechanism: Members) -> None:
         for member in members:
             field = f"{kind}.{member.name}.joint"
             known(member.joint, joints, field, "joint")
-            if isinstance(mechanism.joint(member.joint), WeldJoint):
+            if isinstance(joints[member.joint], WeldJoint):
                 raise InputError("a weld does not move", field=field, value=member.joint, remedy="name another joint")
     for spring in mechanism.springs:
         field = f"spring.{spring.name}"
@@ -114,9 +111,15 @@ def check_references(mechanism: Members) -> None:
     for friction in mechanism.frictions:
         positive(friction.limit, f"friction.{friction.name}.limit", "N m, or N")
         positive(friction.speed, f"friction.{friction.name}.speed", "rad/s, or m/s")
+    motors = [motor.name for motor in mechanism.motors]
     for mode in mechanism.modes:
         for name in mode.motors:
             known(name, motors, f"mode.{mode.name}", "motor")
+
+
+def check_assemblies(mechanism: Members) -> None:
+    """Assemblies name bodies and points of bodies, and place every body."""
+    bodies = [body.name for body in mechanism.bodies]
     for assembly in mechanism.assemblies:
         for name, angle in assembly.angles.items():
             known(name, bodies, f"assembly.{assembly.name}", "body")
@@ -125,29 +128,15 @@ def check_references(mechanism: Members) -> None:
             field = f"assembly.{assembly.name}.points"
             _known_point(mechanism, ref, field)
             finite(place, f"{field}.{ref}")
-            if ref.on_ground:
-                raise InputError(
-                    "the places of ground points are given in [ground]",
-                    field=field,
-                    value=str(ref),
-                    remedy="name a body's point",
-                )
+            _on_body(ref, field, "the places of ground points are given in [ground]")
         # It names the body that neither angles nor points place.
         approximate_poses(mechanism, assembly)
 
 
 def check_connected(mechanism: Members) -> None:
     """Where there is a ground joint, joints lead from the ground to every body. Free-floating: all hang together."""
-    neighbours: dict[str, set[str]] = {body.name: set() for body in mechanism.bodies} | {GROUND: set()}
-    for joint in mechanism.joints:
-        neighbours[joint.a.body].add(joint.b.body)
-        neighbours[joint.b.body].add(joint.a.body)
-    start = GROUND if neighbours[GROUND] else mechanism.bodies[0].name
-    reached, stack = {start}, [start]
-    while stack:
-        for other in neighbours[stack.pop()] - reached:
-            reached.add(other)
-            stack.append(other)
+    start = GROUND if mechanism.joints_at[GROUND] else mechanism.bodies[0].name
+    reached = mechanism.reached(start)
     lost = [body.name for body in mechanism.bodies if body.name not in reached]
     if lost:
         raise InputError(
@@ -160,17 +149,10 @@ def check_connected(mechanism: Members) -> None:
 
 def check_task(mechanism: Members) -> None:
     """The end-effector is a point of a body."""
-    if mechanism.end_effector is None:
-        return
-    point = mechanism.end_effector.point
-    _known_point(mechanism, point, "end_effector.point")
-    if point.on_ground:
-        raise InputError(
-            "the end-effector is a point of the ground, which does not move",
-            field="end_effector.point",
-            value=str(point),
-            remedy="name a body's point",
-        )
+    if mechanism.end_effector is not None:
+        point, field = mechanism.end_effector.point, "end_effector.point"
+        _known_point(mechanism, point, field)
+        _on_body(point, field, "the end-effector is a point of the ground, which does not move")
 
 
 def check_loads(mechanism: Members) -> None:
@@ -178,29 +160,31 @@ def check_loads(mechanism: Members) -> None:
     finite(mechanism.gravity, "gravity")
     for spring in mechanism.linear_springs:
         field = f"linear_spring.{spring.name}"
-        _known_point(mechanism, spring.a, f"{field}.points")
-        _known_point(mechanism, spring.b, f"{field}.points")
-        if spring.a.body == spring.b.body:
-            raise InputError(
-                "a spring needs two different bodies",
-                field=f"{field}.points",
-                value=f"{spring.a}, {spring.b}",
-                remedy="one end must be on another body or on the ground",
-            )
+        remedy = "one end must be on another body or on the ground"
+        _two_bodies(mechanism, spring.a, spring.b, f"{field}.points", "a spring", remedy)
         not_negative(spring.stiffness, f"{field}.stiffness", "N/m")
         not_negative(spring.length, f"{field}.length", "m")
         not_negative(spring.damping, f"{field}.damping", "N s/m")
     for load in mechanism.loads:
         field = f"load.{load.name}"
         _known_point(mechanism, load.point, f"{field}.point")
-        if load.point.on_ground:
-            raise InputError(
-                "the ground does not move", field=f"{field}.point", value=str(load.point), remedy="name a body's point"
-            )
+        _on_body(load.point, f"{field}.point", "the ground does not move")
         if isinstance(load, PointForce):
             finite(load.force, f"{field}.force")
         else:
             finite([load.torque], f"{field}.torque")
+
+
+def _two_bodies(mechanism: Members, a: PointRef, b: PointRef, field: str, what: str, remedy: str) -> None:
+    _known_point(mechanism, a, field)
+    _known_point(mechanism, b, field)
+    if a.body == b.body:
+        raise InputError(f"{what} needs two different bodies", field=field, value=f"{a}, {b}", remedy=remedy)
+
+
+def _on_body(ref: PointRef, field: str, problem: str) -> None:
+    if ref.on_ground:
+        raise InputError(problem, field=field, value=str(ref), remedy="name a body's point")
 
 
 def _known_point(mechanism: Members, ref: PointRef, field: str) -> None:

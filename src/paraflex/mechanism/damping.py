@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, given_as
+from paraflex.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class RayleighDamping(CheckedFields):
     mass: float = 0.0
     stiffness: float = 0.0
 
-    def coefficients(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coefficients(self, omega: Array) -> Array:
         """Of the body's mass-normalised modes of these angular frequencies, as its joints hold it [1/s]."""
         return self.mass + self.stiffness * omega**2
 
@@ -52,7 +52,7 @@ class ModalDamping(CheckedFields):
 
     ratios: tuple[float, ...]
 
-    def coefficients(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coefficients(self, omega: Array) -> Array:
         """2 ratio omega of each mode [1/s]."""
         last = len(self.ratios) - 1
         return 2.0 * omega * np.array([self.ratios[min(k, last)] for k in range(omega.size)])
@@ -83,7 +83,7 @@ class LossFactor(CheckedFields):
         """Coefficient of stiffness-proportional damping [s]."""
         return self.loss_factor / (2.0 * np.pi * self.frequency)
 
-    def coefficients(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coefficients(self, omega: Array) -> Array:
         """Of the body's mass-normalised modes of these angular frequencies [1/s]."""
         return self.stiffness * omega**2
 

@@ -13,10 +13,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.errors import InputError, as_enum
 
 GROUND = "ground"
@@ -192,7 +190,7 @@ given_as("a joint")(Joint)
 class AngleLaw(Protocol):
     """An angle given in time."""
 
-    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
         """Angle [rad], its rate [rad/s] and its acceleration [rad/s^2] at times t [s]."""
         ...
 
@@ -206,12 +204,12 @@ class AngleLaw(Protocol):
 class SampledAngle(CheckedFields):
     """An angle law from three functions of time: the angle and its first two derivatives."""
 
-    angle: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    rate: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    acceleration: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    angle: Callable[[Array], Array]
+    rate: Callable[[Array], Array]
+    acceleration: Callable[[Array], Array]
     knots: tuple[float, ...] = ()
 
-    def evaluate(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
         """Angle, rate and acceleration at times t."""
         return self.angle(t), self.rate(t), self.acceleration(t)
 

@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.joints import AngleLaw
 
-Values = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+Values = tuple[Array, Array, Array]
 
 # What a law and its rate may jump by at a knot, as a fraction of their size: rounding of its expressions.
 _SMOOTH = 1e-9
@@ -33,7 +33,7 @@ class ConstantSpeed(CheckedFields):
     speed: float
     knots: tuple[float, ...] = ()
 
-    def evaluate(self, t: NDArray[np.float64]) -> Values:
+    def evaluate(self, t: Array) -> Values:
         """Value, rate and acceleration at times t."""
         return self.angle + self.speed * t, np.full_like(t, self.speed), np.zeros_like(t)
 
@@ -86,7 +86,7 @@ class PiecewiseLaw(CheckedFields):
         inner = [k for a, piece, b in zip(starts, self.pieces, ends, strict=True) for k in piece.knots if a < k < b]
         return tuple(sorted([*self.ends, *inner]))
 
-    def evaluate(self, t: NDArray[np.float64]) -> Values:
+    def evaluate(self, t: Array) -> Values:
         """Value, rate and acceleration at times t; at a knot those of the later piece."""
         t = np.asarray(t, dtype=float)
         which = np.searchsorted(self.ends, t, side="right")
@@ -149,7 +149,7 @@ class TabulatedLaw(CheckedFields):
         """Times between which it is one polynomial of degree five at most [s]."""
         return self.times
 
-    def evaluate(self, t: NDArray[np.float64]) -> Values:
+    def evaluate(self, t: Array) -> Values:
         """Value, rate and acceleration at times t.
 
         Raises

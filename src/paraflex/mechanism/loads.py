@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.mechanism.joints import PointRef
@@ -95,10 +97,16 @@ class PointForce(CheckedFields):
     """A constant force [N] at a named point of a body, given in the ground frame."""
 
     _table = "load"
+    unit: ClassVar[str] = "N"
 
     name: str
     point: PointRef
     force: tuple[float, float]
+
+    @property
+    def size(self) -> float:
+        """Of the force [N]."""
+        return math.hypot(*self.force)
 
 
 @dataclass(frozen=True)
@@ -106,10 +114,16 @@ class AppliedTorque(CheckedFields):
     """A constant torque [N m] on the material at a named point of a body."""
 
     _table = "load"
+    unit: ClassVar[str] = "N m"
 
     name: str
     point: PointRef
     torque: float
+
+    @property
+    def size(self) -> float:
+        """Of the torque [N m]."""
+        return abs(self.torque)
 
 
 Load = PointForce | AppliedTorque

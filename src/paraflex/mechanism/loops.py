@@ -31,10 +31,6 @@ def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:
 
 def _tree(mechanism: Mechanism) -> dict[str, tuple[str, str] | None]:
     """For each body the joint and the body that lead towards the root, None for that."""
-    neighbours: dict[str, list[tuple[str, str]]] = {}
-    for joint in mechanism.joints:
-        neighbours.setdefault(joint.a.body, []).append((joint.name, joint.b.body))
-        neighbours.setdefault(joint.b.body, []).append((joint.name, joint.a.body))
     parent: dict[str, tuple[str, str] | None] = {}
     for root in (GROUND, *(body.name for body in mechanism.bodies)):
         if root in parent:
@@ -43,9 +39,10 @@ def _tree(mechanism: Mechanism) -> dict[str, tuple[str, str] | None]:
         queue = deque([root])
         while queue:
             here = queue.popleft()
-            for joint, other in neighbours.get(here, []):
+            for joint in mechanism.joints_at[here]:
+                other = joint.b.body if joint.a.body == here else joint.a.body
                 if other not in parent:
-                    parent[other] = (joint, here)
+                    parent[other] = (joint.name, here)
                     queue.append(other)
     return parent
 

@@ -122,16 +122,11 @@ class Mechanism(Members, Shown):
         reference = None if reference is None else as_enum(ReferenceCondition, reference, "reference")
         curvature = None if curvature is None else as_enum(Curvature, curvature, "curvature")
         asked = {"elements": elements, "reference": reference, "curvature": curvature}
-        for what in [name for name, value in asked.items() if value is not None]:
+        changes = {name: value for name, value in asked.items() if value is not None}
+        for what in changes:
             self._refuse_given_shapes(what)
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
-        if elements is not None:
-            beams = [replace(beam, elements=elements) for beam in beams]
-        if reference is not None:
-            beams = [replace(beam, reference=reference) for beam in beams]
-        if curvature is not None:
-            beams = [replace(beam, curvature=curvature) for beam in beams]
-        changed = self.with_bodies(beams)
+        changed = self.with_bodies(replace(beam, **changes) for beam in beams) if changes else self
         if modes is None:
             return changed
         bodies = [body for body in changed.bodies if not isinstance(body, RigidBody)]

@@ -155,9 +155,32 @@ class Members(CheckedFields):
         """Named points of every body, and of the ground by its name."""
         return {GROUND: self.ground} | {body.name: body.points for body in self.bodies}
 
+    @cached_property
+    def joints_at(self) -> Mapping[str, list[Joint]]:
+        """Joints of every body and of the ground, in the order of the mechanism."""
+        found: dict[str, list[Joint]] = {name: [] for name in self.points}
+        for joint in self.joints:
+            for name in dict.fromkeys((joint.a.body, joint.b.body)):
+                found[name].append(joint)
+        return found
+
+    def reached(self, start: str, past: str = "") -> set[str]:
+        """A body or the ground, and all that joints lead to from there past another body."""
+        seen, waiting = {start, past}, [start]
+        while waiting:
+            for joint in self.joints_at[waiting.pop()]:
+                new = {joint.a.body, joint.b.body} - seen
+                seen |= new
+                waiting += new
+        return seen - {past}
+
+    def slides(self, joint: str) -> bool:
+        """Whether a joint, by its name, has a travel and not an angle."""
+        return isinstance(self.joint(joint), AxisJoint)
+
     def motor_units(self) -> tuple[str, ...]:
         """What each motor's torque is counted in: N m, or N where its joint slides."""
-        return tuple("N" if isinstance(self.joint(motor.joint), AxisJoint) else "N m" for motor in self.motors)
+        return tuple("N" if self.slides(motor.joint) else "N m" for motor in self.motors)
 
     def assembly(self, name: str | None = None) -> Assembly:
         """The assembly of that name, or the first.

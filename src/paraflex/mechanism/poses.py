@@ -66,7 +66,7 @@ def placed_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
 
 def _joined(mechanism: Members, body: str) -> str:
     """Of a body that fewer than two joints hold, which: one may be missing."""
-    names = [joint.name for joint in mechanism.joints if body in (joint.a.body, joint.b.body)]
+    names = [joint.name for joint in mechanism.joints_at[body]]
     if not names:
         return "; no joint holds it: is one missing?"
     return f"; {names[0]} alone holds it: is a joint missing?" if len(names) == 1 else ""

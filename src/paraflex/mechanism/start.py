@@ -88,7 +88,7 @@ class Start(CheckedFields):
 
 @checked_arguments()
 def check_start(mechanism: Mechanism, start: Start) -> None:
-    """Nothing, if a start speaks of bodies and points that exist, and says each thing once.
+    """Check that a start speaks of bodies and points that exist, and says each thing once.
 
     Raises
     ------

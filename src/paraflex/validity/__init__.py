@@ -80,10 +80,10 @@ class Validity:
     @property
     def verdict(self) -> str:
         """One sentence: whether the model holds, by what, and what to do if it does not."""
-        worst = self.worst
         if self.holds:
-            return f"{worst.geometry} geometry holds: {worst.text}"
-        return f"{worst.geometry} geometry does not hold: {worst.text}; {worst.remedy}"
+            return f"{self.worst.geometry} geometry holds: {self.worst.text}"
+        found = self.finding()
+        return f"{found.text}; {found.remedy}"
 
     def finding(self, whose: str = "") -> Finding:
         """The verdict on a run that is beyond what its model can describe."""

@@ -5,11 +5,10 @@ As in `numbers`, each bound is wide, and what lies beyond it is hardly ever mean
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 from paraflex.findings import Finding
-from paraflex.mechanism import AssumedModesBeam, AxisJoint, FlexibleBeam, Mechanism, ModalBody, PointForce
+from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, PointForce
 from paraflex.mechanism.bodies import Body
 from paraflex.mechanism.damping import LossFactor, ModalDamping
 from paraflex.mechanism.joints import PointRef, RevoluteJoint, WeldJoint
@@ -138,7 +137,7 @@ def _damping_ratio(body: Body) -> tuple[float, str]:
 def _sharp(mechanism: Mechanism) -> Iterator[Finding]:
     for one in mechanism.frictions:
         if 0.0 < one.speed < SHARP:
-            unit = "m/s" if isinstance(mechanism.joint(one.joint), AxisJoint) else "rad/s"
+            unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
             yield Finding(
                 "friction-sharp", f"friction.{one.name}.speed",
                 f"its force turns over within {one.speed:.3g} {unit}: each change of direction takes very small steps",
@@ -148,7 +147,7 @@ def _sharp(mechanism: Mechanism) -> Iterator[Finding]:
 
 def _rubbing(mechanism: Mechanism, size: float, weight: float) -> Iterator[Finding]:
     for one in mechanism.frictions:
-        slides = isinstance(mechanism.joint(one.joint), AxisJoint)
+        slides = mechanism.slides(one.joint)
         bound, unit = (RUBBING_SLIDE * weight, "N") if slides else (RUBBING_TURN * weight * size, "N m")
         if one.limit > bound:
             yield Finding(
@@ -163,11 +162,10 @@ def _loaded(mechanism: Mechanism, size: float, weight: float) -> Iterator[Findin
     most = (LOADED if any(mechanism.gravity) else LOADED_AT_REST) * weight
     for load in mechanism.loads:
         force = isinstance(load, PointForce)
-        amount = math.hypot(*load.force) if force else abs(load.torque)
-        if amount > (most if force else most * size):
+        if load.size > (most if force else most * size):
             yield Finding(
                 "load-large", f"load.{load.name}.{'force' if force else 'torque'}",
-                f"{amount:.3g} {'N' if force else 'N m'}, where all bodies weigh {weight:.3g} N"
+                f"{load.size:.3g} {load.unit}, where all bodies weigh {weight:.3g} N"
                 + ("" if force else f", in a mechanism of {size:.3g} m"),
-                f"it is in {'N' if force else 'N m'}: is it in another unit, or are masses?",
+                f"it is in {load.unit}: is it in another unit, or are masses?",
             )  # fmt: skip

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import BodyCoordinates, System
 from paraflex.fem import ReferenceCondition
 from paraflex.fem.element import AXIAL, transverse_shape
@@ -15,8 +15,6 @@ from paraflex.integrators import Solution
 from paraflex.kernel.packed import POINT
 from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam
 from paraflex.mechanism.bodies import span_properties
-
-Array = NDArray[np.float64]
 
 # Coordinates that hold less than this of the stiffness of a uniform stretch do not tell the axial force.
 _STRETCHES = 0.5

@@ -11,8 +11,9 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from paraflex.arrays import Array
 from paraflex.mechanism import Geometry
-from paraflex.validity.bending import Array, Bending
+from paraflex.validity.bending import Bending
 
 Number = TypeVar("Number", float, Array)
 

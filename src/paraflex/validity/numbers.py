@@ -13,7 +13,7 @@ import numpy as np
 
 from paraflex.errors import InputError
 from paraflex.findings import Finding
-from paraflex.mechanism import AssumedModesBeam, AxisJoint, FlexibleBeam, Mechanism, ModalBody, RigidBody, Section
+from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, RigidBody, Section
 from paraflex.mechanism.bodies import Body, Material
 from paraflex.mechanism.poses import local_points
 from paraflex.validity.actions import doubtful_actions
@@ -165,7 +165,7 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
     given = {
         f"joint.{j.name}.{name}": getattr(j, name, 0.0) for j in mechanism.joints for name in ("direction", "angle")
     }
-    turning = [one for one in mechanism.springs if not isinstance(mechanism.joint(one.joint), AxisJoint)]
+    turning = [one for one in mechanism.springs if not mechanism.slides(one.joint)]
     given |= {f"spring.{one.name}.rest": one.rest for one in turning}
     given |= {
         f"assembly.{assembly.name}.{body}": angle
@@ -184,7 +184,7 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
 def _laws(mechanism: Mechanism, size: float, duration: float) -> Iterator[Finding]:
     """Angles in time: degrees show in where they start, and how far they swing to and fro."""
     for one in mechanism.prescribed:
-        if isinstance(mechanism.joint(one.joint), AxisJoint):
+        if mechanism.slides(one.joint):
             continue
         try:
             angle, rate, _ = one.law.evaluate(np.linspace(0.0, duration, _LOOKS))

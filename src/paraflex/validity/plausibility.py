@@ -8,19 +8,17 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import CONSTRAINT
-from paraflex.mechanism import AxisJoint, Mechanism, PointForce
+from paraflex.mechanism import Mechanism, PointForce
 from paraflex.validity.bending import bending_of
 from paraflex.validity.blame import most_likely
 from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
-
-Array = NDArray[np.float64]
 
 # Slope of a link in its frame beyond which it is a spring rather than a link [rad].
 STEEP = 0.7
@@ -186,8 +184,8 @@ def _large_efforts(where: _Where, system: System, driven: Driven) -> Iterator[Fi
 
 def _expected(system: System, mechanism: Mechanism, acceleration: float) -> tuple[float, float]:
     """The force that accelerates and holds the whole mass, with all loads [N]; and all torques applied [N m]."""
-    loads = sum(math.hypot(*one.force) for one in mechanism.loads if isinstance(one, PointForce))
-    turning = sum(abs(one.torque) for one in mechanism.loads if not isinstance(one, PointForce))
+    loads = sum(one.size for one in mechanism.loads if isinstance(one, PointForce))
+    turning = sum(one.size for one in mechanism.loads if not isinstance(one, PointForce))
     felt = max(acceleration + math.hypot(*mechanism.gravity), _LEAST_ACCELERATION)
     return system.total_mass * felt + loads, turning
 
@@ -229,12 +227,9 @@ def _moving(mechanism: Mechanism, solution: Solution) -> str:
     named: list[str] = []
     for one in mechanism.prescribed:
         rate = float(np.max(np.abs(one.law.evaluate(solution.t)[1])))
-        unit = "m/s" if isinstance(mechanism.joint(one.joint), AxisJoint) else "rad/s"
+        unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
         named.append(f"prescribed.{one.name} (up to {rate:.3g} {unit})")
-    for load in mechanism.loads:
-        force = isinstance(load, PointForce)
-        amount = f"{math.hypot(*load.force):.3g} N" if force else f"{abs(load.torque):.3g} N m"
-        named.append(f"load.{load.name} ({amount})")
+    named += [f"load.{load.name} ({load.size:.3g} {load.unit})" for load in mechanism.loads]
     return f": {', '.join(named)}" if named else ""
 
 

@@ -51,5 +51,13 @@ def make_tableau(
     )
 
 
+def paired_rows(diagonal: Number, rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
+    """Rows of A where all from the third on begin with two equal entries: these once, and what follows to the diagonal.
+
+    So have methods of stage order two that Kennedy and Carpenter derive.
+    """
+    return [[0.0], [diagonal, diagonal], *([row[0], *row, diagonal] for row in rows)]
+
+
 def _value(entry: Number) -> float:
     return float(Fraction(entry)) if isinstance(entry, str) else entry

@@ -1,19 +1,19 @@
-"""A run in stretches between times at which something given jumps: a step that ends there must not see what follows."""
+"""Times at which something given jumps: a step that ends there must not see what follows."""
 
 from __future__ import annotations
 
 from math import perm
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.kernel.packed import Signals
 
 # A jump smaller than this fraction of the signal is rounding.
 _SMOOTH = 1e-9
 
 
-def jump_times(signals: Signals, n_torques: int, knots: NDArray[np.float64]) -> NDArray[np.float64]:
+def jump_times(signals: Signals, n_torques: int, knots: Array) -> Array:
     """The knots at which a torque jumps, or a prescribed law in its value, rate or acceleration.
 
     Parameters
@@ -52,7 +52,7 @@ def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
     return False
 
 
-def _derivative(coefficients: NDArray[np.float64], order: int, x: float) -> float:
+def _derivative(coefficients: Array, order: int, x: float) -> float:
     """Of a polynomial with coefficients of ascending powers."""
     value = 0.0
     for power in range(coefficients.size - 1, order - 1, -1):

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import (
     BodyCoordinates,
     SingularityMeasure,
@@ -21,9 +21,7 @@ from paraflex.dynamics import (
 from paraflex.errors import InputError
 from paraflex.fem import slope_square_integrals
 from paraflex.integrators.events import BeamEnd, DeflectionLimit, Event, JointLimit, beam_ends, check_events
-from paraflex.mechanism import AtEnd, AxisJoint
-
-Array = NDArray[np.float64]
+from paraflex.mechanism import AtEnd
 
 # Places looked at within an element, its last end among them.
 _PLACES = 4
@@ -34,7 +32,7 @@ _LINE = 3
 
 
 @dataclass(frozen=True)
-class Gauge:
+class EventFunction:
     """What tells of an event: a value of the pose, and the bounds it is to stay between.
 
     Attributes
@@ -80,8 +78,8 @@ class Gauge:
         return f"a {event} came as near as {self.low:g}"
 
 
-def make_gauges(system: System, q: Array, events: Sequence[Event]) -> tuple[Gauge, ...]:
-    """Gauges of events, for runs that start at q (n,).
+def event_functions(system: System, q: Array, events: Sequence[Event]) -> tuple[EventFunction, ...]:
+    """One for each event, for runs that start at q (n,).
 
     Raises
     ------
@@ -89,44 +87,44 @@ def make_gauges(system: System, q: Array, events: Sequence[Event]) -> tuple[Gaug
         See `check_events`; or the start is not inside.
     """
     check_events(system.mechanism, events)
-    gauges = tuple(_gauge(system, q, event) for event in events)
-    for gauge in gauges:
-        if not gauge.inside(q[None])[0] > 0.0:
-            value, unit = float(gauge.value(q[None])[0]), f" {gauge.unit}" if gauge.unit else ""
-            bounds = {"above": gauge.low, "below": gauge.high}
+    functions = tuple(_event_function(system, q, event) for event in events)
+    for function in functions:
+        if not function.inside(q[None])[0] > 0.0:
+            value, unit = float(function.value(q[None])[0]), f" {function.unit}" if function.unit else ""
+            bounds = {"above": function.low, "below": function.high}
             wanted = " and ".join(f"{side} {x:g}{unit}" for side, x in bounds.items() if math.isfinite(x))
             raise InputError(
-                f"the run would start outside the limits of {gauge.event}", field="events", value=value,
+                f"the run would start outside the limits of {function.event}", field="events", value=value,
                 remedy=f"start {wanted}, or move the limit",
             )  # fmt: skip
-    return gauges
+    return functions
 
 
-def beam_end_gauges(system: System) -> tuple[Gauge, ...]:
-    """Gauges of the places where points slide along beams, from 0 to the length of the beam."""
-    gauges = []
+def beam_end_functions(system: System) -> tuple[EventFunction, ...]:
+    """Those of the places where points slide along beams, from 0 to the length of the beam."""
+    functions = []
     for end in beam_ends(system.mechanism):
         margin = _AT_END * end.length
-        gauges.append(Gauge(end, _place(system, end.joint), -margin, end.length + margin, "m"))
-    return tuple(gauges)
+        functions.append(EventFunction(end, _place(system, end.joint), -margin, end.length + margin, "m"))
+    return tuple(functions)
 
 
 def _place(system: System, joint: str) -> Callable[[Array], Array]:
     return lambda q: place_along_beam(system, joint, q)
 
 
-def _gauge(system: System, q: Array, event: Event) -> Gauge:
+def _event_function(system: System, q: Array, event: Event) -> EventFunction:
     if isinstance(event, JointLimit):
-        unit = "m" if isinstance(system.mechanism.joint(event.joint), AxisJoint) else "rad"
-        return Gauge(event, _joint_value(system, event.joint), event.low, event.high, unit)
+        unit = "m" if system.mechanism.slides(event.joint) else "rad"
+        return EventFunction(event, _joint_value(system, event.joint), event.low, event.high, unit)
     if isinstance(event, DeflectionLimit):
-        return Gauge(event, _deflection(system, event.body), -math.inf, event.limit, "m")
-    return Gauge(event, SingularityMeasure(system, q, event.motors), event.distance, math.inf, "")
+        return EventFunction(event, _deflection(system, event.body), -math.inf, event.limit, "m")
+    return EventFunction(event, SingularityMeasure(system, q, event.motors), event.distance, math.inf, "")
 
 
 def _joint_value(system: System, joint: str) -> Callable[[Array], Array]:
     """Angle or travel of a joint; an angle is linear in the coordinates."""
-    if isinstance(system.mechanism.joint(joint), AxisJoint):
+    if system.mechanism.slides(joint):
         return lambda q: joint_coordinate(system, joint, q).value
     row = joint_coordinate(system, joint, np.zeros((1, system.n))).rows[0]
     return lambda q: q @ row
