@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from pathlib import Path
-from typing import Any
-
-from rich.console import Console
 
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import CompareRequest
@@ -34,7 +30,7 @@ from paraflex.errors import AssemblyError, InputError
 from paraflex.files import Model, load
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
-from paraflex.studies import Case, ComparisonOptions, MethodComparison, compare_methods, motion_case, tracking_case
+from paraflex.studies import Case, ComparisonOptions, compare_methods, motion_case, tracking_case
 from paraflex.writing import write_json
 
 
@@ -49,11 +45,22 @@ def compare_command(request: CompareRequest) -> int:
     say_replaced(folder, "comparison of methods")
     compile_kernels_for(model.mechanism, console.print)
     began = time.perf_counter()
-    case = _motion(model, request) if mode is None else _tracking(model, request, mode)
-    comparison = _run(console, case, methods, options)
-    figures = comparison.figures() | {"parameters": _parameters(model, case, options)}
+    if mode is None:
+        case = _motion(model, request)
+    else:
+        path, name = find_path(model, request.path)
+        case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
+    with counting(console) as report:
+        comparison = compare_methods(case, methods, options=options, on_progress=report)
+    asked = {"mechanism": model.source, "limit": options.limit, "repetitions": options.repetitions}
+    asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
+    figures = comparison.figures() | {"parameters": {"model": dict(model.parameters), "run": asked}}
     if comparison.measurements:
-        _write(figures, folder)
+        from paraflex.plots import save_work_precision
+
+        folder.mkdir(parents=True, exist_ok=True)
+        write_json(folder / "compare-methods.json", figures)
+        save_work_precision(figures, folder / "figures")
     if request.json:
         print(json.dumps(figures, indent=2))
     else:
@@ -96,11 +103,6 @@ def _mode(model: Model, request: CompareRequest) -> str | None:
     return None
 
 
-def _tracking(model: Model, request: CompareRequest, mode: str) -> Case:
-    path, name = find_path(model, request.path)
-    return tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-
-
 def _motion(model: Model, request: CompareRequest) -> Case:
     study, mechanism = own_motion(model, request.plan), model.mechanism
     assert study.duration is not None
@@ -113,24 +115,3 @@ def _motion(model: Model, request: CompareRequest) -> Case:
         raise of_assembly(error, model) from error
     except InputError as error:
         raise at_fault(error, model) from None
-
-
-def _run(console: Console, case: Case, methods: list[str], options: ComparisonOptions) -> MethodComparison:
-    with counting(console) as report:
-        return compare_methods(case, methods, options=options, on_progress=report)
-
-
-def _parameters(model: Model, case: Case, options: ComparisonOptions) -> dict[str, Any]:
-    asked = {"mechanism": model.source, "limit": options.limit, "repetitions": options.repetitions}
-    return {
-        "model": dict(model.parameters),
-        "run": asked | {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name},
-    }
-
-
-def _write(figures: dict[str, Any], folder: Path) -> None:
-    from paraflex.plots import save_work_precision
-
-    folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / "compare-methods.json", figures)
-    save_work_precision(figures, folder / "figures")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
-from pathlib import Path
 
 from rich.console import Console
 from rich.progress import TimeElapsedColumn
@@ -32,18 +32,17 @@ from paraflex.cli.request import (
     with_frames,
 )
 from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of, warn_of_doubts
+from paraflex.cli.writing import write_run
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import Model, load
-from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, finite_segments, proportional_segments
-from paraflex.results import save_results, summary
+from paraflex.results import summary
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
-from paraflex.studies import Simulator, StudyResult, run_study
-from paraflex.writing import write_json
+from paraflex.studies import Simulator, run_study
 
 
 def run_command(request: RunRequest) -> int:
@@ -76,7 +75,11 @@ def run_command(request: RunRequest) -> int:
     doubts = check_planned(model, task, path_name, modes, request.plan.assembly)
     method = _method(request, options)
     try:
-        result = _simulate(console, task, modes, options, parameters, method, model.study.error, doubts)
+        with _progress(console, task, modes) as report:
+            result = run_study(
+                task, modes, options=options, parameters=parameters, on_progress=report, method=method,
+                error=model.study.error, warning=False, findings=doubts,
+            )  # fmt: skip
     except InputError as error:
         warn_of(console, collected(doubts))
         raise at_fault(error, model) from None
@@ -85,8 +88,8 @@ def run_command(request: RunRequest) -> int:
         failures(console, result)
         return INTERRUPTED if result.interrupted else TROUBLE
     keep_findings(result.data, collected(verdict_of(result.data)))
-    _write(result, folder, report=request.report)
     figures = summary(result.data, result.failed)
+    write_run(result.data, figures, folder, report=request.report)
     if request.json:
         warn_of_doubts(console, figures)
         print(json.dumps(figures, indent=2))
@@ -148,12 +151,8 @@ def _check_fidelity(request: RunRequest) -> None:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
     for flag, value in given_flags(request).items():
         if request.ked:
-            raise InputError(
-                "means nothing with --ked",
-                field=flag,
-                value=value,
-                remedy="its steps are fixed, its start undeformed, its motors held",
-            )
+            remedy = "its steps are fixed, its start undeformed, its motors held"
+            raise InputError("means nothing with --ked", field=flag, value=value, remedy=remedy)
 
 
 def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
@@ -175,12 +174,7 @@ def asked_mechanism(model: Model, request: RunRequest) -> Mechanism:
 
 
 def _parameters(
-    model: Model,
-    path: str,
-    modes: list[ActuationMode],
-    task: TrackingTask,
-    how: dict,
-    request: RunRequest,
+    model: Model, path: str, modes: list[ActuationMode], task: TrackingTask, how: dict, request: RunRequest
 ) -> dict:
     return {
         "model": dict(model.parameters),
@@ -203,16 +197,11 @@ def _parameters(
     }
 
 
-def _simulate(
-    console: Console,
-    task: TrackingTask,
-    modes: list[ActuationMode],
-    options: IntegrationOptions,
-    parameters: dict,
-    method: Simulator | None,
-    error: str,
-    doubts: Iterable[Finding],
-) -> StudyResult:
+@contextmanager
+def _progress(
+    console: Console, task: TrackingTask, modes: list[ActuationMode]
+) -> Iterator[Callable[[str, float], None]]:
+    """A bar of each mode, and what is called with a mode and the time it has reached."""
     end = float(task.motion.t[-1])
     with bars(console, "{task.completed:.3f}/{task.total:.3f} s", TimeElapsedColumn()) as progress:
         of_mode = {mode.name: progress.add_task(mode.name, total=end, start=False) for mode in modes}
@@ -221,28 +210,4 @@ def _simulate(
             progress.start_task(of_mode[name])
             progress.update(of_mode[name], completed=reached)
 
-        return run_study(
-            task,
-            modes,
-            options=options,
-            parameters=parameters,
-            on_progress=report,
-            method=method,
-            error=error,
-            warning=False,
-            findings=doubts,
-        )
-
-
-def _write(result: StudyResult, folder: Path, *, report: bool) -> None:
-    from paraflex.plots import save_figures
-
-    assert result.data is not None
-    folder.mkdir(parents=True, exist_ok=True)
-    save_results(result.data, folder / "results.nc")
-    write_json(folder / "summary.json", summary(result.data, result.failed))
-    save_figures(result.data, folder / "figures")
-    if report:
-        from paraflex.report import save_page, tracking_page
-
-        save_page(tracking_page(result.data, result.failed), folder / "report.html")
+        yield report

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from paraflex.campaign import held
 from paraflex.cli.commands.studies import SensitivityRequest
-from paraflex.cli.replacing import say_replaced
+from paraflex.cli.replacing import read_json, say_replaced
 from paraflex.cli.request import COMPLETE
-from paraflex.cli.tables import number, plain_console, plain_table, warn_of_doubts
+from paraflex.cli.tables import number, plain_console, plain_table, print_titled, warn_of_doubts
 from paraflex.designs.setting import digest
 from paraflex.errors import InputError, OutputError
 from paraflex.plots import save_elasticities
@@ -31,7 +31,8 @@ _OURS = {RESULTS, TABLE, LINES, FIGURES, ".lock"}
 
 def sensitivity_command(request: SensitivityRequest) -> int:
     """Differentiate the runs of a study; write sensitivity.json, the table and figures. The exit code."""
-    study = load_sensitivities(request.study, [name for entry in request.metrics for name in _names(entry)])
+    named = [name.strip() for entry in request.metrics for name in entry.split(",")]
+    study = load_sensitivities(request.study, [name for name in named if name])
     at = _values(request.at)
     folder = request.folder
     setting = study.setting
@@ -55,10 +56,6 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     return COMPLETE
 
 
-def _names(entry: str) -> list[str]:
-    return [name.strip() for name in entry.split(",") if name.strip()]
-
-
 def _values(entries: list[str]) -> dict[str, float]:
     values = {}
     for entry in entries:
@@ -74,41 +71,28 @@ def _claim(folder: Path, asked: str) -> None:
     """Check that the folder is empty or holds what the same study wrote."""
     others = sorted(entry.name for entry in folder.iterdir() if entry.name not in _OURS)
     if others:
-        raise InputError(
-            f"the folder holds other files ({', '.join(others[:3])})", field="--output", value=str(folder),
-            remedy="name a new folder",
-        )  # fmt: skip
-    if (folder / RESULTS).exists() and _content(folder / RESULTS) != asked:
-        raise InputError(
-            "the folder holds results of another study, or of this one before it was changed", field="--output",
-            value=str(folder), remedy="name a new folder",
-        )  # fmt: skip
-
-
-def _content(file: Path) -> Any:
-    try:
-        return json.loads(file.read_text(encoding="utf-8")).get("content")
-    except (OSError, ValueError, AttributeError):
-        return None
+        problem = f"the folder holds other files ({', '.join(others[:3])})"
+    elif (folder / RESULTS).exists() and read_json(folder / RESULTS).get("content") != asked:
+        problem = "the folder holds results of another study, or of this one before it was changed"
+    else:
+        return
+    raise InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
 
 
 def _write(folder: Path, figures: dict[str, Any], found: Sensitivities) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     lines = found.to_frame()
     write_json(folder / RESULTS, figures)
     with whole_file(folder / TABLE) as unfinished:
         lines.to_csv(unfinished, index=False)
-    with whole_file(folder / LINES) as unfinished:
-        _to_parquet(lines, unfinished)
-
-
-def _to_parquet(lines: Any, file: Path) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     try:
-        pq.write_table(pa.Table.from_pandas(lines, preserve_index=False), file)
+        with whole_file(folder / LINES) as unfinished:
+            pq.write_table(pa.Table.from_pandas(lines, preserve_index=False), unfinished)
     except pa.ArrowException as error:
-        raise OutputError(f"cannot be written ({error})", field=str(file), remedy="choose another folder") from error
+        file = str(folder / LINES)
+        raise OutputError(f"cannot be written ({error})", field=file, remedy="choose another folder") from error
 
 
 def _print(console: Console, found: Sensitivities, row: int) -> None:
@@ -117,11 +101,11 @@ def _print(console: Console, found: Sensitivities, row: int) -> None:
     where, relative = f"{found.mechanism}, {path}, mode {mode}", found.relative
     for first in range(0, len(found.parameters), _COLUMNS):
         some = slice(first, first + _COLUMNS)
-        # Not the table's own title: that is broken at the table's width.
-        console.print(f"{where}: change of metrics by that of parameters [% / %]", soft_wrap=True)
-        console.print(_table(found, row, relative[row, :, some], some, "+.2f"))
-        console.print("Derivatives, in the units of metrics and parameters", soft_wrap=True)
-        console.print(_table(found, row, found.derivatives[row, :, some], some, ".2e"))
+        for title, values, form in (
+            (f"{where}: change of metrics by that of parameters [% / %]", relative, "+.2f"),
+            ("Derivatives, in the units of metrics and parameters", found.derivatives, ".2e"),
+        ):
+            print_titled(console, title, _table(found, row, values[row, :, some], some, form))
 
 
 def _table(found: Sensitivities, row: int, shown: NDArray[np.float64], some: slice, form: str) -> Table:

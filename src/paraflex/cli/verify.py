@@ -7,8 +7,6 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
-
 from paraflex.cli.agreement import print_agreement
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import VerifyRequest
@@ -31,9 +29,8 @@ from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
 from paraflex.files import load
-from paraflex.mechanism import ActuationMode, Geometry
+from paraflex.mechanism import Geometry
 from paraflex.results import save_results
-from paraflex.simulate import TrackingTask
 from paraflex.studies import FIDELITIES, Verification, VerificationOptions, agreement, check_model, verify
 from paraflex.writing import write_json
 
@@ -55,7 +52,8 @@ def verify_command(request: VerifyRequest) -> int:
             compile_kernels(geometry, console.print)
     began = time.perf_counter()
     task = plan_study(model, mechanism, path, path_name, request.plan)
-    verification = _run(console, task, modes, models, options)
+    with counting(console) as report:
+        verification = verify(task, modes, models=models, options=options, on_progress=report)
     parameters = {
         "model": dict(model.parameters),
         "run": {"mechanism": model.source, "path": path_name, "modes": [mode.name for mode in modes]}
@@ -97,13 +95,6 @@ def _models(request: VerifyRequest) -> list[str]:
             if name not in known:
                 raise InputError(f"unknown {flag[2:]}", field=flag, value=name, remedy=suggestion(name, known))
     return list(dict.fromkeys([*(request.fidelities or FIDELITIES), *request.engines]))
-
-
-def _run(
-    console: Console, task: TrackingTask, modes: list[ActuationMode], models: list[str], options: VerificationOptions
-) -> Verification:
-    with counting(console) as report:
-        return verify(task, modes, models=models, options=options, on_progress=report)
 
 
 def _write(verification: Verification, figures: dict, parameters: dict, folder: Path, *, report: bool) -> None:
