@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from paraflex import plots
 from paraflex.errors import InputError, OutputError
 from paraflex.plots.labels import display_unit, mode_label, symbol, three_digits
-from paraflex.plots.runs import default_mode
+from paraflex.plots.selection import default_mode
 
 FULL, PARTIAL = "++", "+-"
 STOP = 25  # Samples of the partial run.

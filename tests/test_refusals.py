@@ -17,13 +17,12 @@ from paraflex.integrators.run import make_problem
 from paraflex.integrators.spectra import spectrum
 from paraflex.integrators.variation import check_differentiable
 from paraflex.motion import simulate_motion
-from paraflex.plots.agreement import select_model
 from paraflex.plots.designs import read_designs
 from paraflex.plots.driving import mode_conditions
 from paraflex.plots.film import FilmOptions, plan_film
 from paraflex.plots.planned import drawings, figures_of, find_figure
-from paraflex.plots.runs import one_run
 from paraflex.plots.scene import check_shapes, scene, select
+from paraflex.plots.selection import one_run, select_model
 from paraflex.plots.sources import open_source
 from paraflex.plots.time_series import link_deflections
 from paraflex.plots.workspace import deviated_paths

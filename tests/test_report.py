@@ -75,7 +75,7 @@ def test_rows_come_back_rounded_by_less_than_a_hundred_thousandth_and_once_each(
     values[[0, 7]] = np.nan
     series = Series()
     assert [series.add(values), series.add([1.0]), series.add(values)] == [0, 1, 0]
-    kept, one = rows_of(series.told())
+    kept, one = rows_of(series.to_dict())
     np.testing.assert_allclose(kept, values, rtol=5e-6)
     assert one.tolist() == [1.0]
     assert series.add([np.inf, 1e300]) == 2

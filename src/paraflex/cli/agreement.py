@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from paraflex.cli.tables import number, plain_table
+from paraflex.cli.tables import number, plain_table, print_titled
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 
 # Names that fit above a column.
@@ -20,6 +19,7 @@ _SHORT = {
     "exudyn": "Exudyn",
     "mujoco": "MuJoCo",
 }
+_ERRORS = ("error\n[m]", "largest\n[m]", "RMS\n[m]", "wall\n[s]")
 _SOUND = {
     "finer step\n[m]": "change_with_finer_step",
     "finer mesh\n[m]": "change_with_finer_mesh",
@@ -37,57 +37,31 @@ def print_agreement(console: Console, figures: dict[str, Any], mode: str) -> Non
     reference = figures["reference"]
     compared = {name: values for name, values in finished.items() if "distance_max" in values and name != reference}
 
-    def show(title: str, table: Table) -> None:
-        # Not the table's own title: that is broken at the table's width.
-        console.print(title, soft_wrap=True)
-        console.print(table)
-
+    short = [_SHORT[name] for name in finished]
     where = f"{figures['mechanism']}, mode {mode}"
     span = SPAN_WORDS[ErrorSpan(figures["error"])]
-    show(
-        f"{where}: tracking error {span}, and distance from the path of {_SHORT[reference]}", _errors(models, reference)
+    print_titled(
+        console,
+        f"{where}: tracking error {span}, and distance from the path of {_SHORT[reference]}",
+        plain_table("model", numbers=_ERRORS, rows=(_errors(name, one, reference) for name, one in models.items())),
     )
-    show("Largest distance between the paths of two models [m]", _distances(finished, distances))
-    show(
-        "Change of the path with a finer step and mesh, imbalance of energy, constraint violation", _soundness(finished)
-    )
+    apart = (
+        [_SHORT[a], *("" if a == b else number(distances[a][b], ".1e") for b in finished)] for a in finished
+    )  # fmt: skip
+    table = plain_table("", numbers=short, rows=apart)
+    print_titled(console, "Largest distance between the paths of two models [m]", table)
+    sound = ([_SHORT[name], *(number(one[key], ".1e") for key in _SOUND.values())] for name, one in finished.items())
+    title = "Change of the path with a finer step and mesh, imbalance of energy, constraint violation"
+    print_titled(console, title, plain_table("model", numbers=_SOUND, rows=sound))
     for key, what in _LINKS.items() if compared else ():
-        show(f"RMS difference of each link's {what} from {_SHORT[reference]}", _links(figures["links"], compared, key))
+        of_links = [one[f"{key}_difference_rms"] for one in compared.values()]
+        rows = ([link, *(number(each[link], ".1e") for each in of_links)] for link in figures["links"])
+        table = plain_table("link", numbers=(_SHORT[name] for name in compared), rows=rows)
+        print_titled(console, f"RMS difference of each link's {what} from {_SHORT[reference]}", table)
 
 
-def _errors(models: dict[str, Any], reference: str) -> Table:
-    table = plain_table("model", numbers=("error\n[m]", "largest\n[m]", "RMS\n[m]", "wall\n[s]"))
-    for name, values in models.items():
-        if "tracking_error" not in values:
-            table.add_row(_SHORT[name], "failed")
-            continue
-        table.add_row(
-            _SHORT[name],
-            number(values["tracking_error"], ".4e"),
-            *("" if name == reference else number(values.get(f"distance_{kind}"), ".1e") for kind in ("max", "rms")),
-            number(values["wall_time"], ".2f"),
-        )
-    return table
-
-
-def _distances(finished: dict[str, Any], distances: dict[str, Any]) -> Table:
-    table = plain_table("", numbers=(_SHORT[name] for name in finished))
-    for name in finished:
-        table.add_row(
-            _SHORT[name], *("" if other == name else number(distances[name][other], ".1e") for other in finished)
-        )
-    return table
-
-
-def _soundness(finished: dict[str, Any]) -> Table:
-    table = plain_table("model", numbers=_SOUND)
-    for name, values in finished.items():
-        table.add_row(_SHORT[name], *(number(values[key], ".1e") for key in _SOUND.values()))
-    return table
-
-
-def _links(links: list[str], compared: dict[str, Any], key: str) -> Table:
-    table = plain_table("link", numbers=(_SHORT[name] for name in compared))
-    for link in links:
-        table.add_row(link, *(number(values[f"{key}_difference_rms"][link], ".1e") for values in compared.values()))
-    return table
+def _errors(name: str, values: dict[str, Any], reference: str) -> list[str]:
+    if "tracking_error" not in values:
+        return [_SHORT[name], "failed"]
+    far = ("" if name == reference else number(values.get(f"distance_{kind}"), ".1e") for kind in ("max", "rms"))
+    return [_SHORT[name], number(values["tracking_error"], ".4e"), *far, number(values["wall_time"], ".2f")]

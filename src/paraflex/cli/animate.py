@@ -56,13 +56,7 @@ def animate_command(request: AnimateRequest) -> int:
 
 
 def refuse_existing(output: Path, force: bool) -> None:
-    """Check that there is no file of that name, nor anything in a folder of it, or that it may be written over.
-
-    Raises
-    ------
-    InputError
-        It may not.
-    """
+    """Check that there is no file of that name, nor anything in a folder of it, or that it may be written over."""
     if force or not output.exists() or (output.is_dir() and not any(output.iterdir())):
         return
     raise InputError(

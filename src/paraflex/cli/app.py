@@ -10,9 +10,9 @@ from typing import Annotated
 import typer
 
 from paraflex.cli.collected import collecting
-from paraflex.cli.commands import shell
 from paraflex.cli.commands.once import Command
 from paraflex.cli.commands.requests import with_options
+from paraflex.cli.commands.shell import COMMANDS
 from paraflex.errors import InputError, ParaflexError
 
 app = typer.Typer(
@@ -23,28 +23,10 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-# In the order of `paraflex --help`.
-for _command in (
-    shell.run,
-    shell.verify,
-    shell.report,
-    shell.compare_methods,
-    shell.sensitivity,
-    shell.sweep,
-    shell.optimise,
-    shell.identify,
-    shell.indices,
-    shell.animate,
-    shell.plot,
-    shell.export,
-    shell.modes,
-    shell.methods,
-    shell.info,
-    shell.new,
-    shell.schema,
-):
-    app.command(cls=Command)(with_options(_command))
-app.command("optimize", cls=Command, hidden=True)(with_options(shell.optimise))
+for _one in COMMANDS:
+    app.command(_one.name, cls=Command, help=_one.help)(with_options(_one.request, _one.answer))
+    if _one.name == "optimise":
+        app.command("optimize", cls=Command, hidden=True, help=_one.help)(with_options(_one.request, _one.answer))
 
 BAD_INPUT, TROUBLE, INTERRUPTED = 2, 1, 130
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from typing import Any
 
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import CompareRequest
@@ -31,7 +30,6 @@ from paraflex.errors import AssemblyError, InputError
 from paraflex.files import Model, load
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
-from paraflex.plots import save_work_precision
 from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_case, tracking_case
 
 
@@ -46,12 +44,20 @@ def compare_command(request: CompareRequest) -> int:
     say_replaced(folder, "comparison of methods")
     compile_kernels_for(model.mechanism, console.print)
     began = time.perf_counter()
-    case = _motion(model, request) if mode is None else _tracking(model, request, mode)
-    study = ComparisonStudy(case, methods, options, _parameters(model, case, options))
+    if mode is None:
+        case = _motion(model, request)
+    else:
+        path, name = find_path(model, request.path)
+        case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
+    asked = {"mechanism": model.source, "limit": options.limit, "repetitions": options.repetitions}
+    asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
+    study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
     with counting(console) as report:
         comparison = study.run(folder, on_progress=report)
     figures = comparison.to_dict()
     if comparison.measurements:
+        from paraflex.plots import save_work_precision
+
         save_work_precision(figures, folder / "figures")
     if request.json:
         print(json.dumps(figures, indent=2))
@@ -95,11 +101,6 @@ def _mode(model: Model, request: CompareRequest) -> str | None:
     return None
 
 
-def _tracking(model: Model, request: CompareRequest, mode: str) -> Case:
-    path, name = find_path(model, request.path)
-    return tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-
-
 def _motion(model: Model, request: CompareRequest) -> Case:
     study, mechanism = own_motion(model, request.plan), model.mechanism
     assert study.duration is not None
@@ -112,11 +113,3 @@ def _motion(model: Model, request: CompareRequest) -> Case:
         raise of_assembly(error, model) from error
     except InputError as error:
         raise at_fault(error, model) from None
-
-
-def _parameters(model: Model, case: Case, options: ComparisonOptions) -> dict[str, Any]:
-    asked = {"mechanism": model.source, "limit": options.limit, "repetitions": options.repetitions}
-    return {
-        "model": dict(model.parameters),
-        "run": asked | {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name},
-    }

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from paraflex.cli.tables import number, plain_table
+from paraflex.cli.tables import number, plain_table, print_titled
 
 _KEPT = {
     "gap\n[m]": "constraint_position_max",
@@ -35,50 +34,42 @@ def print_comparison(console: Console, figures: dict[str, Any]) -> None:
         f"(as far as {reference['check_method']} at {reference['check_tolerance']:g} m is off).",
         soft_wrap=True,
     )
-    told = {name: method for name, method in figures["methods"].items() if _complete(method)}
-    if told:
-        for title, table in (
-            ("Error, time, violation of constraints, imbalance of energy", _precision(told, reference["uncertainty"])),
-            ("Work", _work(told)),
-            ("Wall time to an error [s]; the last column at 1e-5 m", _times(told, figures)),
-        ):
-            console.print(title)
-            console.print(table)
+    done = {
+        name: [run for run in method["runs"] if run["status"] == "complete"]
+        for name, method in figures["methods"].items()
+    }
+    if any(done.values()):
+        _print_tables(console, figures, [(name, run) for name, runs in done.items() for run in runs])
     _print_reasons(console, figures["methods"])
     fastest = [f"{level} m {name}" for level, name in figures["fastest"].items() if name is not None]
     if fastest:
         console.print(f"Fastest: {', '.join(fastest)}", soft_wrap=True)
 
 
-def _complete(method: dict[str, Any]) -> list[dict[str, Any]]:
-    return [run for run in method["runs"] if run["status"] == "complete"]
-
-
-def _precision(methods: dict[str, Any], uncertainty: float) -> Table:
-    table = plain_table("method", numbers=(_SETTING, "error\n[m]", "wall\n[s]", *_KEPT))
-    for name, method in methods.items():
-        for run in _complete(method):
-            error = f"{run['error']:.1e}" if run["error"] > uncertainty else f"<{uncertainty:.0e}"
-            kept = (number(run[key], ".1e") for key in _KEPT.values())
-            table.add_row(name, _setting(run), error, f"{run['wall_time']:.3g}", *kept)
-    return table
-
-
-def _work(methods: dict[str, Any]) -> Table:
-    table = plain_table("method", numbers=(_SETTING, *_COUNTS))
-    for name, method in methods.items():
-        for run in _complete(method):
-            table.add_row(name, _setting(run), *(str(run[key]) for key in _COUNTS.values()))
-    return table
-
-
-def _times(methods: dict[str, Any], figures: dict[str, Any]) -> Table:
-    levels = list(figures["fastest"])
-    table = plain_table("method", numbers=(*(f"{level} m" for level in levels), "x TR-BDF2"))
-    for name, method in methods.items():
-        times = (number(method["time_to_reach"][level], ".3g") for level in levels)
-        table.add_row(name, *times, number(method["relative_time"], ".2f"))
-    return table
+def _print_tables(console: Console, figures: dict[str, Any], done: list[tuple[str, dict[str, Any]]]) -> None:
+    """Tables of the complete runs, each with its method's name."""
+    uncertainty = figures["reference"]["uncertainty"]
+    precision = (
+        [
+            name,
+            _setting(run),
+            f"{run['error']:.1e}" if run["error"] > uncertainty else f"<{uncertainty:.0e}",
+            f"{run['wall_time']:.3g}",
+            *(number(run[key], ".1e") for key in _KEPT.values()),
+        ]
+        for name, run in done
+    )
+    table = plain_table("method", numbers=(_SETTING, "error\n[m]", "wall\n[s]", *_KEPT), rows=precision)
+    print_titled(console, "Error, time, violation of constraints, imbalance of energy", table)
+    work = ([name, _setting(run), *(str(run[key]) for key in _COUNTS.values())] for name, run in done)
+    print_titled(console, "Work", plain_table("method", numbers=(_SETTING, *_COUNTS), rows=work))
+    levels, methods = list(figures["fastest"]), {name: figures["methods"][name] for name, _ in done}
+    times = (
+        [name, *(number(one["time_to_reach"][level], ".3g") for level in levels), number(one["relative_time"], ".2f")]
+        for name, one in methods.items()
+    )
+    table = plain_table("method", numbers=(*(f"{level} m" for level in levels), "x TR-BDF2"), rows=times)
+    print_titled(console, "Wall time to an error [s]; the last column at 1e-5 m", table)
 
 
 def _print_reasons(console: Console, methods: dict[str, Any]) -> None:

@@ -6,14 +6,16 @@ import json
 import re
 from pathlib import Path
 
+from paraflex.cli.commands.models import NewRequest, SchemaRequest
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_text, model_schema
 from paraflex.writing import write_text
 
 
-def new_command(name: str, template: str) -> None:
+def new_command(request: NewRequest) -> None:
     """Write a commented model file of this name, to edit."""
+    name, template = request.name, request.template
     try:
         text = library_text(template)
     except InputError as error:
@@ -28,6 +30,6 @@ def new_command(name: str, template: str) -> None:
     console.print(f"  paraflex info {path}\n  paraflex run --mechanism {path}", soft_wrap=True)
 
 
-def schema_command() -> None:
+def schema_command(_: SchemaRequest) -> None:
     """Print the JSON Schema of model files."""
     print(json.dumps(model_schema(), indent=2))

@@ -16,13 +16,18 @@ def identify_command(request: SearchRequest) -> int:
 def _report(result: IdentificationResult) -> None:
     console = plain_console()
     found = result.confidence
-    console.print(parameter_table(result, deviation=_deviations(result)))
-    table = plain_table("mode", "path", "metric", numbers=("target", "start", "reached", "residual"))
-    for each in result.targets:
-        target = each.target
-        numbers = [f"{value:.5g}" for value in (target.value, each.start, each.reached)]
-        table.add_row(target.mode, target.path, target.column, *numbers, f"{each.residual:+.3g}")
-    console.print(table)
+    # Half-widths of intervals of 68 %.
+    known = {} if found is None else found.deviations
+    widths = {name: known.get(name) for name in result.values}
+    deviations = {name: "not given" if value is None else f"{value:.2g}" for name, value in widths.items()}
+    console.print(parameter_table(result, deviation=deviations))
+    rows = (
+        [one.target.mode, one.target.path, one.target.column,
+         *(f"{value:.5g}" for value in (one.target.value, one.start, one.reached)), f"{one.residual:+.3g}"]
+        for one in result.targets
+    )  # fmt: skip
+    heads = ("target", "start", "reached", "residual")
+    console.print(plain_table("mode", "path", "metric", numbers=heads, rows=rows))
     console.print(f"root mean square residual {result.residual:.4g}, {result.start_residual:.4g} at the start")
     console.print(f"derivatives: {result.derivatives or 'none were needed'}", soft_wrap=True)
     if found is None:
@@ -39,11 +44,3 @@ def _report(result: IdentificationResult) -> None:
             f"the targets cannot tell the parameters apart (condition {found.condition:.3g}): they hardly change along "
             f"{described}, in shares of the ranges"
         )
-
-
-def _deviations(result: IdentificationResult) -> dict[str, str]:
-    """Half-widths of intervals of 68 %, or that there are none."""
-    if result.confidence is None:
-        return dict.fromkeys(result.values, "not given")
-    described = result.confidence.deviations
-    return {name: "not given" if value is None else f"{value:.2g}" for name, value in described.items()}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 
-from paraflex.campaign import Progress
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import IndicesRequest
 from paraflex.cli.request import COMPLETE, INTERRUPTED
@@ -21,11 +20,10 @@ def indices_command(request: IndicesRequest) -> int:
     compile_kernels_for(study.sweep.model().mechanism, console.print)
     with bars(console, "{task.completed}/{task.total}") as progress:
         bar = progress.add_task(study.sweep.name, total=study.sweep.runs)
-
-        def tell(at: Progress) -> None:
-            progress.update(bar, completed=at.done)
-
-        result = sobol_indices(study, request.folder, on_progress=tell, **request.workers.given)
+        result = sobol_indices(
+            study, request.folder, on_progress=lambda at: progress.update(bar, completed=at.done),
+            **request.workers.given,
+        )  # fmt: skip
     if not result.complete:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED
@@ -42,16 +40,17 @@ def indices_command(request: IndicesRequest) -> int:
 
 def _report(result: IndicesResult) -> None:
     title = "Sobol indices and half the width of their intervals of 95 %"
-    table = plain_table("metric", "path", "mode", "parameter", numbers=("first", "±", "total", "±"), title=title)
-    for each in result.indices:
-        for row in each.rows():
-            keys = ("first", "first_confidence", "total", "total_confidence")
-            table.add_row(each.metric, each.path, each.mode, row["parameter"], *(number(row[k], ".3f") for k in keys))
+    keys = ("first", "first_confidence", "total", "total_confidence")
+    rows = (
+        [each.metric, each.path, each.mode, row["parameter"], *(number(row[key], ".3f") for key in keys)]
+        for each in result.indices
+        for row in each.rows()
+    )
+    heads = ("first", "±", "total", "±")
     console = plain_console()
-    console.print(table)
+    console.print(plain_table("metric", "path", "mode", "parameter", numbers=heads, rows=rows, title=title))
     for each in result.indices:
         if each.dropped:
-            left_out = (
-                f"{each.metric}, {each.path}, {each.mode}: {each.dropped} of {each.dropped + each.samples} base samples"
-            )
-            console.print(f"{left_out} left out: not all their runs are complete", soft_wrap=True)
+            share = f"{each.dropped} of {each.dropped + each.samples} base samples"
+            where = f"{each.metric}, {each.path}, {each.mode}"
+            console.print(f"{where}: {share} left out: not all their runs are complete", soft_wrap=True)

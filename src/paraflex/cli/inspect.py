@@ -61,13 +61,7 @@ def library() -> list[dict[str, Any]]:
 
 
 def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]:
-    """The facts `paraflex info` prints.
-
-    Raises
-    ------
-    InputError
-        An unknown assembly or path, or a time that the pose cannot be told of.
-    """
+    """The facts `paraflex info` prints."""
     request = request or InfoRequest()
     mechanism = model.mechanism
     seen = examine(mechanism, request.assembly or model.study.assembly)

@@ -39,8 +39,10 @@ def print_facts(facts: dict[str, Any]) -> None:
     if facts["description"]:
         console.print(facts["description"])
     console.print(_counts(facts))
-    _print_loops(console, facts)
-    _print_redundancies(console, facts)
+    loops = [f"loop {k + 1}: {_some(loop)}" for k, loop in enumerate(facts["loops"])]
+    _print_some(console, loops, facts["loop_count"], " loops")
+    redundancies = [f"redundant: {one['row']}, among {_some(one['among'])}" for one in facts.get("redundancies", [])]
+    _print_some(console, redundancies, len(redundancies))
     _print_starts(console, facts)
     if "drives" in facts:
         _print_drives(console, facts)
@@ -93,8 +95,7 @@ def _counts(facts: dict[str, Any]) -> Table:
     ):
         if key in facts:
             value = facts[key]
-            text = _some(value) if isinstance(value, list) else f"{value:g}"
-            table.add_row(label, text or "none")
+            table.add_row(label, (_some(value) or "none") if isinstance(value, list) else f"{value:g}")
     return table
 
 
@@ -104,19 +105,12 @@ def _some(names: Sequence[Any]) -> str:
     return f"{text} and {len(names) - _LISTED} more" if len(names) > _LISTED else text
 
 
-def _print_loops(console: Console, facts: dict[str, Any]) -> None:
-    for k, loop in enumerate(facts["loops"][:_LISTED]):
-        console.print(f"loop {k + 1}: {_some(loop)}", soft_wrap=True)
-    if facts["loop_count"] > _LISTED:
-        console.print(f"and {facts['loop_count'] - _LISTED} more loops")
-
-
-def _print_redundancies(console: Console, facts: dict[str, Any]) -> None:
-    redundancies = facts.get("redundancies", [])
-    for one in redundancies[:_LISTED]:
-        console.print(f"redundant: {one['row']}, among {_some(one['among'])}", soft_wrap=True)
-    if len(redundancies) > _LISTED:
-        console.print(f"and {len(redundancies) - _LISTED} more")
+def _print_some(console: Console, lines: Sequence[str], count: int, what: str = "") -> None:
+    """As many lines as are worth reading, and how many more there are."""
+    for line in lines[:_LISTED]:
+        console.print(line, soft_wrap=True)
+    if count > _LISTED:
+        console.print(f"and {count - _LISTED} more{what}")
 
 
 def _print_starts(console: Console, facts: dict[str, Any]) -> None:

@@ -78,13 +78,7 @@ def _parameter(text: str) -> tuple[str, float]:
 
 
 def parse_event(text: str) -> Event:
-    """Read an event: "joint:A1=0.1..1.4", "deflection:link1=0.002", "singular=0.05", "singular:tau1,tau5=0.05".
-
-    Raises
-    ------
-    InputError
-        Anything else.
-    """
+    """Read an event: "joint:A1=0.1..1.4", "deflection:link1=0.002", "singular=0.05", "singular:tau1,tau5=0.05"."""
     what, sign, value = text.rpartition("=")
     kind, colon, name = (part.strip() for part in what.partition(":"))
     named = bool(colon and name)

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
+from paraflex.cli.commands.models import ModesRequest
 from paraflex.cli.request import find_path
 from paraflex.cli.tables import plain_console
 from paraflex.dynamics import build_system, closure_of, mobility, reach
@@ -26,12 +27,12 @@ _SAMPLES = 201
 _TRIED, _LISTED = 20_000, 20
 
 
-def modes_command(source: str, path: str | None, as_json: bool) -> None:
+def modes_command(request: ModesRequest) -> None:
     """List the actuation modes with the condition of their actuation matrix along a path.
 
     Of a model that names none: the sets of motors that could be asked for.
     """
-    model = load(source)
+    model, path = load(request.model.name), request.path
     effort = _effort(model, path)
     named = _named_modes(model)
     rows, more = [_row(mode, effort) for mode in named], 0
@@ -41,7 +42,7 @@ def modes_command(source: str, path: str | None, as_json: bool) -> None:
         row["declared"] = bool(named)
     for line in _explain(model, path, rows, more):
         plain_console(stderr=True).print(line, soft_wrap=True)
-    if as_json:
+    if request.json:
         print(json.dumps(rows, indent=2))
     elif rows:
         plain_console().print(_table(model, rows))
@@ -104,21 +105,21 @@ def _sets_of_pose(model: Model) -> Iterable[tuple[str, ...]]:
 def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: int) -> list[str]:
     """What the table does not say: what its rows are, where no modes are named, and what is missing for the rest."""
     mechanism = model.mechanism
-    said = []
+    lines = []
     if not rows:
-        said.append(f"{mechanism.name} has no motors, hence no actuation modes: add [motor] with a joint for each")
+        lines.append(f"{mechanism.name} has no motors, hence no actuation modes: add [motor] with a joint for each")
     elif not rows[0]["declared"]:
         sets = "the smallest sets of motors that suffice, and all motors" if len(rows) > 1 else "all motors"
         left = f" ({more} more sets suffice)" if more else ""
-        said.append(
+        lines.append(
             f"{mechanism.name} has no [mode] tables; listed are {sets}{left}: "
             f"ask for some by --mode {','.join(rows[0]['motors'])}"
         )
     if not model.paths and path is None:
-        said.append(f"{mechanism.name} has no path: add [path.NAME], or name a file by --path, to see what drives it")
+        lines.append(f"{mechanism.name} has no path: add [path.NAME], or name a file by --path, to see what drives it")
     elif mechanism.end_effector is None:
-        said.append(f"{mechanism.name} has no [end_effector] to follow a path: what drives it cannot be said")
-    return said
+        lines.append(f"{mechanism.name} has no [end_effector] to follow a path: what drives it cannot be said")
+    return lines
 
 
 def _table(model: Model, rows: list[dict[str, Any]]) -> Table:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -29,6 +28,7 @@ from paraflex.cli.request import (
     say_where,
 )
 from paraflex.cli.tables import FINISHED, plain_console, validity, warn_of_doubts
+from paraflex.cli.writing import write_run
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
 from paraflex.errors import AssemblyError, InputError, IntegrationError
@@ -36,8 +36,7 @@ from paraflex.files import Model, StudyDefaults
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion
-from paraflex.results import motion_dataset, motion_summary, save_results
-from paraflex.writing import write_json
+from paraflex.results import motion_dataset, motion_summary
 
 # Singular positions listed one by one.
 _NAMED = 4
@@ -80,7 +79,7 @@ def run_motion(
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     figures = motion_summary(data)
-    _write(data, figures, folder, report=request.report)
+    write_run(data, figures, folder, report=request.report)
     warn_of_doubts(console if request.json else plain_console(), figures)
     if request.json:
         print(json.dumps(figures, indent=2))
@@ -126,13 +125,7 @@ def _simulate(
 
 
 def own_motion(model: Model, chosen: PlanChoice) -> StudyDefaults:
-    """The study of a model without a path, with what is chosen of it.
-
-    Raises
-    ------
-    InputError
-        Nothing says how long it is to run.
-    """
+    """The study of a model without a path, with what is chosen of it."""
     study = model.study.filled(**asdict(chosen))
     if study.duration is None:
         raise InputError(
@@ -196,16 +189,3 @@ def _report(figures: dict, data: xr.Dataset) -> None:
         f"imbalance of energy {figures['energy_balance_max']:.1e} J"
     )
     validity(out, {"": figures["validity"]})
-
-
-def _write(data: xr.Dataset, figures: dict, folder: Path, *, report: bool) -> None:
-    from paraflex.plots import save_overview
-
-    folder.mkdir(parents=True, exist_ok=True)
-    save_results(data, folder / "results.nc")
-    write_json(folder / "summary.json", figures)
-    save_overview(data, folder / "figures")
-    if report:
-        from paraflex.report import motion_page, save_page
-
-        save_page(motion_page(data), folder / "report.html")

@@ -16,10 +16,9 @@ def optimise_command(request: SearchRequest) -> int:
 def _report(result: OptimisationResult) -> None:
     console = plain_console()
     console.print(parameter_table(result))
-    table = plain_table("", numbers=("start", "best"))
-    table.add_row("objective", f"{result.start_objective:.6g}", f"{result.objective:.6g}")
-    for name, value in result.metrics.items():
-        table.add_row(name, f"{result.start_metrics[name]:.6g}", f"{value:.6g}")
-    console.print(table)
+    values = [("objective", result.start_objective, result.objective)]
+    values += [(name, result.start_metrics[name], value) for name, value in result.metrics.items()]
+    rows = ([name, f"{start:.6g}", f"{best:.6g}"] for name, start, best in values)
+    console.print(plain_table("", numbers=("start", "best"), rows=rows))
     if not result.holds_limits:
         console.print("no design holds all limits; this one passes them least")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,9 @@ def say_replaced(folder: Path, kind: str) -> None:
     kind : str
         Of the results that the command writes: "run", "verification", "comparison of methods" or "sensitivity".
     """
-    there = _kind_of(folder, kind)
+    # Of several kinds that lie there a sweep, else that which is written.
+    order = dict.fromkeys(["sweep", kind, *_FILES])
+    there = next((one for one in order if any((folder / name).is_file() for name in _FILES[one])), None)
     if there is None:
         return
     if there == kind:
@@ -45,70 +46,42 @@ def say_replaced(folder: Path, kind: str) -> None:
     )
 
 
-def _kind_of(folder: Path, written: str) -> str | None:
-    """The kind of results that lie in a folder: of several a sweep, else that which is written."""
-    order = dict.fromkeys(["sweep", written, *_FILES])
-    return next((kind for kind in order if any((folder / name).is_file() for name in _FILES[kind])), None)
-
-
 def _described(folder: Path, kind: str) -> str:
     file = next(folder / name for name in _FILES[kind] if (folder / name).is_file())
     when = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime))
     try:
-        text = _TEXTS[kind](folder, _read(folder / _FILES[kind][0]))
+        text = _what(folder, kind, read_json(folder / _FILES[kind][0]))
     except (KeyError, TypeError, AttributeError):
         # Damaged, or of another version: it is replaced all the same.
         text = f"a {kind}"
     return f"{text}, {when}"
 
 
-def _read(file: Path) -> Any:
+def read_json(file: Path) -> Any:
+    """What a file of JSON holds; nothing of one that cannot be read, or that is no table."""
     try:
-        return json.loads(file.read_text(encoding="utf-8"))
+        found = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
+    return found if isinstance(found, dict) else {}
 
 
-def _run(_: Path, found: dict[str, Any], what: str = "a run") -> str:
+def _what(folder: Path, kind: str, found: dict[str, Any]) -> str:
+    """What the first file of some results tells of them."""
+    if kind == "sensitivity":
+        return f'sensitivities "{found["name"]}"'
+    if kind == "sweep":
+        searched = read_json(folder / "result.json").get("kind", "sweep")
+        kind = "study of indices" if (folder / "indices.json").is_file() else searched
+        article = "an" if kind[0] in "aeiou" else "a"
+        number = found.get("runs")
+        runs = f" of {number} run{'' if number == 1 else 's'}" if number else ""
+        return f'{article} {kind} "{found["name"]}"{runs}'
+    from paraflex.report.provenance import mechanism_argument
+
     run = found["parameters"]["run"]
-    text = f"{what} of {_mechanism(run['mechanism'])}"
-    if "path" not in run:
+    text = f"a {kind} of {mechanism_argument(run['mechanism'])}"
+    if "path" not in run or kind == "comparison of methods":
         return text
     modes = run["modes"]
     return f'{text} along "{run["path"]}", {"mode " + modes[0] if len(modes) == 1 else f"{len(modes)} modes"}'
-
-
-def _verification(folder: Path, found: dict[str, Any]) -> str:
-    return _run(folder, found, "a verification")
-
-
-def _comparison(_: Path, found: dict[str, Any]) -> str:
-    return f"a comparison of methods of {_mechanism(found['parameters']['run']['mechanism'])}"
-
-
-def _sensitivity(_: Path, found: dict[str, Any]) -> str:
-    return f'sensitivities "{found["name"]}"'
-
-
-def _study(folder: Path, found: dict[str, Any]) -> str:
-    searched = _read(folder / "result.json").get("kind", "sweep")
-    kind = "study of indices" if (folder / "indices.json").is_file() else searched
-    article = "an" if kind[0] in "aeiou" else "a"
-    number = found.get("runs")
-    runs = f" of {number} run{'' if number == 1 else 's'}" if number else ""
-    return f'{article} {kind} "{found["name"]}"{runs}'
-
-
-def _mechanism(source: str) -> str:
-    from paraflex.report.provenance import mechanism_argument
-
-    return mechanism_argument(source)
-
-
-_TEXTS: dict[str, Callable[[Path, Any], str]] = {
-    "sweep": _study,
-    "verification": _verification,
-    "comparison of methods": _comparison,
-    "sensitivity": _sensitivity,
-    "run": _run,
-}

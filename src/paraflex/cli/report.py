@@ -9,6 +9,7 @@ from typing import Any
 import xarray as xr
 from rich.console import Console
 
+from paraflex.cli.commands.results import ReportRequest
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.report import Page, motion_page, save_page, tracking_page, verification_page
@@ -16,20 +17,14 @@ from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
 
 
-def report_command(results: str, output: str | None, *, force: bool) -> None:
-    """Write a report.
-
-    Raises
-    ------
-    InputError
-        No results of ours, or a file that would be written over.
-    """
-    study = study_of(Path(results))
-    file = study / "results.parquet" if study is not None else results_file(results)
-    target = file.with_name("report.html") if output is None else Path(output)
+def report_command(request: ReportRequest) -> None:
+    """Write a report."""
+    study = study_of(Path(request.results))
+    file = study / "results.parquet" if study is not None else results_file(request.results)
+    target = file.with_name("report.html") if request.output is None else Path(request.output)
     if target.is_dir():
         target = target / "report.html"
-    if target.exists() and not force:
+    if target.exists() and not request.force:
         raise InputError("is there already", field=str(target), remedy="say --force to write over it, or --output FILE")
     if study is None:
         save_page(page_of(open_results(file), file.parent), target)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
-from pathlib import Path
 
 from rich.console import Console
 from rich.progress import TimeElapsedColumn
 
-from paraflex.campaign import Progress
+from paraflex.campaign import OnProgress, Progress
 from paraflex.checks import check_planned
 from paraflex.cli.bars import bars
 from paraflex.cli.collected import collected
@@ -32,6 +33,7 @@ from paraflex.cli.request import (
     with_frames,
 )
 from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of, warn_of_doubts
+from paraflex.cli.writing import write_run
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -40,7 +42,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, finite_segments, proportional_segments
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.simulate import TrackingRun, TrackingTask, simulate
-from paraflex.studies import Simulator, StudyResult, TrackingStudy
+from paraflex.studies import Simulator, TrackingStudy
 
 
 def run_command(request: RunRequest) -> int:
@@ -75,7 +77,8 @@ def run_command(request: RunRequest) -> int:
         task, modes, options, parameters, _method(request, options), model.study.error, warning=False, findings=doubts
     )
     try:
-        result = _simulate(console, study)
+        with _progress(console, task, modes) as report:
+            result = study.run(on_progress=report)
     except InputError as error:
         warn_of(console, collected(doubts))
         raise at_fault(error, model) from None
@@ -84,8 +87,8 @@ def run_command(request: RunRequest) -> int:
         failures(console, result)
         return INTERRUPTED if result.interrupted else TROUBLE
     keep_findings(result.data, collected(verdict_of(result.data)))
-    _write(result, folder, report=request.report)
     figures = result.to_dict()
+    write_run(result.data, figures, folder, report=request.report)
     if request.json:
         warn_of_doubts(console, figures)
         print(json.dumps(figures, indent=2))
@@ -147,12 +150,8 @@ def _check_fidelity(request: RunRequest) -> None:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
     for flag, value in given_flags(request).items():
         if request.ked:
-            raise InputError(
-                "means nothing with --ked",
-                field=flag,
-                value=value,
-                remedy="its steps are fixed, its start undeformed, its motors held",
-            )
+            remedy = "its steps are fixed, its start undeformed, its motors held"
+            raise InputError("means nothing with --ked", field=flag, value=value, remedy=remedy)
 
 
 def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
@@ -174,12 +173,7 @@ def asked_mechanism(model: Model, request: RunRequest) -> Mechanism:
 
 
 def _parameters(
-    model: Model,
-    path: str,
-    modes: list[ActuationMode],
-    task: TrackingTask,
-    how: dict,
-    request: RunRequest,
+    model: Model, path: str, modes: list[ActuationMode], task: TrackingTask, how: dict, request: RunRequest
 ) -> dict:
     return {
         "model": dict(model.parameters),
@@ -202,26 +196,15 @@ def _parameters(
     }
 
 
-def _simulate(console: Console, study: TrackingStudy) -> StudyResult:
-    end = float(study.task.motion.t[-1])
+@contextmanager
+def _progress(console: Console, task: TrackingTask, modes: list[ActuationMode]) -> Iterator[OnProgress]:
+    """A bar of each mode."""
+    end = float(task.motion.t[-1])
     with bars(console, "{task.completed:.3f}/{task.total:.3f} s", TimeElapsedColumn()) as progress:
-        names = [study.task.mode(mode).name for mode in study.modes]
-        of_mode = {name: progress.add_task(name, total=end, start=False) for name in names}
+        of_mode = {mode.name: progress.add_task(mode.name, total=end, start=False) for mode in modes}
 
         def report(at: Progress) -> None:
             progress.start_task(of_mode[at.doing])
             progress.update(of_mode[at.doing], completed=at.done)
 
-        return study.run(on_progress=report)
-
-
-def _write(result: StudyResult, folder: Path, *, report: bool) -> None:
-    from paraflex.plots import save_figures
-
-    assert result.data is not None
-    result.save(folder)
-    save_figures(result.data, folder / "figures")
-    if report:
-        from paraflex.report import save_page, tracking_page
-
-        save_page(tracking_page(result.data, result.failed), folder / "report.html")
+        yield report

@@ -52,18 +52,18 @@ def parameter_table(result: R, **columns: dict[str, str]) -> Table:
     table.add_column("", no_wrap=True)
     for name, value in result.values.items():
         more = [column.get(name, "") for column in columns.values()]
-        bound = result.bounds.get(name)
-        table.add_row(name, f"{result.start[name]:.6g}", f"{value:.6g}", *more, f"at its {bound}" if bound else "")
+        bound = f"at its {result.bounds[name]}" if name in result.bounds else ""
+        table.add_row(name, f"{result.start[name]:.6g}", f"{value:.6g}", *more, bound)
     return table
 
 
 def _with_bar(console: Console, study: DesignStudy, request: SearchRequest, look: Callable[..., R], what: str) -> R:
-    with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[told]}") as progress:
-        bar = progress.add_task(study.name, total=study.search.evaluations, told="")
+    with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[best]}") as progress:
+        bar = progress.add_task(study.name, total=study.search.evaluations, best="")
 
         def tell(at: Progress) -> None:
-            told = "" if at.best is None else f"{what} {at.best:.4g}"
-            progress.update(bar, completed=at.done, told=told)
+            best = "" if at.best is None else f"{what} {at.best:.4g}"
+            progress.update(bar, completed=at.done, best=best)
 
         return look(study, request.folder, on_progress=tell, **request.workers.given)
 

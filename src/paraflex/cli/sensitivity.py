@@ -13,7 +13,7 @@ from rich.table import Table
 from paraflex.cli.commands.studies import SensitivityRequest
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import COMPLETE
-from paraflex.cli.tables import number, plain_console, plain_table, warn_of_doubts
+from paraflex.cli.tables import number, plain_console, plain_table, print_titled, warn_of_doubts
 from paraflex.errors import InputError
 from paraflex.plots import save_elasticities
 from paraflex.studies import Sensitivities, load_sensitivities
@@ -25,7 +25,8 @@ _COLUMNS = 4
 
 def sensitivity_command(request: SensitivityRequest) -> int:
     """Differentiate the runs of a study; write sensitivity.json, the table and figures. The exit code."""
-    study = load_sensitivities(request.study, [name for entry in request.metrics for name in _names(entry)])
+    named = [name.strip() for entry in request.metrics for name in entry.split(",")]
+    study = load_sensitivities(request.study, [name for name in named if name])
     folder = request.folder
     study = replace(study, at=_values(request.at))
     # Told of the first path when the folder is seen to be this study's.
@@ -41,10 +42,6 @@ def sensitivity_command(request: SensitivityRequest) -> int:
         _print(console, found, row)
     console.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
     return COMPLETE
-
-
-def _names(entry: str) -> list[str]:
-    return [name.strip() for name in entry.split(",") if name.strip()]
 
 
 def _values(entries: list[str]) -> dict[str, float]:
@@ -64,11 +61,11 @@ def _print(console: Console, found: Sensitivities, row: int) -> None:
     where, relative = f"{found.mechanism}, {path}, mode {mode}", found.relative
     for first in range(0, len(found.parameters), _COLUMNS):
         some = slice(first, first + _COLUMNS)
-        # Not the table's own title: that is broken at the table's width.
-        console.print(f"{where}: change of metrics by that of parameters [% / %]", soft_wrap=True)
-        console.print(_table(found, row, relative[row, :, some], some, "+.2f"))
-        console.print("Derivatives, in the units of metrics and parameters", soft_wrap=True)
-        console.print(_table(found, row, found.derivatives[row, :, some], some, ".2e"))
+        for title, values, form in (
+            (f"{where}: change of metrics by that of parameters [% / %]", relative, "+.2f"),
+            ("Derivatives, in the units of metrics and parameters", found.derivatives, ".2e"),
+        ):
+            print_titled(console, title, _table(found, row, values[row, :, some], some, form))
 
 
 def _table(found: Sensitivities, row: int, shown: NDArray[np.float64], some: slice, form: str) -> Table:

@@ -28,7 +28,7 @@ def sweep_command(request: SweepRequest) -> int:
     folder = request.folder
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
-    told = request.report and bool(result.done) and _write_report(console, folder)
+    has_report = request.report and bool(result.done) and _write_report(console, folder)
     verdict = study.setting.verdict()
     warn_of(console if request.json else plain_console(), verdict)
     if request.json:
@@ -36,7 +36,7 @@ def sweep_command(request: SweepRequest) -> int:
         print(json.dumps(_figures(result) | {"part": parts, "verdict": verdict.to_dict()}, indent=2))
     else:
         _report(console, result)
-        if told:
+        if has_report:
             console.print(f"report: {folder / REPORT}", soft_wrap=True)
     if result.interrupted:
         return INTERRUPTED
@@ -44,13 +44,13 @@ def sweep_command(request: SweepRequest) -> int:
 
 
 def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequest) -> SweepResult:
-    with bars(console, "{task.completed}/{task.total} runs", "{task.fields[told]}") as progress:
-        bar = progress.add_task(study.name, total=study.runs, told="", start=False)
+    with bars(console, "{task.completed}/{task.total} runs", "{task.fields[pace]}") as progress:
+        bar = progress.add_task(study.name, total=study.runs, pace="", start=False)
 
         def report(at: Progress) -> None:
             left = "" if at.left is None else f", {_clock(at.left)} left"
             progress.start_task(bar)
-            progress.update(bar, completed=at.done, told=f"{at.rate:.1f} runs/s{left}")
+            progress.update(bar, completed=at.done, pace=f"{at.rate:.1f} runs/s{left}")
 
         return sweep(study, folder, limit=request.limit, on_progress=report, **request.workers.given)
 
@@ -73,7 +73,9 @@ def _report(console: Console, result: SweepResult) -> None:
     if result.beyond:
         plain_console().print(f"warning: {beyond_limits(result.beyond)}", soft_wrap=True)
     if result.fresh:
-        console.print(f"{result.fresh} of them in {result.seconds:.1f} s now, {_rate(result)} runs/s")
+        console.print(
+            f"{result.fresh} of them in {result.seconds:.1f} s now, {result.fresh / result.seconds:.1f} runs/s"
+        )
     if result.complete:
         console.print(f"one table: {result.table}", soft_wrap=True)
     else:
@@ -84,10 +86,6 @@ def _figures(result: SweepResult) -> dict:
     places = {"folder": str(result.folder), "table": str(result.table)}
     session = {"fresh": result.fresh, "seconds": result.seconds, "interrupted": result.interrupted}
     return places | result.to_dict() | session
-
-
-def _rate(result: SweepResult) -> str:
-    return f"{result.fresh / result.seconds:.1f}"
 
 
 def _clock(seconds: float) -> str:

@@ -81,25 +81,32 @@ def _after_table(figures: dict[str, Any], task: TrackingTask) -> Table:
     motors = "held by brakes" if held else "free"
     if figures["parameters"]["run"].get("ked"):
         motors = "held all the time"
-    heads = ("motion\n[m]", "after\n[m]", "drift\n[m/s]", "vibration\n[m]", *(["brakes\n[J]"] if held else []))
+    keys = {"motion\n[m]": "tracking_rms_motion", "after\n[m]": "tracking_rms_after", "drift\n[m/s]": "drift_speed",
+            "vibration\n[m]": "residual_vibration"} | ({"brakes\n[J]": "brake_energy"} if held else {})  # fmt: skip
+    ran = {name: mode for name, mode in figures["modes"].items() if "steps" in mode}
+    rows = ([name, *(number(mode[key], ".2e") for key in keys.values())] for name, mode in ran.items())
     title = f"Tracking error during the motion and after it, the motors {motors}"
-    table = plain_table("mode", numbers=heads, title=title)
-    keys = ("tracking_rms_motion", "tracking_rms_after", "drift_speed", "residual_vibration")
-    for name, mode in figures["modes"].items():
-        if "steps" in mode:
-            brakes = [number(mode["brake_energy"], ".2e")] if held else []
-            table.add_row(name, *(number(mode[key], ".2e") for key in keys), *brakes)
-    return table
+    return plain_table("mode", numbers=keys, rows=rows, title=title)
 
 
-def plain_table(*texts: str, numbers: Iterable[str] = (), title: str | None = None) -> Table:
-    """An empty table without frames: columns of text, then of numbers."""
+def plain_table(
+    *texts: str, numbers: Iterable[str] = (), rows: Iterable[Iterable[str]] = (), title: str | None = None
+) -> Table:
+    """A table without frames: columns of text, then of numbers."""
     table = Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
     for heading in texts:
         table.add_column(heading, no_wrap=True)
     for heading in numbers:
         table.add_column(heading, justify="right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
     return table
+
+
+def print_titled(console: Console, title: str, table: Table) -> None:
+    """A table below a title that is not broken at the table's width, as one of its own would be."""
+    console.print(title, soft_wrap=True)
+    console.print(table)
 
 
 def validity(console: Console, verdicts: Mapping[str, Any]) -> None:

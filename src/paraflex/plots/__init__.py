@@ -1,5 +1,20 @@
 """Figures of results, each a function from a dataset, or from figures read of a file, to a Matplotlib figure.
 
+What they have in common:
+
+data, figures, table
+    Results of the kind that `paraflex plot --list` has the figure for: a dataset (from `paraflex.results` or
+    `studies.Verification.dataset`), the plain numbers of a study's result, or its table of designs; or the folder or
+    file that they were written to.
+mode, models, run
+    Which of the runs: an actuation mode, two models of a verification, the number of a run. A mode that may be left
+    out is then the one with most active motors.
+metrics
+    Of many designs; by default the first that vary.
+
+An `InputError` says that results are of another kind or hold nothing to show, or that there is no such mode, model, run
+or metric.
+
 The names below are imported when they are first used: most commands need one or two of them.
 """
 
@@ -16,12 +31,10 @@ if TYPE_CHECKING:
     from paraflex.plots.drawing import mechanism_drawing
     from paraflex.plots.driving import actuation_condition, mode_comparison, mode_conditions, tracking_distance
     from paraflex.plots.energy import energies
-    from paraflex.plots.forces import joint_forces
-    from paraflex.plots.free_motion import coordinates, point_paths
+    from paraflex.plots.free_motion import coordinates, motion_overview, point_paths
     from paraflex.plots.methods import work_precision
     from paraflex.plots.modes import motor_torques, tracking_errors
     from paraflex.plots.optimisation import convergence, sobol_bars, targets_reached
-    from paraflex.plots.overview import motion_overview
     from paraflex.plots.parallel import parallel_coordinates
     from paraflex.plots.phase import link_phases, phase_diagrams
     from paraflex.plots.responses import pareto_front, response_curves
@@ -34,18 +47,14 @@ if TYPE_CHECKING:
         save_work_precision,
     )
     from paraflex.plots.spectra import numerical_damping
-    from paraflex.plots.time_series import end_effector_motion, link_deflections, link_motions, tip_deflections
+    from paraflex.plots.time_series import (
+        end_effector_motion,
+        joint_forces,
+        link_deflections,
+        link_motions,
+        tip_deflections,
+    )
     from paraflex.plots.workspace import desired_path, end_effector_path
-
-_SAVES = (
-    "save_agreement_figures",
-    "save_elasticities",
-    "save_figures",
-    "save_overview",
-    "save_search_figures",
-    "save_work_precision",
-)
-_HOME = homes() | dict.fromkeys(_SAVES, "save") | {"mechanism_drawing": "drawing"}
 
 __all__ = [
     "actuation_condition",
@@ -90,9 +99,12 @@ __all__ = [
 ]
 
 
+_HOMES = homes() | {name: "save" for name in __all__ if name.startswith("save_")}
+
+
 def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(import_module(f"paraflex.plots.{_HOME[name]}"), name)
+    if name in _HOMES:
+        return getattr(import_module(f"paraflex.plots.{_HOMES[name]}"), name)
     raise AttributeError(f"module 'paraflex.plots' has no attribute {name!r}")
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, mode_label, peak, symbol
-from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
-from paraflex.plots.runs import draw_actual, draw_curves, select_run, shade_rest
+from paraflex.plots.layout import is_narrow, panels
+from paraflex.plots.runs import draw_actual, draw_curves, finish_over_time
 from paraflex.plots.scales import mark_powers
+from paraflex.plots.selection import names_of, select_model, select_run
 from paraflex.plots.style import BLUE, VERMILLION, keep_flat, look_of
 from paraflex.plots.time_series import most_deflected
 from paraflex.plots.workspace import deviated_paths
@@ -28,10 +28,7 @@ _PRINTED = {
     "exudyn": "Exudyn",
     "mujoco": "MuJoCo",
 }
-_PAIR: tuple[dict[str, Any], ...] = (
-    {"color": BLUE, "linestyle": "-"},
-    {"color": VERMILLION, "linestyle": (0, (4, 2))},
-)
+_PAIR: tuple[dict[str, Any], ...] = ({"color": BLUE, "linestyle": "-"}, {"color": VERMILLION, "linestyle": (0, (4, 2))})
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
 _SHORTEST = 1e-8
 # Links that a page holds in one column.
@@ -43,56 +40,15 @@ def printed(model: str) -> str:
     return _PRINTED.get(model, model)
 
 
-def select_model(data: xr.Dataset, model: str) -> xr.Dataset:
-    """The runs of one model.
-
-    Raises
-    ------
-    InputError
-        No such model.
-    """
-    names = [str(name) for name in data["model"].values]
-    if model not in names:
-        raise InputError(
-            "no such model in these results", field="model", value=model, remedy="one of " + ", ".join(names)
-        )
-    return data.isel(model=names.index(model))
-
-
-def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
-    """The floating frame's best model and the most independent other one, as Figs. 22 and 23 compare them."""
-    names = [str(name) for name in data["model"].values]
-    ours = next((name for name in ("second-order", "linear") if name in names), None)
-    other = next((name for name in ("segments", "mujoco", "exudyn") if name in names), None)
-    return None if ours is None or other is None else (ours, other)
-
-
 @drawn
 def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure:
     """Angle and angular velocity of every link in two models (Fig. 22).
 
     A link's angle is that of the line from its first end to its last, which every model has. In one column there are
     those of the first six.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `studies.Verification.dataset`.
-    mode : str
-        Actuation mode.
-    models : sequence of str
-        Two of its models.
-
-    Raises
-    ------
-    InputError
-        No such mode or model.
     """
     runs = [select_run(select_model(data, model), mode) for model in models]
-    columns = (
-        ("chord_angle", "angle"),
-        ("chord_velocity", "angular_velocity"),
-    )
+    columns = (("chord_angle", "angle"), ("chord_velocity", "angular_velocity"))
     bodies, time = data["body"].values[: _MOST_NARROW if is_narrow() else None], data["time"].values
     figure, axes = panels(len(bodies), len(columns))
     for column, (variable, quantity) in zip(axes.T, columns, strict=True):
@@ -100,12 +56,10 @@ def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure
         for panel, body in zip(column, bodies, strict=True):
             for run, model, look in zip(runs, models, _PAIR, strict=True):
                 draw_actual(panel, run, time, run[variable].sel(body=body).values, label=printed(model), **look)
-            shade_rest(panel, data)
             keep_flat(panel, scale)
             panel.set_title(f"{symbol(str(body))}: {QUANTITIES[quantity].name}")
             panel.set_ylabel(axis_label(quantity, short=True))
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=21.5)
+    return finish_over_time(figure, axes, data, panel_height=21.5)
 
 
 @drawn
@@ -113,20 +67,8 @@ def compared_deflections(data: xr.Dataset, mode: str) -> Figure:
     """Transverse tip displacement of links in every model that has it, a panel a link.
 
     Those of the two links whose tips move most in the reference, twins of a symmetric mechanism counted once.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `studies.Verification.dataset`.
-    mode : str
-        Actuation mode.
-
-    Raises
-    ------
-    InputError
-        No such mode.
     """
-    runs = {str(name): select_run(select_model(data, str(name)), mode) for name in data["model"].values}
+    runs = {name: select_run(select_model(data, name), mode) for name in names_of(data, "model")}
     bodies = most_deflected(runs[str(data.attrs["reference"])])
     everything = [run["tip_transverse"].sel(body=body).values for run in runs.values() for body in bodies]
     unit = display_unit("m", np.concatenate(everything))
@@ -134,11 +76,9 @@ def compared_deflections(data: xr.Dataset, mode: str) -> Figure:
     for panel, body in zip(axes[:, 0], bodies, strict=True):
         for k, (name, run) in enumerate(runs.items()):
             draw_curves(panel, run, {printed(name): unit.factor * run["tip_transverse"].sel(body=body).values}, first=k)
-        shade_rest(panel, data)
         panel.set_title(f"{symbol(body)}: transverse displacement")
         panel.set_ylabel(axis_label("displacement", unit=unit.name))
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=44.0)
+    return finish_over_time(figure, axes, data, panel_height=44.0)
 
 
 @drawn
@@ -147,19 +87,8 @@ def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnifica
 
     Parameters
     ----------
-    data : xarray.Dataset
-        From `studies.Verification.dataset`.
-    mode : str
-        Actuation mode.
-    models : sequence of str
-        Two of its models.
     magnification : float, optional
         Of the deviations; by default one at which they can be seen.
-
-    Raises
-    ------
-    InputError
-        No such mode or model, or a magnification that is not positive.
     """
     runs = [select_run(select_model(data, model), mode) for model in models]
     return deviated_paths(dict(zip(map(printed, models), runs, strict=True)), magnification, _PAIR)
@@ -167,20 +96,14 @@ def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnifica
 
 @drawn
 def model_distances(data: xr.Dataset) -> Figure:
-    """Distance of the end-effector from its desired place, and from where the reference has it, in every model.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `studies.Verification.dataset`, which names the reference.
-    """
+    """Distance of the end-effector from its desired place, and from where the reference has it, in every model."""
     reference = str(data.attrs["reference"])
-    modes = [str(name) for name in data["mode"].values]
+    modes = names_of(data, "mode")
     time = data["time"].values
     figure, axes = panels(2, len(modes))
     for column, mode in zip(axes.T, modes, strict=True):
         datum = select_run(select_model(data, reference), mode)["end_effector"].values
-        for k, name in enumerate(str(name) for name in data["model"].values):
+        for k, name in enumerate(names_of(data, "model")):
             run = select_run(select_model(data, name), mode)
             place = run["end_effector"].values
             look = look_of(k)
@@ -189,11 +112,9 @@ def model_distances(data: xr.Dataset) -> Figure:
                 shown = np.where(distance > _SHORTEST, distance, np.nan)
                 draw_actual(panel, run, time, 1e3 * shown, label=printed(name), **look)
         for panel, title in zip(column, ("from the desired place", f"from {printed(reference)}"), strict=True):
-            shade_rest(panel, data)
             panel.set_title(f"{mode_label(mode)}: distance {title}")
             if any(peak(np.asarray(line.get_ydata(), dtype=float)) > 0.0 for line in panel.lines):
                 mark_powers(panel)
     for panel in axes[:, 0]:
         panel.set_ylabel(axis_label("distance"))
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=48.0)
+    return finish_over_time(figure, axes, data, panel_height=48.0)

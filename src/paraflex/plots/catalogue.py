@@ -59,7 +59,7 @@ _RUN = (
     ),
     CatalogueFigure("energies", "energy", "kinetic and strain energy, work, and how far they balance", "mode"),
     CatalogueFigure(
-        "joint_forces", "forces", "magnitude of the force in every joint", "mode", variables=("joint_force",)
+        "joint_forces", "time_series", "magnitude of the force in every joint", "mode", variables=("joint_force",)
     ),
     CatalogueFigure("link_deflections", "time_series", "transverse displacement of the ends of all links", "mode"),
     CatalogueFigure("link_phases", "phase", "angular velocity over angle of every body", "mode"),
@@ -98,7 +98,7 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
         *_RUN,
     ),
     "motion": (
-        CatalogueFigure("motion_overview", "overview", "angles, speeds and energies", written_as="motion_overview"),
+        CatalogueFigure("motion_overview", "free_motion", "angles, speeds and energies", written_as="motion_overview"),
         CatalogueFigure("coordinates", "free_motion", "generalised coordinates, those of the bodies' modes included"),
         CatalogueFigure("point_paths", "free_motion", "where named points go in the plane"),
         *_RUN,

@@ -21,31 +21,18 @@ _EM = STYLE["font.size"] / 72.0 * 25.4
 
 @drawn
 def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
-    """By how many per cent each metric changes with one per cent of each parameter: a group of bars a metric.
-
-    Parameters
-    ----------
-    figures : mapping
-        From `studies.Sensitivities.told`, or read from `sensitivity.json`.
-    run : int
-        Which of its runs.
-
-    Raises
-    ------
-    InputError
-        No such run.
-    """
+    """By how many per cent each metric changes with one per cent of each parameter: a group of bars a metric."""
     if not 0 <= run < len(figures["runs"]):
         raise InputError("no such run", field="run", value=run, remedy=f"name one from 0 to {len(figures['runs']) - 1}")
-    told = figures["runs"][run]
-    parameters, metrics = list(figures["parameters"]), list(told["metrics"])
+    shown = figures["runs"][run]
+    parameters, metrics = list(figures["parameters"]), list(shown["metrics"])
     figure, axes = panels(1, 1)
     panel = axes[0, 0]
     # Groups from the top down, in them the parameters in order.
     pitch = len(parameters) * _BAR + _GROUP
     places = -pitch * np.arange(len(metrics))
     for k, parameter in enumerate(parameters):
-        values = [told["metrics"][metric]["relative"][parameter] for metric in metrics]
+        values = [shown["metrics"][metric]["relative"][parameter] for metric in metrics]
         widths = [np.nan if value is None else value for value in values]
         offset = (0.5 * (len(parameters) - 1) - k) * _BAR
         panel.barh(places + offset, widths, 0.9 * _BAR, color=COLOURS[k % len(COLOURS)], label=parameter)
@@ -58,7 +45,7 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
     panel.set_yticks([])
     # Half of the width is the names of the metrics.
     panel.set_xlabel("elasticity [% / %]" if is_narrow() else "change of the metric by change of the parameter [% / %]")
-    panel.set_title(f"{figures['mechanism']}, {told['path']}, {mode_label(told['mode'])}", loc="left")
+    panel.set_title(f"{figures['mechanism']}, {shown['path']}, {mode_label(shown['mode'])}", loc="left")
     lay_out(figure, axes, panel_height=pitch * len(metrics))
     _name_groups(panel, dict(zip(map(metric_name, metrics), places, strict=True)))
     return figure

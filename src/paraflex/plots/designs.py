@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paraflex.campaign import read_table
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit, metric_name
+from paraflex.plots.selection import place_of
 from paraflex.results.metrics import METRICS
 
 Array = NDArray[np.float64]
@@ -54,18 +55,10 @@ class DesignTable:
         )  # fmt: skip
 
     def in_modes(self, modes: Sequence[str]) -> DesignTable:
-        """Runs in some actuation modes.
-
-        Raises
-        ------
-        InputError
-            A mode in which there are no runs.
-        """
+        """Runs in some actuation modes."""
         known = list(dict.fromkeys(self.mode.tolist()))
         for mode in modes:
-            if mode not in known:
-                remedy = "one of " + ", ".join(known)
-                raise InputError("no such mode in these results", field="mode", value=mode, remedy=remedy)
+            place_of(mode, known, "mode")
         return self.only(np.isin(self.mode, list(modes)))
 
     @property
@@ -76,13 +69,7 @@ class DesignTable:
         return {pair: done.only((done.path == pair[0]) & (done.mode == pair[1])) for pair in pairs}
 
     def judged_by(self, names: Sequence[str] | None, most: int) -> list[str]:
-        """The metrics asked for; else the first that vary and are no figures of the solver.
-
-        Raises
-        ------
-        InputError
-            An unknown metric, or none that varies.
-        """
+        """The metrics asked for; else the first that vary and are no figures of the solver."""
         for name in names or ():
             if name not in self.metrics:
                 raise InputError(
@@ -119,13 +106,7 @@ class DesignTable:
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
-    """The table of a study, from the files that `tables_of` its folder names.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read, or is none of ours.
-    """
+    """The table of a study, from the files that `tables_of` its folder names."""
     import pyarrow as pa
 
     try:
@@ -143,11 +124,11 @@ def read_designs(files: Sequence[Path]) -> DesignTable:
     first, last = names.index("mode") + 1, names.index("status")
     judged = [name for name in names[last:] if name not in _LAST and not name.startswith("slope.")]
     columns = {name: table[name].to_numpy().astype(float) for name in (*names[first:last], *judged)}
-    told = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
+    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
     return DesignTable(
         parameters={name: columns[name] for name in names[first:last]},
         metrics={name: columns[name] for name in judged},
-        units={name: told[name] for name in judged},
+        units={name: units[name] for name in judged},
         path=np.array(table["path"].to_pylist(), dtype=str),
         mode=np.array(table["mode"].to_pylist(), dtype=str),
         complete=np.array(table["status"].to_pylist(), dtype=str) == "complete",

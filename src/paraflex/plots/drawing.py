@@ -161,10 +161,6 @@ def mechanism_drawing(
 
     Parameters
     ----------
-    data : xarray.Dataset
-        Of a run, with a path or without, or of a verification.
-    mode : str, optional
-        Actuation mode; the first by default.
     time : float, optional
         [s]; half way by default.
     magnify : float
@@ -175,11 +171,6 @@ def mechanism_drawing(
         [mm]
     theme_name : str
         "light" or "dark".
-
-    Raises
-    ------
-    InputError
-        No such mode, model or theme, a time outside the run, or results without shapes.
     """
     look, width = theme(theme_name), page_width(width)
     run = select(data, mode, model)
@@ -198,8 +189,8 @@ def mechanism_drawing(
     sketch = Sketch(axes, shown, limits, look, width=0.5)
     sketch.show(len(shown.time) - 1)
     draw_scale_bar(figure, sketch.limits, look, (0.98, 1.5 / height), 6.5)
-    told = [shown.mechanism, *([f"mode {mode_label(shown.mode)}"] if shown.mode else [])]
-    figure.text(0.02, 0.985, ", ".join(told), va="top", color=look.ink, fontsize=7.0)
+    title = [shown.mechanism, *([f"mode {mode_label(shown.mode)}"] if shown.mode else [])]
+    figure.text(0.02, 0.985, ", ".join(title), va="top", color=look.ink, fontsize=7.0)
     figure.text(
         0.98, 0.985, f"t = {three_digits(time)} s, {caption(shown)}", va="top", ha="right", color=look.ink, fontsize=7.0
     )

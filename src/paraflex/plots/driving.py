@@ -9,88 +9,62 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label, plain
-from paraflex.plots.layout import ONE_COLUMN, label_outer_time, lay_out, panels
-from paraflex.plots.runs import draw_curves, select_run, shade_rest
-from paraflex.plots.scales import mark_powers
+from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label
+from paraflex.plots.layout import ONE_COLUMN, lay_out, panels
+from paraflex.plots.runs import draw_curves, finish_over_time
+from paraflex.plots.scales import LINE, list_lines, mark_powers
+from paraflex.plots.selection import names_of, select_run
 from paraflex.plots.style import BLUE, GREEN, VERMILLION
 from paraflex.results.following import headline, ranked_by_motion
-
-# Height of a line of a list [mm].
-_LINE = 5.5
 
 
 @drawn
 def actuation_condition(data: xr.Dataset) -> Figure:
-    """Condition number of the actuation matrix along the path in every mode: large near a Type II singularity.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `results.tracking_dataset`.
-    """
-    figure, axes = panels(1, 1)
-    for k, name in enumerate(str(name) for name in data["mode"].values):
-        run = select_run(data, name)
-        # Of the planned motion: it goes on where a run stopped.
-        whole = run.assign(end_effector=run["end_effector_desired"])
-        draw_curves(axes[0, 0], whole, {f"mode {mode_label(name)}": run["actuation_condition"].values}, first=k)
-    axes[0, 0].set_ylabel(axis_label("condition"))
-    mark_powers(axes[0, 0])
-    shade_rest(axes[0, 0], data)
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=56.0)
+    """Condition number of the actuation matrix along the path in every mode: large near a Type II singularity."""
+    # Of the planned motion: it goes on where a run stopped.
+    whole = data.assign(end_effector=data["end_effector_desired"])
+    return _of_all_modes(whole, data["actuation_condition"].transpose("mode", "time").values, "condition")
 
 
 @drawn
 def tracking_distance(data: xr.Dataset) -> Figure:
-    """Distance of the end-effector from its desired place in time, all modes in one panel.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `results.tracking_dataset`.
-    """
-    figure, axes = panels(1, 1)
+    """Distance of the end-effector from its desired place in time, all modes in one panel."""
     away = (data["end_effector"] - data["end_effector_desired"]).transpose("mode", "time", "axis").values
     distance = 1e3 * np.linalg.norm(away, axis=2)
     # What rounding leaves would stretch the axis.
-    shown = np.where(distance > 1e-5, distance, np.nan)
-    for k, name in enumerate(str(name) for name in data["mode"].values):
-        draw_curves(axes[0, 0], select_run(data, name), {f"mode {mode_label(name)}": shown[k]}, first=k)
-    axes[0, 0].set_ylabel(axis_label("distance"))
-    if np.isfinite(shown).any():
+    return _of_all_modes(data, np.where(distance > 1e-5, distance, np.nan), "distance")
+
+
+def _of_all_modes(data: xr.Dataset, values: NDArray[np.float64], quantity: str) -> Figure:
+    """A quantity (modes, samples) of all modes in one panel, on a logarithmic axis."""
+    figure, axes = panels(1, 1)
+    for k, name in enumerate(names_of(data, "mode")):
+        draw_curves(axes[0, 0], select_run(data, name), {f"mode {mode_label(name)}": values[k]}, first=k)
+    axes[0, 0].set_ylabel(axis_label(quantity))
+    if np.isfinite(values).any():
         mark_powers(axes[0, 0])
-    shade_rest(axes[0, 0], data)
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=56.0)
+    return finish_over_time(figure, axes, data, panel_height=56.0)
 
 
 @drawn
 def mode_comparison(data: xr.Dataset) -> Figure:
-    """RMS tracking error (of the motion, or the whole run), residual vibration and largest torque of every mode.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `results.tracking_dataset`.
-    """
+    """RMS tracking error (of the motion, or the whole run), residual vibration and largest torque of every mode."""
     rms, of_motion = headline(data)[0], ranked_by_motion(data)
     efforts = data["peak_torque"].max("motor").values
     label = effort_label(data["torque"].attrs.get("units", "N m"))
     figure, axes = panels(1, 3)
-    modes = [str(name) for name in data["mode"].values]
-    names = [mode_label(name) for name in modes]
+    names = [mode_label(name) for name in names_of(data, "mode")]
     for panel, values, title, colour in (
         (axes[0, 0], rms.values, f"RMS error {'of the motion' if of_motion else 'of the whole run'}", BLUE),
         (axes[0, 1], data["residual_vibration"].values, "residual vibration", GREEN),
     ):
         unit = display_unit("m", values)
         # Modes differ by orders of magnitude, of which bars show only the largest.
-        panel.plot(unit.factor * values, np.arange(len(modes)), "o", color=colour, markersize=4.0)
+        panel.plot(unit.factor * values, np.arange(len(names)), "o", color=colour, markersize=4.0)
         _list_modes(panel, names)
         panel.set_title(title)
         panel.set_xlabel(axis_label("distance", unit=unit.name))
@@ -100,22 +74,17 @@ def mode_comparison(data: xr.Dataset) -> Figure:
     _bars(axes[0, 2], names, efforts, VERMILLION)
     axes[0, 2].set_title(f"largest {label.partition(' [')[0]}")
     axes[0, 2].set_xlabel(label)
-    return lay_out(figure, axes, panel_height=_LINE * len(modes) + 2.0)
+    return lay_out(figure, axes, panel_height=LINE * len(names) + 2.0)
 
 
 @drawn
 def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Worst condition number of the actuation matrix along a path, a bar a mode; modes that cannot drive it are pale.
+    """Worst condition number of the actuation matrix along a path, a bar a mode; those that cannot drive it are pale.
 
     Parameters
     ----------
     rows : sequence of mapping
         What `paraflex modes --json` prints.
-
-    Raises
-    ------
-    InputError
-        No mode has a condition number: there was no path.
     """
     # None is an infinite one.
     known = [row for row in rows if np.isfinite(row.get("condition_max") or np.nan)]
@@ -131,7 +100,7 @@ def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
     mark_powers(panel, "x")
     panel.set_xlim(1.0, None)
     panel.set_xlabel(axis_label("condition") + ", worst along the path")
-    return lay_out(figure, axes, panel_height=_LINE * len(names) + 2.0)
+    return lay_out(figure, axes, panel_height=LINE * len(names) + 2.0)
 
 
 def _bars(panel: Axes, names: list[str], values: Any, colour: str, **look: Any) -> None:
@@ -142,6 +111,5 @@ def _bars(panel: Axes, names: list[str], values: Any, colour: str, **look: Any) 
 
 
 def _list_modes(panel: Axes, names: list[str]) -> None:
-    panel.set_yticks(range(len(names)), [plain(name) for name in names])
-    panel.set_ylim(len(names) - 0.4, -0.6)
+    list_lines(panel, names)
     panel.grid(axis="x", color="0.9", linewidth=0.4)

@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak
-from paraflex.plots.layout import label_outer_time, lay_out, panels
-from paraflex.plots.runs import draw_curves, one_run, shade_rest
+from paraflex.plots.layout import panels
+from paraflex.plots.runs import draw_curves, finish_over_time
 from paraflex.plots.scales import mark_powers
+from paraflex.plots.selection import one_run
 from paraflex.plots.style import ZERO
 
 # Names of the curves, in every figure of energies.
@@ -22,18 +23,6 @@ def energies(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Kinetic and strain energy and the work done on the mechanism; strain energy alone; how far they do not balance.
 
     The imbalance is |kinetic + strain energy - those at the start - work|, at the samples.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `results.tracking_dataset` or `motion_dataset`.
-    mode : str, optional
-        Actuation mode; by default that with most active motors.
-
-    Raises
-    ------
-    InputError
-        No such mode.
     """
     run = one_run(data, mode)
     curves = {label: run[name].values for name, label in ENERGIES.items()}
@@ -50,6 +39,4 @@ def energies(data: xr.Dataset, mode: str | None = None) -> Figure:
         mark_powers(balance)
     for panel in axes.flat:
         panel.set_ylabel(axis_label("energy"))
-        shade_rest(panel, data)
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=34.0)
+    return finish_over_time(figure, axes, data, panel_height=34.0)

@@ -127,10 +127,16 @@ def plan_film(
     runs = [select(data, mode, options.model) for mode in modes] or [select(data, None, options.model)]
     first, last = min(run_times(run)[0] for run in runs), max(run_times(run)[1] for run in runs)
     duration = last - first
-    speed = _round_speed(duration) if options.speed is None else options.speed
+    speed = options.speed
+    if speed is None:
+        # The highest round speed at which a run is not over too soon.
+        speed = next((one for one in _SPEEDS if duration / one >= _SHORTEST), _SPEEDS[-1])
     fps = 100.0 / max(1, round(100.0 / options.fps)) if kind == ".gif" else options.fps
     if kind == ".png":
-        times = _until(first, last, options.at)
+        at = 0.5 * (first + last) if options.at is None else options.at
+        if not first <= at <= last:
+            raise InputError("outside the run", field="at", value=at, remedy=f"choose it from {first:g} to {last:g} s")
+        times = np.linspace(first, at, _TRAIL)
     else:
         count = round(duration / speed * fps) + 1
         if count > _MOST_FRAMES:
@@ -141,13 +147,6 @@ def plan_film(
         times = np.linspace(first, last, max(count, 2))
     scenes = tuple(scene(run, times, options.magnify) for run in runs)
     return Film(scenes, _size(scenes, options.size), fps, speed, theme(options.theme), kind != ".png")
-
-
-def _until(first: float, last: float, at: float | None) -> NDArray[np.float64]:
-    at = 0.5 * (first + last) if at is None else at
-    if not first <= at <= last:
-        raise InputError("outside the run", field="at", value=at, remedy=f"choose it from {first:g} to {last:g} s")
-    return np.linspace(first, at, _TRAIL)
 
 
 def write_film(
@@ -181,35 +180,32 @@ def write_film(
     kind = film_kind(file)
     encoder = find_encoder() if kind == ".mp4" else ""
     film = plan_film(data, modes, options, kind)
-    tell = on_progress or (lambda done, total: None)
+    report = on_progress or (lambda done, total: None)
     whole = whole_file(file, remedy=_ELSEWHERE)
     if kind == "":
         whole = whole_folder(file, replaced="frame_*.png", remedy=_ELSEWHERE)
     with whole as unfinished:
         if kind == ".svg":
             unfinished.write_text(_animated_svg(film), encoding="utf-8")
-            tell(len(film.time), len(film.time))
+            report(len(film.time), len(film.time))
         elif kind == ".mp4":
-            _write_mp4(film, unfinished, encoder, tell)
+            _write_mp4(film, unfinished, encoder, report)
         elif kind == ".gif":
-            _write_gif(film, unfinished, tell)
+            _write_gif(film, unfinished, report)
         elif kind == ".png":
             still = next(_frames(film, len(film.time) - 1))
             Image.fromarray(still).convert("RGB").save(unfinished, format="PNG")
-            tell(1, 1)
+            report(1, 1)
         else:
-            _write_pictures(film, unfinished, tell)
+            digits = max(4, len(str(len(film.time))))
+            for i, frame in enumerate(_frames(film), 1):
+                Image.fromarray(frame).convert("RGB").save(unfinished / f"frame_{i:0{digits}d}.png")
+                report(i, len(film.time))
     return film
 
 
 def film_kind(file: Path) -> str:
-    """The kind of film that a name asks for: its ending, or nothing of a folder of pictures.
-
-    Raises
-    ------
-    InputError
-        Another ending.
-    """
+    """The kind of film that a name asks for: its ending, or nothing of a folder of pictures."""
     kind = file.suffix.lower()
     if kind in FORMATS or kind == "":
         return kind
@@ -220,13 +216,7 @@ def film_kind(file: Path) -> str:
 
 
 def find_encoder() -> str:
-    """The program that makes mp4.
-
-    Raises
-    ------
-    InputError
-        There is none.
-    """
+    """The program that makes mp4."""
     found = shutil.which("ffmpeg")
     if found:
         return found
@@ -255,11 +245,6 @@ def _check(options: FilmOptions) -> None:
             raise InputError(
                 f"not between {_SMALLEST} and {_LARGEST} pixels", field="size", value=side, remedy="say 1280x720"
             )
-
-
-def _round_speed(duration: float) -> float:
-    """The highest round speed at which a run is not over too soon."""
-    return next((speed for speed in _SPEEDS if duration / speed >= _SHORTEST), _SPEEDS[-1])
 
 
 def _size(scenes: Sequence[Scene], size: tuple[int, int] | None) -> tuple[int, int]:
@@ -385,14 +370,7 @@ def _still_svg(figure: Figure, moving: list[Artist]) -> str:
     return text[text.index("viewBox=") :]
 
 
-def _write_pictures(film: Film, folder: Path, tell: Callable[[int, int], None]) -> None:
-    digits = max(4, len(str(len(film.time))))
-    for i, frame in enumerate(_frames(film), 1):
-        Image.fromarray(frame).convert("RGB").save(folder / f"frame_{i:0{digits}d}.png")
-        tell(i, len(film.time))
-
-
-def _write_gif(film: Film, file: Path, tell: Callable[[int, int], None]) -> None:
+def _write_gif(film: Film, file: Path, report: Callable[[int, int], None]) -> None:
     """One palette for all pictures: what does not move keeps its colour, and files are small."""
     total = len(film.time)
     frames = _frames(film)
@@ -400,7 +378,7 @@ def _write_gif(film: Film, file: Path, tell: Callable[[int, int], None]) -> None
 
     def reduced() -> Iterator[Image.Image]:
         for i, frame in enumerate(frames, 1):
-            tell(i, total)
+            report(i, total)
             yield Image.fromarray(frame).convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)
 
     pictures = reduced()
@@ -425,7 +403,7 @@ def _palette(film: Film) -> Image.Image:
     return palette
 
 
-def _write_mp4(film: Film, file: Path, encoder: str, tell: Callable[[int, int], None]) -> None:
+def _write_mp4(film: Film, file: Path, encoder: str, report: Callable[[int, int], None]) -> None:
     width, height = film.size
     command = [
         encoder, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}",
@@ -439,7 +417,7 @@ def _write_mp4(film: Film, file: Path, encoder: str, tell: Callable[[int, int], 
         try:
             for i, frame in enumerate(_frames(film), 1):
                 process.stdin.write(frame.tobytes())
-                tell(i, len(film.time))
+                report(i, len(film.time))
             process.stdin.close()
             process.wait()
         except BrokenPipeError:

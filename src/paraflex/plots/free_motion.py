@@ -1,4 +1,4 @@
-"""Of a run without a path: its coordinates, and where its points go."""
+"""Of a run without a path: angles, speeds and energies at a glance, its coordinates, and where its points go."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.plots.energy import ENERGIES
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, plain, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
-from paraflex.plots.runs import draw_curves
-from paraflex.plots.style import keep_flat, look_of
+from paraflex.plots.runs import MOST_LINES, draw_curves
+from paraflex.plots.selection import names_of
+from paraflex.plots.style import COLOURS, DASHES, keep_flat, look_of
 from paraflex.plots.workspace import finish_workspace, workspace_panel
 
-# Lines that can still be told apart in one panel; a point that moves less than this share of all stands still.
-_MOST, _STILL = 7, 1e-3
+# A point that moves less than this share of all stands still.
+_STILL = 1e-3
 # Coordinates that change by less rest, but for rounding.
 _NOTHING = 1e-12
 # Of modal coordinates, what they are by the last part of their names.
@@ -22,28 +24,44 @@ _KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0),
 
 
 @drawn
+def motion_overview(data: xr.Dataset) -> Figure:
+    """Angle and angular velocity of the first bodies, and the energies."""
+    figure, axes = panels(3, 1)
+    time = data["time"].values
+    for panel, variable in ((axes[0, 0], "angle"), (axes[1, 0], "angular_velocity")):
+        values = data[variable].values
+        for k, body in enumerate(data["body"].values[:MOST_LINES]):
+            panel.plot(time, values[:, k], label=symbol(str(body)), **look_of(k))
+        keep_flat(panel, float(np.nanmax(np.abs(values), initial=0.0)) or 1.0)
+        panel.set_ylabel(axis_label(variable))
+    for k, (variable, name) in enumerate(ENERGIES.items()):
+        look = {"color": COLOURS[-1 - k], "linestyle": DASHES[k]}
+        axes[2, 0].plot(time, data[variable].values, label=name, **look)
+    axes[2, 0].set_ylabel(axis_label("energy"))
+    for panel in axes.flat:
+        panel.set_xlim(time[0], time[-1])
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=40.0)
+
+
+@drawn
 def coordinates(data: xr.Dataset) -> Figure:
     """Generalised coordinates in time: places and angles of the bodies' frames, and flexible coordinates.
 
     A panel for each kind that moves, in it the seven that move most.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `results.motion_dataset`.
     """
-    names = [str(name) for name in data["coordinate"].values]
+    names = names_of(data, "coordinate")
     values = data["coordinate_value"].transpose("time", "coordinate").values
     travel = np.nan_to_num(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))
     groups = {
         kind: [k for k, name in enumerate(names) if _kind(name) == kind and travel[k] > _NOTHING] for kind in _KINDS
     }
     groups = {kind: members for kind, members in groups.items() if members} or {"phi": list(range(len(names)))[:1]}
-    bodies = [str(name) for name in data["body"].values]
+    bodies = names_of(data, "body")
     figure, axes = panels(len(groups), 1)
     for panel, (kind, members) in zip(axes[:, 0], groups.items(), strict=True):
         quantity, factor = _KINDS[kind]
-        most = sorted(members, key=lambda k: -travel[k])[:_MOST]
+        most = sorted(members, key=lambda k: -travel[k])[:MOST_LINES]
         for place, k in enumerate(sorted(most)):
             body = names[k].rpartition(".")[0]
             # A body has one look in all panels of its frame's coordinates.
@@ -58,15 +76,9 @@ def coordinates(data: xr.Dataset) -> Figure:
 
 @drawn
 def point_paths(data: xr.Dataset) -> Figure:
-    """Where named points go in the plane; of more than seven those that go furthest.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `results.motion_dataset`.
-    """
+    """Where named points go in the plane; of more than seven those that go furthest."""
     places = 1e3 * data["point_position"].transpose("time", "point", "axis").values
-    names = [str(name) for name in data["point"].values]
+    names = names_of(data, "point")
     travel = np.nan_to_num(np.nanmax(places, axis=0) - np.nanmin(places, axis=0)).max(axis=1)
     # Points at one place share a line; those that a program made have names of their own.
     shown: list[int] = []
@@ -75,7 +87,7 @@ def point_paths(data: xr.Dataset) -> Figure:
         if travel[k] > _STILL * travel.max() and apart and "._" not in names[k]:
             shown.append(int(k))
     figure, panel = workspace_panel()
-    for look, k in enumerate(sorted(shown[:_MOST])):
+    for look, k in enumerate(sorted(shown[:MOST_LINES])):
         panel.plot(*places[:, k].T, label=plain(names[k]), **look_of(look))
         panel.plot(*places[0, k], marker="s", markersize=3.0, linestyle="none", color=look_of(look)["color"])
     if not shown:

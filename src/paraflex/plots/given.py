@@ -23,13 +23,7 @@ P = ParamSpec("P")
 
 
 def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate[D | str | Path, P], Figure]:
-    """Make the function of a figure: in this style, of results or of the folder or file that holds them.
-
-    Raises
-    ------
-    InputError
-        From the function: no results, those of another kind than the catalogue has for it, or a wrong argument.
-    """
+    """Make the function of a figure: in this style, of results or of the folder or file that holds them."""
     take: Callable[..., Figure] = checked_arguments(
         figures="give what the study's result has as plain numbers, or the folder it was written to",
         table="give the folder of a study of many runs",
@@ -38,16 +32,15 @@ def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate
     first = next(iter(signature(function).parameters))
 
     @wraps(function)
-    def draw(*args: Any, **kwargs: Any) -> Figure:
+    def draw_results(*args: Any, **kwargs: Any) -> Figure:
         data: Any = args[0] if args else kwargs.pop(first, None)
-        if isinstance(data, str | os.PathLike):
-            data = _read(Path(data), function.__name__)
-        elif isinstance(data, xr.Dataset):
-            _check_kind(data, function.__name__)
+        if isinstance(data, str | os.PathLike | xr.Dataset):
+            data = _of_a_kind(data, _kinds()[function.__name__])
         with journal_style():
             return _drawn(data, first, partial(take, data, *args[1:], **kwargs))
 
-    return draw
+    draw_results.__doc__ = f"{function.__doc__}\n\nWhat all figures take and refuse: see `paraflex.plots`."
+    return draw_results
 
 
 def _drawn(data: Any, field: str, draw: Callable[[], Figure]) -> Figure:
@@ -61,20 +54,18 @@ def _drawn(data: Any, field: str, draw: Callable[[], Figure]) -> Figure:
         raise
 
 
-def _read(path: Path, figure: str) -> Any:
+def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
+    """Results, or what a folder or file holds, of one of some kinds, each with what of it is taken."""
+    if isinstance(data, xr.Dataset):
+        if kind_of(data) not in kinds:
+            raise wrong_kind(kind_of(data), kinds)
+        return data
     from paraflex.plots.sources import open_source
 
-    source = open_source(path)
-    kinds = _kinds()[figure]
+    source = open_source(data)
     if source.kind not in kinds:
-        raise wrong_kind(source.kind, kinds, str(path))
+        raise wrong_kind(source.kind, kinds, str(data))
     return source.designs if kinds[source.kind] == "designs" else source.data
-
-
-def _check_kind(data: xr.Dataset, figure: str) -> None:
-    kinds = _kinds()[figure]
-    if kind_of(data) not in kinds:
-        raise wrong_kind(kind_of(data), kinds)
 
 
 @cache

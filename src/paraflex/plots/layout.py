@@ -51,13 +51,7 @@ _width: ContextVar[float | None] = ContextVar("_width", default=None)
 
 @contextmanager
 def column_width(style: str | None) -> Iterator[None]:
-    """Draw figures as wide as one column of a journal, "single", or two, "double"; None: each as suits it.
-
-    Raises
-    ------
-    InputError
-        None of these.
-    """
+    """Draw figures as wide as one column of a journal, "single", or two, "double"; None: each as suits it."""
     if style is not None:
         known(style, COLUMNS, "style", "style")
     before = _width.set(None if style is None else COLUMNS[style])

@@ -19,7 +19,7 @@ _TEETH = 14
 _STILL = 1e-3
 
 
-class Look(NamedTuple):
+class MarkLook(NamedTuple):
     """How symbols are drawn: colours of a theme by what they are for, empty for none, and a width of lines."""
 
     fill: str
@@ -29,12 +29,12 @@ class Look(NamedTuple):
 
 # Symbols from the back to the front; links are drawn before the first that moves.
 LOOKS = {
-    "ground": Look("", "earth", 1.2),
-    "hatching": Look("", "earth", 0.8),
-    "spring": Look("", "earth", 1.1),
-    "block": Look("ground", "ink", 1.2),
-    "weld": Look("ink", "ink", 0.8),
-    "pin": Look("ground", "ink", 1.3),
+    "ground": MarkLook("", "earth", 1.2),
+    "hatching": MarkLook("", "earth", 0.8),
+    "spring": MarkLook("", "earth", 1.1),
+    "block": MarkLook("ground", "ink", 1.2),
+    "weld": MarkLook("ink", "ink", 0.8),
+    "pin": MarkLook("ground", "ink", 1.3),
 }
 
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import symbol
 from paraflex.plots.marks import still_marks
-from paraflex.plots.runs import samples
 from paraflex.plots.scene import DrawnJoint, Scene, limits_of
+from paraflex.plots.selection import names_of, samples
 from paraflex.plots.style import BLACK
 from paraflex.plots.themes import theme
 from paraflex.results.outlines import figure_order
@@ -48,7 +48,7 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
     if samples(run) == 0:
         return
     places = 1e3 * run["point_position"].transpose("time", "point", "axis").values[: samples(run)]
-    names = [str(name) for name in run["point"].values]
+    names = names_of(run, "point")
     start, size = places[0], float(np.ptp(places[0], axis=0).max())
     moves = np.ptp(places, axis=0).max(axis=1)
     fixed = moves <= _SAME * size if moves.max() > _SAME * size else np.zeros(len(names), dtype=bool)

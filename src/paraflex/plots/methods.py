@@ -7,12 +7,12 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, power_of_ten
+from paraflex.plots.labels import axis_label
 from paraflex.plots.layout import lay_out, panels
+from paraflex.plots.scales import name_powers
 from paraflex.plots.style import BLACK, COLOURS, SHADE
 
 # A family shares mark and dashes; its members differ in colour.
@@ -41,16 +41,6 @@ def work_precision(figures: Mapping[str, Any]) -> Figure:
 
     Runs with fixed steps and those with error control are lines of their own; the former have open marks. What the
     reference cannot tell is shaded.
-
-    Parameters
-    ----------
-    figures : mapping
-        From `studies.MethodComparison.figures`, or read from `compare-methods.json`.
-
-    Raises
-    ------
-    InputError
-        No run of them got to its end.
     """
     lines = _lines(figures["methods"])
     if not lines:
@@ -93,8 +83,5 @@ def _logarithmic(panel: Axes) -> None:
     panel.set_yscale("log")
     panel.margins(0.06)
     panel.grid(color="0.9", linewidth=0.4)
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(LogLocator(numticks=12))
-        # Plain text: the layout knows how wide digits are.
-        axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-        axis.set_minor_formatter(NullFormatter())
+    name_powers(panel.xaxis)
+    name_powers(panel.yaxis)

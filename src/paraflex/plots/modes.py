@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label, peak, symbol, three_digits
-from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, label_outer_time, lay_out, panels
-from paraflex.plots.runs import draw_actual, samples, select_run, shade_rest
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, panels
+from paraflex.plots.runs import draw_actual, finish_over_time
+from paraflex.plots.selection import names_of, samples, select_run
 from paraflex.plots.style import BLUE, VERMILLION, ZERO, keep_flat, look_of
 from paraflex.results.following import headline, ranked_by_motion
 
@@ -26,13 +27,8 @@ def motor_torques(data: xr.Dataset) -> Figure:
     """Torque of every motor, a panel for each mode; the panels of a row share their scale (Fig. 12).
 
     A motor without torque throughout is left out of a panel and named as passive above it.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `paraflex.results`.
     """
-    names = [str(name) for name in data["mode"].values]
+    names = names_of(data, "mode")
     figure, axes = _mode_panels(len(names))
     time, motors = data["time"].values, data["motor"].values
     for row in range(axes.shape[0]):
@@ -48,7 +44,6 @@ def motor_torques(data: xr.Dataset) -> Figure:
                     torque = np.full_like(torque, np.nan)  # Keeps its place in the legend.
                 panel.plot(time, torque, label=symbol(str(motor)), **look_of(k))
             panel.axhline(0.0, **ZERO)
-            shade_rest(panel, data)
             panel.set_ylim(-1.08 * scale or -1.0, 1.08 * scale or 1.0)
             panel.set_title(mode_label(name), loc="left")
             if passive:
@@ -56,21 +51,13 @@ def motor_torques(data: xr.Dataset) -> Figure:
                 listed = ", ".join(map(symbol, passive)) if short else f"{len(passive)} motors"
                 panel.set_title(f"passive: {listed}", loc="right")
         axes[row, 0].set_ylabel(effort_label(data["torque"].attrs.get("units", "N m")))
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=38.0)
+    return finish_over_time(figure, axes, data, panel_height=38.0)
 
 
 @drawn
 def tracking_errors(data: xr.Dataset) -> Figure:
-    """Actual less desired place of the end-effector in x and y, a panel for each mode (Fig. 18).
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `paraflex.results`. The titles hold the RMS error of the motion, or over all (Eq. 64): see
-        `results.tracking_dataset`.
-    """
-    names = [str(name) for name in data["mode"].values]
+    """Actual less desired place of the end-effector in x and y, a panel for each mode (Fig. 18)."""
+    names = names_of(data, "mode")
     figure, axes = _mode_panels(len(names))
     time = data["time"].values
     looks = ({"color": BLUE, "linestyle": "-"}, {"color": VERMILLION, "linestyle": (0, (4, 1.2))})
@@ -81,12 +68,10 @@ def tracking_errors(data: xr.Dataset) -> Figure:
         for k, (axis, look) in enumerate(zip(data["axis"].values, looks, strict=True)):
             draw_actual(panel, run, time, unit.factor * errors[:, k], label=f"error in ${axis}$", **look)
         panel.axhline(0.0, **ZERO)
-        shade_rest(panel, data)
         keep_flat(panel, unit.factor * peak(errors))
         panel.set_title(f"{mode_label(name)}: {_outcome(run)}")
         panel.set_ylabel(axis_label("error", unit=unit.name))
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=38.0)
+    return finish_over_time(figure, axes, data, panel_height=38.0)
 
 
 def _outcome(run: xr.Dataset) -> str:

@@ -13,11 +13,12 @@ from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import metric_name, mode_label
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panels
+from paraflex.plots.scales import LINE, list_lines
 from paraflex.plots.style import BLUE, VERMILLION, ZERO
 
 _FAINT = "0.6"
-# Heights of a panel, and of a line of one that is a list [mm].
-_PANEL, _LINE = 50.0, 5.5
+# Height of a panel [mm].
+_PANEL = 50.0
 # Far above the best a design says nothing of how the search came down; it is drawn at the upper edge.
 _HIGHEST = 3.0
 
@@ -27,16 +28,6 @@ def convergence(figures: Mapping[str, Any]) -> Figure:
     """The objective, or root mean square residual, of every design, and the least until then.
 
     Designs that do not run stand below the axis, those that pass a limit are crosses.
-
-    Parameters
-    ----------
-    figures : mapping
-        From `OptimisationResult.figures` or `IdentificationResult.figures`, or read from `result.json`.
-
-    Raises
-    ------
-    InputError
-        No design ran.
     """
     history = [(number + 1, value, held) for number, value, held in figures["history"]]
     ran = [each for each in history if each[1] is not None]
@@ -66,18 +57,7 @@ def convergence(figures: Mapping[str, Any]) -> Figure:
 
 @drawn
 def targets_reached(figures: Mapping[str, Any]) -> Figure:
-    """Every target: what the start and the best design make of it, as a multiple of it.
-
-    Parameters
-    ----------
-    figures : mapping
-        From `IdentificationResult.figures`, or read from `result.json`.
-
-    Raises
-    ------
-    InputError
-        There are no targets, or all of them are zero.
-    """
+    """Every target: what the start and the best design make of it, as a multiple of it."""
     targets = [each for each in figures["targets"] if each["value"] != 0.0]
     if not targets:
         raise InputError("no targets to compare with", field="figures", remedy="give figures of an identification")
@@ -90,26 +70,15 @@ def targets_reached(figures: Mapping[str, Any]) -> Figure:
     panel.axvline(1.0, color=VERMILLION, linewidth=0.7, zorder=0.7, label="target")
     for line in lines:
         panel.axhline(line, **ZERO)
-    _list_lines(panel, [_target_name(each, targets) for each in targets])
+    list_lines(panel, [_target_name(each, targets) for each in targets])
     panel.margins(x=0.08)
     panel.set_xlabel("reached / target")
-    return lay_out(figure, axes, panel_height=_LINE * len(targets) + 2.0)
+    return lay_out(figure, axes, panel_height=LINE * len(targets) + 2.0)
 
 
 @drawn
 def sobol_bars(figures: Mapping[str, Any]) -> Figure:
-    """First-order and total indices of every parameter with their intervals of 95 %; a panel a metric, path and mode.
-
-    Parameters
-    ----------
-    figures : mapping
-        From `IndicesResult.figures`, or read from `indices.json`.
-
-    Raises
-    ------
-    InputError
-        No metric varies.
-    """
+    """First-order and total indices of every parameter, intervals of 95 %; a panel a metric, path and mode."""
     panels_of: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in figures["indices"]:
         if row["first"] is not None:
@@ -127,7 +96,7 @@ def sobol_bars(figures: Mapping[str, Any]) -> Figure:
     for panel in axes.flat:
         panel.set_xlabel("share of the variance" if panel.get_visible() else "")
     most = max(len(parameters) for parameters in panels_of.values())
-    return lay_out(figure, axes, panel_height=1.6 * _LINE * most + 2.0)
+    return lay_out(figure, axes, panel_height=1.6 * LINE * most + 2.0)
 
 
 def _draw_best(panel: Axes, ran: list, last: int) -> None:
@@ -151,24 +120,15 @@ def _draw_bars(panel: Axes, rows: list[Mapping[str, Any]]) -> None:
             elinewidth=0.6, capsize=1.5, capthick=0.6,
         )  # fmt: skip
     panel.axvline(0.0, **ZERO)
-    _list_lines(panel, [row["parameter"] for row in rows])
+    list_lines(panel, [row["parameter"] for row in rows])
     panel.margins(x=0.05)
-
-
-def _list_lines(panel: Axes, names: list[str]) -> None:
-    panel.set_yticks(range(len(names)), [name.replace("$", r"\$") for name in names])
-    panel.set_ylim(len(names) - 0.4, -0.6)
 
 
 def _target_name(target: Mapping[str, Any], targets: list) -> str:
     """What tells a target from the others: its mode, and path and metric where they differ."""
     differing = [key for key in ("metric", "path") if len({each[key] for each in targets}) > 1]
-    return " ".join(
-        [
-            mode_label(target["mode"]),
-            *(metric_name(target[key]) if key == "metric" else target[key] for key in differing),
-        ]
-    )
+    names = [metric_name(target[key]) if key == "metric" else target[key] for key in differing]
+    return " ".join([mode_label(target["mode"]), *names])
 
 
 def _panel_name(name: tuple[str, ...], names: list[tuple[str, ...]]) -> str:

@@ -34,14 +34,8 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
 
     Parameters
     ----------
-    table : DesignTable
     metrics : sequence of str, optional
         By default the first three that vary.
-
-    Raises
-    ------
-    InputError
-        No such metric, or none that varies.
     """
     chosen = table.judged_by(metrics, _METRICS)
     pair, runs = next(iter(table.series.items()))

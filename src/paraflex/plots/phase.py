@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, symbol
 from paraflex.plots.layout import is_narrow, lay_out, panels
-from paraflex.plots.runs import END_EFFECTOR, START, draw_actual, draw_desired, one_run, select_run
+from paraflex.plots.runs import END_EFFECTOR, START, draw_actual, draw_desired
+from paraflex.plots.selection import names_of, one_run, select_run
 from paraflex.plots.style import BLUE, keep_flat
 
 # Bodies that have a panel.
@@ -17,22 +18,9 @@ _MOST = 8
 
 @drawn
 def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
-    """Velocity over displacement and acceleration over velocity in x and y, desired and actual (Fig. 17).
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `paraflex.results`.
-    mode : str
-        Actuation mode.
-
-    Raises
-    ------
-    InputError
-        No such mode.
-    """
+    """Velocity over displacement and acceleration over velocity in x and y, desired and actual (Fig. 17)."""
     run = select_run(data, mode)
-    directions = [str(axis) for axis in data["axis"].values]
+    directions = names_of(data, "axis")
     figure, axes = panels(2, len(directions))
     for row, (across, up) in zip(axes, (END_EFFECTOR[:2], END_EFFECTOR[1:]), strict=True):
         for panel, axis in zip(row, directions, strict=True):
@@ -55,22 +43,9 @@ def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
 
 @drawn
 def link_phases(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Angular velocity over angle of every body, of at most eight of them.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `results.tracking_dataset` or `motion_dataset`.
-    mode : str, optional
-        Actuation mode; by default that with most active motors.
-
-    Raises
-    ------
-    InputError
-        No such mode.
-    """
+    """Angular velocity over angle of every body, of at most eight of them."""
     run = one_run(data, mode)
-    bodies = [str(name) for name in run["body"].values][:_MOST]
+    bodies = names_of(run, "body")[:_MOST]
     columns = 2 if is_narrow() or len(bodies) in (2, 3, 4) else min(len(bodies), 4)
     columns = min(columns, len(bodies))
     figure, axes = panels(-(-len(bodies) // columns), columns)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure, homes
+from paraflex.plots.selection import default_mode, names_of, place_of, prototype_pair
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,14 +40,14 @@ class PlannedFigure:
 
 
 # Of results read from JSON, what must be there for a figure.
-_TOLD: Mapping[str, Callable[[Any], bool]] = {
-    "convergence": lambda told: any(value is not None for _, value, _ in told.get("history", ())),
-    "targets_reached": lambda told: any(target["value"] != 0.0 for target in told.get("targets", ())),
-    "sobol_bars": lambda told: any(row["first"] is not None for row in told.get("indices", ())),
-    "work_precision": lambda told: any(
-        run["status"] == "complete" for method in told["methods"].values() for run in method["runs"]
+_DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
+    "convergence": lambda found: any(value is not None for _, value, _ in found.get("history", ())),
+    "targets_reached": lambda found: any(target["value"] != 0.0 for target in found.get("targets", ())),
+    "sobol_bars": lambda found: any(row["first"] is not None for row in found.get("indices", ())),
+    "work_precision": lambda found: any(
+        run["status"] == "complete" for method in found["methods"].values() for run in method["runs"]
     ),
-    "mode_conditions": lambda told: any("condition_max" in row for row in told),
+    "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
 
 
@@ -56,13 +57,7 @@ def figures_of(source: Source) -> list[CatalogueFigure]:
 
 
 def find_figure(source: Source, name: str) -> CatalogueFigure:
-    """A figure by its name, or by that of its file.
-
-    Raises
-    ------
-    InputError
-        There is none of that name of these results.
-    """
+    """A figure by its name, or by that of its file."""
     there = figures_of(source)
     for figure in there:
         if name in (figure.name, figure.written_as):
@@ -87,96 +82,57 @@ def drawings(
         Actuation modes that are shown; by default all, or of figures that show one, that with most active motors.
     metrics : sequence of str
         Of figures of many designs; by default the first that vary.
-
-    Raises
-    ------
-    InputError
-        No such mode.
     """
-    make = {"mode": _of_modes, "models": _of_models, "run": _of_runs, "designs": _of_designs, "nothing": _of_nothing}
-    return make.get(figure.takes, _of_results)(source, figure, modes, metrics)
+
+    def planned(of: str, *given: Any) -> PlannedFigure:
+        return PlannedFigure(figure, of, partial(figure.function, *given))
+
+    data, shown = source.data, ",".join(modes)
+    if figure.takes == "nothing":
+        return [planned("")]
+    if figure.takes == "designs":
+        assert source.designs is not None
+        table = source.designs.in_modes(modes) if modes else source.designs
+        return [planned(shown, table, list(metrics) or None)]
+    chosen = _chosen(source, modes)
+    if figure.takes == "run":
+        runs = enumerate(data["runs"])
+        return [planned(f"{run['path']}_{run['mode']}", data, k) for k, run in runs if run["mode"] in chosen]
+    if figure.takes == "models":
+        return [planned(mode, data, mode, prototype_pair(data)) for mode in chosen]
+    if figure.takes == "mode" and source.kind != "motion":
+        return [planned(mode, data, mode) for mode in modes or [default_mode(data)]]
+    if modes and source.kind == "indices":
+        data = data | {"indices": [row for row in data["indices"] if row["mode"] in modes]}
+    elif modes:
+        data = data.sel(mode=list(modes))
+    return [planned(shown, data)]
 
 
 def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
     if figure.takes == "designs":
         return source.designs is not None and bool(source.designs.series)
     if figure.takes == "models":
-        from paraflex.plots.agreement import prototype_pair
-
         return prototype_pair(source.data) is not None
-    if figure.name in _TOLD:
-        return _TOLD[figure.name](source.data)
+    if figure.name in _DRAWABLE:
+        return _DRAWABLE[figure.name](source.data)
     return all(name in source.data for name in figure.variables)
 
 
-def _of_results(source: Source, figure: CatalogueFigure, modes: Sequence[str], _: Sequence[str]) -> list[PlannedFigure]:
-    data = source.data
-    if modes and source.kind in ("tracking", "verification"):
-        data = data.isel(mode=[_known(source, mode) for mode in modes])
-    elif modes and source.kind == "indices":
-        data = data | {"indices": [row for row in data["indices"] if row["mode"] in modes]}
+def _chosen(source: Source, modes: Sequence[str]) -> list[str]:
+    """The modes asked for, else all there are; none of results that have no modes."""
+    if source.kind in ("tracking", "verification"):
+        known = names_of(source.data, "mode")
+    elif source.kind == "sensitivity":
+        known = list(dict.fromkeys(run["mode"] for run in source.data["runs"]))
+    elif source.kind == "indices":
+        return list(modes)
     elif modes:
         raise InputError(
             "this figure has no modes to choose from", field="--mode", value=modes[0], remedy="leave it out"
         )
-    return [PlannedFigure(figure, ",".join(modes), partial(figure.function, data))]
-
-
-def _of_modes(source: Source, figure: CatalogueFigure, modes: Sequence[str], _: Sequence[str]) -> list[PlannedFigure]:
-    from paraflex.plots.runs import default_mode
-
-    if source.kind == "motion":
-        if modes:
-            return _of_results(source, figure, modes, ())
-        return [PlannedFigure(figure, "", partial(figure.function, source.data))]
+    else:
+        return []
     for mode in modes:
-        _known(source, mode)
-    chosen = list(modes) or [default_mode(source.data)]
-    return [PlannedFigure(figure, mode, partial(figure.function, source.data, mode)) for mode in chosen]
-
-
-def _of_models(source: Source, figure: CatalogueFigure, modes: Sequence[str], _: Sequence[str]) -> list[PlannedFigure]:
-    from paraflex.plots.agreement import prototype_pair
-
-    pair = prototype_pair(source.data)
-    for mode in modes:
-        _known(source, mode)
-    chosen = list(modes) or [str(name) for name in source.data["mode"].values]
-    return [PlannedFigure(figure, mode, partial(figure.function, source.data, mode, pair)) for mode in chosen]
-
-
-def _of_runs(source: Source, figure: CatalogueFigure, modes: Sequence[str], _: Sequence[str]) -> list[PlannedFigure]:
-    runs = source.data["runs"]
-    known = list(dict.fromkeys(run["mode"] for run in runs))
-    for mode in modes:
-        if mode not in known:
-            raise _no_mode(mode, known)
-    return [
-        PlannedFigure(figure, f"{run['path']}_{run['mode']}", partial(figure.function, source.data, k))
-        for k, run in enumerate(runs)
-        if not modes or run["mode"] in modes
-    ]
-
-
-def _of_designs(
-    source: Source, figure: CatalogueFigure, modes: Sequence[str], metrics: Sequence[str]
-) -> list[PlannedFigure]:
-    table = source.designs
-    assert table is not None
-    shown = table.in_modes(modes) if modes else table
-    return [PlannedFigure(figure, ",".join(modes), partial(figure.function, shown, list(metrics) or None))]
-
-
-def _of_nothing(_: Source, figure: CatalogueFigure, __: Sequence[str], ___: Sequence[str]) -> list[PlannedFigure]:
-    return [PlannedFigure(figure, "", figure.function)]
-
-
-def _known(source: Source, mode: str) -> int:
-    names = [str(name) for name in source.data["mode"].values]
-    if mode not in names:
-        raise _no_mode(mode, names)
-    return names.index(mode)
-
-
-def _no_mode(mode: str, known: list[str]) -> InputError:
-    return InputError("no such mode in these results", field="--mode", value=mode, remedy="one of " + ", ".join(known))
+        place_of(mode, known, "mode", field="--mode")
+    return list(modes) or known

@@ -36,14 +36,8 @@ def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) ->
 
     Parameters
     ----------
-    table : DesignTable
     metrics : sequence of str, optional
         By default the first three that vary; in one column of print the first, where there are several parameters.
-
-    Raises
-    ------
-    InputError
-        No such metric, or none that varies.
     """
     columns = table.varied[:_MOST_PARAMETERS]
     rows = table.judged_by(metrics, 1 if is_narrow() and len(columns) > 1 else _MOST_METRICS)
@@ -105,14 +99,8 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
 
     Parameters
     ----------
-    table : DesignTable
     metrics : sequence of str, optional
         Two; by default the first that varies, and that with which most designs are on the front.
-
-    Raises
-    ------
-    InputError
-        No such metric, or not two of them.
     """
     chosen = table.judged_by(metrics, 2) if metrics else in_conflict(table, table.judged_by(None, len(table.metrics)))
     if len(chosen) != 2:

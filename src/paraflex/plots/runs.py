@@ -1,4 +1,4 @@
-"""Which run a figure shows, how far it got, and how desired and actual curves are drawn."""
+"""How desired and actual curves of runs are drawn, and panels over time finished."""
 
 from __future__ import annotations
 
@@ -8,92 +8,28 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from paraflex.errors import InputError
-from paraflex.plots.labels import is_signs, mode_label
-from paraflex.plots.layout import figure_width, is_narrow
+from paraflex.plots.labels import peak, symbol
+from paraflex.plots.layout import figure_width, is_narrow, label_outer_time, lay_out, panels
+from paraflex.plots.selection import names_of, run_label, samples
 from paraflex.plots.style import BLACK, BLUE, SHADE, look_of
 
 DESIRED: dict[str, Any] = {
-    "color": BLACK,
-    "linestyle": (0, (4, 2)),
-    "linewidth": 0.8,
-    "zorder": 2.5,
-    "label": "desired",
-}
-STOPPED: dict[str, Any] = {
-    "color": BLACK,
-    "linestyle": "none",
-    "marker": "x",
-    "markersize": 4.5,
-    "markeredgewidth": 1.2,
-    "zorder": 3.0,
-    "label": "the run stopped",
-}
-START: dict[str, Any] = {
-    "linestyle": "none",
-    "marker": "s",
-    "markersize": 4.5,
-    "color": BLACK,
-    "zorder": 4.0,
-    "label": "start",
-}
+    "color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 0.8, "zorder": 2.5, "label": "desired",
+}  # fmt: skip
+_MARK: dict[str, Any] = {"color": BLACK, "linestyle": "none", "markersize": 4.5}
+STOPPED = _MARK | {"marker": "x", "markeredgewidth": 1.2, "zorder": 3.0, "label": "the run stopped"}
+START = _MARK | {"marker": "s", "zorder": 4.0, "label": "start"}
+# Lines that can still be told apart in one panel.
+MOST_LINES = 7
 # Variables of the end-effector's motion, what they are, and what their values are multiplied by.
 END_EFFECTOR = (
     ("end_effector", "position", 1e3),
     ("end_effector_velocity", "velocity", 1.0),
     ("end_effector_acceleration", "acceleration", 1.0),
 )
-
-
-def select_run(data: xr.Dataset, mode: str) -> xr.Dataset:
-    """The run of one mode.
-
-    Raises
-    ------
-    InputError
-        No such mode.
-    """
-    names = [str(name) for name in data["mode"].values]
-    if mode not in names:
-        raise InputError("no such mode in these results", field="mode", value=mode, remedy="one of " + ", ".join(names))
-    return data.isel(mode=names.index(mode))
-
-
-def default_mode(data: xr.Dataset) -> str:
-    """The mode with most active motors where modes are named by their signs; else the first."""
-    names = [str(name) for name in data["mode"].values]
-    return max(names, key=lambda name: name.count("+")) if all(map(is_signs, names)) else names[0]
-
-
-def run_label(run: xr.Dataset) -> str:
-    """A run's mode for legends."""
-    return f"mode {mode_label(str(run['mode'].item()))}"
-
-
-def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
-    """The run of a mode, by default of `default_mode`; of results without modes the one there is.
-
-    Raises
-    ------
-    InputError
-        No such mode.
-    """
-    if "mode" not in data.dims:
-        if mode is not None:
-            raise InputError(
-                "these results have no modes", field="mode", value=mode, remedy="leave it out: motors were not driven"
-            )
-        return data
-    return select_run(data, default_mode(data) if mode is None else mode)
-
-
-def samples(run: xr.Dataset) -> int:
-    """How many samples of a run there are before the end or the first one it did not get to."""
-    moving = run["end_effector"] if "end_effector" in run else run["angle"]
-    missing = ~np.isfinite(moving.values).all(axis=-1)
-    return int(np.argmax(missing)) if missing.any() else missing.size
 
 
 def draw_actual(axes: Axes, run: xr.Dataset, x: ArrayLike, y: ArrayLike, **look: Any) -> None:
@@ -136,3 +72,22 @@ def shade_rest(axes: Axes, data: xr.Dataset) -> None:
         # In one column the longer words would leave the legend one entry a line.
         label = "after the motion" if is_narrow(figure_width(axes)) else "after the end of the desired motion"
         axes.axvspan(end, time[-1], color=SHADE, linewidth=0.0, zorder=0.0, label=label)
+
+
+def finish_over_time(figure: Figure, axes: NDArray[Any], data: xr.Dataset, panel_height: float) -> Figure:
+    """Lay out panels over time [mm]: what follows the motion is shaded, and the time axis named once a column."""
+    for panel in axes.flat:
+        shade_rest(panel, data)
+    label_outer_time(axes)
+    return lay_out(figure, axes, panel_height=panel_height)
+
+
+def largest_over_time(data: xr.Dataset, run: xr.Dataset, values: NDArray[np.float64], dim: str, label: str) -> Figure:
+    """One panel of quantities (time, dim) of a run; of more than can be told apart those with the largest peaks."""
+    peaks = np.array([peak(each) for each in values.T])
+    largest = [k for k in np.argsort(-peaks, kind="stable")[:MOST_LINES] if peaks[k] > 0.0]
+    names = names_of(run, dim)
+    figure, axes = panels(1, 1)
+    draw_curves(axes[0, 0], run, {symbol(names[k]): values[:, k] for k in sorted(largest)})
+    axes[0, 0].set_ylabel(label)
+    return finish_over_time(figure, axes, data, panel_height=56.0)

@@ -25,7 +25,9 @@ FORMATS = tuple(_METADATA)
 
 @checked_arguments()
 def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) -> list[Path]:
-    """Write figures 11 to 18 as PNG (200 dpi) and SVG, named like `fig11_desired_path.png`.
+    """Write figures 11 to 18 of a run along a path, named like `fig11_desired_path.png`.
+
+    As all `save_...` functions, as PNG (200 dpi) and SVG.
 
     Parameters
     ----------
@@ -49,101 +51,41 @@ def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) 
     OutputError
         The folder cannot be written.
     """
-    return _save_written("tracking", data, Path(folder), mode)
+    return _save_written("tracking", data, folder, mode)
 
 
 @checked_arguments()
 def save_agreement_figures(data: xr.Dataset, folder: str | Path) -> list[Path]:
-    """Write figures 22 and 23 of every mode, and the distances of all models, as PNG and SVG.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `studies.Verification.dataset`.
-    folder : str or Path
-        Made if it is not there; files of the same names are written over.
-
-    Returns
-    -------
-    list of Path
-        The files written.
-
-    Raises
-    ------
-    OutputError
-        The folder cannot be written.
-    """
-    return _save_written("verification", data, Path(folder))
+    """Write figures 22 and 23 of every mode, and the distances of all models, of `studies.Verification.dataset`."""
+    return _save_written("verification", data, folder)
 
 
 @checked_arguments()
 def save_overview(data: xr.Dataset, folder: str | Path) -> list[Path]:
-    """Write the overview of a run without a path as PNG and SVG.
-
-    Raises
-    ------
-    OutputError
-        The folder cannot be written.
-    """
-    return _save_written("motion", data, Path(folder))
+    """Write the overview of a run without a path."""
+    return _save_written("motion", data, folder)
 
 
 @checked_arguments()
 def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
-    """Write the figure of a comparison of methods as PNG and SVG; none where no run got to its end.
-
-    Raises
-    ------
-    OutputError
-        The folder cannot be written.
-    """
-    return _save_written("methods", figures, Path(folder))
+    """Write the figure of a comparison of methods; none where no run got to its end."""
+    return _save_written("methods", figures, folder)
 
 
 @checked_arguments()
 def save_search_figures(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
-    """Write the figures of an optimisation, an identification or of Sobol indices as PNG and SVG.
+    """Write the figures of an optimisation, an identification or of Sobol indices.
 
-    Parameters
-    ----------
-    figures : mapping
-        From the `figures` of its result, or read from `result.json` or `indices.json`. There are none of a search in
-        which no design ran, nor of metrics that do not vary.
-    folder : str or Path
-        Made if it is not there; files of the same names are written over.
-
-    Raises
-    ------
-    OutputError
-        The folder cannot be written.
+    There are none of a search in which no design ran, nor of metrics that do not vary.
     """
     kind = "indices" if "indices" in figures else "identification" if "targets" in figures else "optimisation"
-    return _save_written(kind, figures, Path(folder))
+    return _save_written(kind, figures, folder)
 
 
 @checked_arguments()
 def save_elasticities(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
-    """Write a figure of elasticities for each run of a sensitivity study, as PNG and SVG.
-
-    Raises
-    ------
-    OutputError
-        The folder cannot be written.
-    """
-    return _save_written("sensitivity", figures, Path(folder))
-
-
-def check_formats(formats: Sequence[str]) -> None:
-    """Nothing, if figures can be written in these.
-
-    Raises
-    ------
-    InputError
-        An unknown one, or none.
-    """
-    for name in formats or ("",):
-        if name not in FORMATS:
-            raise InputError("unknown format", field="--format", value=name, remedy=suggestion(name, FORMATS))
+    """Write a figure of elasticities for each run of a sensitivity study."""
+    return _save_written("sensitivity", figures, folder)
 
 
 def write_figures(
@@ -174,15 +116,10 @@ def write_figures(
     Returns
     -------
     list of Path
-
-    Raises
-    ------
-    InputError
-        An unknown format or style, or a file that is there already; before anything is drawn.
-    OutputError
-        The folder cannot be written.
     """
-    check_formats(formats)
+    for name in formats or ("",):
+        if name not in FORMATS:
+            raise InputError("unknown format", field="--format", value=name, remedy=suggestion(name, FORMATS))
     files = {drawing.stem: [folder / f"{_file_name(drawing.stem)}.{name}" for name in formats] for drawing in drawn}
     there = [file for each in files.values() for file in each if file.exists()]
     if there and not force:
@@ -200,10 +137,11 @@ def write_figures(
     return written
 
 
-def _save_written(kind: str, data: Any, folder: Path, mode: str | None = None) -> list[Path]:
+def _save_written(kind: str, data: Any, folder: str | Path, mode: str | None = None) -> list[Path]:
     """The figures that the command which makes results of a kind writes beside them."""
     if isinstance(data, xr.Dataset):
         check_kind(data, kind)
+    folder = Path(folder)
     source = Source(kind, data, folder)
     written: list[Path] = []
     for figure in figures_of(source):

@@ -1,13 +1,21 @@
-"""Logarithmic axes whose numbers are plain text: the layout knows how wide digits are."""
+"""Axes of numbers as powers of ten, and of names.
+
+Numbers are plain text: the layout knows how wide digits are.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from paraflex.plots.labels import logarithmic_number
+from paraflex.plots.labels import logarithmic_number, plain, power_of_ten
+
+# Height of a line of a list of names [mm].
+LINE = 5.5
 
 
 def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y") -> None:
@@ -19,3 +27,16 @@ def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y") -> None:
     axis.set_major_locator(LogLocator(numticks=12) if several else LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
     axis.set_minor_formatter(NullFormatter())
+
+
+def name_powers(axis: Axis) -> None:
+    """Number a logarithmic axis at powers of ten alone."""
+    axis.set_major_locator(LogLocator(numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def list_lines(panel: Axes, names: Sequence[str]) -> None:
+    """Name the lines of a panel that is a list, from the top down."""
+    panel.set_yticks(range(len(names)), [plain(name) for name in names])
+    panel.set_ylim(len(names) - 0.4, -0.6)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit
-from paraflex.plots.runs import select_run
+from paraflex.plots.selection import names_of, select_run
 
 Array = NDArray[np.float64]
 
@@ -114,13 +114,7 @@ class Scene:
 
 
 def run_times(data: xr.Dataset) -> tuple[float, float]:
-    """First time of a run and the last that any of its modes reached [s].
-
-    Raises
-    ------
-    InputError
-        The results hold no shapes.
-    """
+    """First time of a run and the last that any of its modes reached [s]."""
     check_shapes(data)
     kept = np.isfinite(data["shape"].values[..., 0, 0]).reshape(-1, data.sizes["time"]).any(axis=0)
     time = data["time"].values
@@ -128,13 +122,7 @@ def run_times(data: xr.Dataset) -> tuple[float, float]:
 
 
 def check_shapes(data: xr.Dataset) -> None:
-    """Nothing, if results hold what drawings are made from.
-
-    Raises
-    ------
-    InputError
-        They do not.
-    """
+    """Nothing, if results hold what drawings are made from."""
     if "shape" not in data:
         raise InputError(
             "these results hold no shapes of links: they are of an earlier version", field="results",
@@ -143,16 +131,10 @@ def check_shapes(data: xr.Dataset) -> None:
 
 
 def select(data: xr.Dataset, mode: str | None, model: str | None = None) -> xr.Dataset:
-    """One run: of a mode where there are modes, of a model where there are models (by default the reference).
-
-    Raises
-    ------
-    InputError
-        No such mode or model; or the results hold no shapes.
-    """
+    """One run: of a mode where there are modes, of a model where there are models (by default the reference)."""
     check_shapes(data)
     if "model" in data.dims:
-        names = [str(name) for name in data["model"].values]
+        names = names_of(data, "model")
         model = str(data.attrs.get("reference", names[0])) if model is None else model
         if model not in names:
             raise InputError(
@@ -179,11 +161,6 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
         [s]; after the end of a run that stopped its last picture is held.
     magnify : float
         1 is the truth, 0 draws links stiff.
-
-    Raises
-    ------
-    InputError
-        A magnification that is negative or not finite; a run that has no sample.
     """
     if not (np.isfinite(magnify) and magnify >= 0.0):
         raise InputError("must not be negative", field="magnify", value=magnify, remedy="1 is the truth, 50 shows more")
@@ -242,7 +219,7 @@ class _Sampler:
 
 def followed_station(run: xr.Dataset) -> int | None:
     """The station whose trail is drawn: the end-effector's, or else of the point at no joint that goes farthest."""
-    points = [str(name) for name in run["point"].values]
+    points = names_of(run, "point")
     stations = run["point_station"].values
     if run.attrs.get("end_effector_point") in points:
         return int(stations[points.index(run.attrs["end_effector_point"])])

@@ -42,20 +42,22 @@ class Source:
 
 
 def open_source(path: str | Path) -> Source:
-    """Results of any command, from their folder or one of their files.
-
-    Raises
-    ------
-    InputError
-        Nothing there, several results at once, a damaged file, or one that is not ours.
-    """
+    """Results of any command, from their folder or one of their files."""
     path = Path(path)
     if not path.exists():
         raise InputError("no such file or folder", field="RESULTS", value=str(path), remedy=_OURS)
     if path.is_dir():
         return _folder(path)
-    read = {"netcdf": _netcdf, "parquet": _table, "json": _json}
-    return read[_format(path)](path)
+    kind = _format(path)
+    if kind == "json":
+        return _json(path)
+    if kind == "parquet":
+        table = read_designs([path])
+        return Source("sweep", table, path.parent, table)
+    from paraflex.results import kind_of, open_results
+
+    data = open_results(path)
+    return Source(kind_of(data), data, path.parent)
 
 
 def _folder(folder: Path) -> Source:
@@ -83,27 +85,15 @@ def _format(file: Path) -> str:
     return kind
 
 
-def _netcdf(file: Path) -> Source:
-    from paraflex.results import kind_of, open_results
-
-    data = open_results(file)
-    return Source(kind_of(data), data, file.parent)
-
-
-def _table(file: Path) -> Source:
-    table = read_designs([file])
-    return Source("sweep", table, file.parent, table)
-
-
 def _json(file: Path) -> Source:
     try:
-        told = json.loads(file.read_text(encoding="utf-8"))
+        found = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError("damaged: not JSON to its end", field=str(file), remedy="make these results again") from error
     for kind, is_it in _JSON.items():
-        if is_it(told):
+        if is_it(found):
             searched = kind in ("optimisation", "identification", "indices")
-            return Source(kind, told, file.parent, _designs(file.parent) if searched else None)
+            return Source(kind, found, file.parent, _designs(file.parent) if searched else None)
     beside = [name for name in _FILES if (file.parent / name).is_file() and name != file.name]
     remedy = f"name {beside[0]} beside it" if beside else _OURS
     raise InputError("no figures are drawn from this file", field=str(file), remedy=remedy)
@@ -117,11 +107,11 @@ def _designs(folder: Path) -> DesignTable | None:
 
 
 def _has(*keys: str) -> Callable[[Any], bool]:
-    return lambda told: isinstance(told, Mapping) and all(key in told for key in keys)
+    return lambda found: isinstance(found, Mapping) and all(key in found for key in keys)
 
 
 def _named(kind: str) -> Callable[[Any], bool]:
-    return lambda told: isinstance(told, Mapping) and told.get("kind") == kind
+    return lambda found: isinstance(found, Mapping) and found.get("kind") == kind
 
 
 _JSON: Mapping[str, Callable[[Any], bool]] = {
@@ -130,5 +120,5 @@ _JSON: Mapping[str, Callable[[Any], bool]] = {
     "indices": _named("indices"),
     "methods": _has("methods", "reference", "fastest"),
     "sensitivity": _has("parameters", "units", "runs"),
-    "modes": lambda told: isinstance(told, list) and bool(told) and all(_has("mode", "motors")(row) for row in told),
+    "modes": lambda found: isinstance(found, list) and bool(found) and all(map(_has("mode", "motors"), found)),
 }

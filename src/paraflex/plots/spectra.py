@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.integrators import METHODS
 from paraflex.integrators.spectra import MULTISTEP, Spectrum, spectrum
-from paraflex.plots.labels import power_of_ten
 from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.methods import method_look
+from paraflex.plots.scales import name_powers
 from paraflex.plots.style import ZERO, journal_style
 
 # Of multistep methods the orders at which they start to differ; IDA's roots are those of BDF.
@@ -56,12 +54,12 @@ def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figu
         panel.set_title(title)
         panel.set_xlabel(r"$h\,\omega$ [rad]")
         panel.set_xscale("log")
-        _mark_powers(panel.xaxis)
+        name_powers(panel.xaxis)
     for panel in axes[0, :2]:
         panel.set_yscale("log")
         panel.set_ylim(*_SHOWN)
         panel.grid(color="0.9", linewidth=0.4)
-        _mark_powers(panel.yaxis)
+        name_powers(panel.yaxis)
     axes[0, 2].set_ylim(0.0, _GROWN)
     axes[0, 2].axhline(1.0, **ZERO)
     return lay_out(figure, axes, panel_height=62.0)
@@ -70,9 +68,3 @@ def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figu
 def _shown(found: Spectrum, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """What a logarithmic axis can show: not what is zero, nor what grows, which is not what a vibration does."""
     return np.where((found.radius < 1.0 + 1e-9) & (values > 0.1 * _SHOWN[0]), values, np.nan)
-
-
-def _mark_powers(axis: Axis) -> None:
-    axis.set_major_locator(LogLocator(numticks=12))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-    axis.set_minor_formatter(NullFormatter())

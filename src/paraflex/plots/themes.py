@@ -43,12 +43,6 @@ PAGE = Theme(
 
 
 def theme(name: str) -> Theme:
-    """Colours by name.
-
-    Raises
-    ------
-    InputError
-        There are none of that name.
-    """
+    """Colours by name."""
     known(name, THEMES, "theme", "theme")
     return THEMES[name]

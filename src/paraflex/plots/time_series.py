@@ -11,23 +11,13 @@ from matplotlib.figure import Figure
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, symbol
-from paraflex.plots.layout import is_narrow, label_outer_time, lay_out, panels
-from paraflex.plots.runs import (
-    END_EFFECTOR,
-    draw_actual,
-    draw_curves,
-    draw_desired,
-    one_run,
-    run_label,
-    select_run,
-    shade_rest,
-)
+from paraflex.plots.layout import is_narrow, panels
+from paraflex.plots.runs import END_EFFECTOR, draw_actual, draw_desired, finish_over_time, largest_over_time
+from paraflex.plots.selection import names_of, one_run, run_label, select_run
 from paraflex.plots.style import keep_flat
 
 # Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
 _ALIKE = 0.9
-# Lines that can still be told apart in one panel.
-_MOST = 7
 # Links whose motions a page holds in one column.
 _MOST_NARROW = 4
 
@@ -38,17 +28,8 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
 
     Parameters
     ----------
-    data : xarray.Dataset
-        From `paraflex.results`.
-    mode : str
-        Actuation mode.
     bodies : sequence of str, optional
         A row each; by default the two whose tips move most across, twins of a symmetric mechanism counted once.
-
-    Raises
-    ------
-    InputError
-        No such mode or body.
     """
     run = select_run(data, mode)
     chosen = most_deflected(run) if bodies is None else list(bodies)
@@ -67,12 +48,10 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
         unit = display_unit(si_unit, curves)
         for panel, curve, name in zip(column, curves, chosen, strict=True):
             draw_actual(panel, run, data["time"].values, unit.factor * curve, label=run_label(run))
-            shade_rest(panel, data)
             keep_flat(panel, unit.factor * peak(curves))
             panel.set_title(f"{symbol(name)}: {title}")
             panel.set_ylabel(axis_label(quantity, unit=unit.name))
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=34.0)
+    return finish_over_time(figure, axes, data, panel_height=34.0)
 
 
 def most_deflected(run: xr.Dataset) -> list[str]:
@@ -91,37 +70,24 @@ def most_deflected(run: xr.Dataset) -> list[str]:
 
 @drawn
 def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Transverse displacement of links' last ends from the tangents at their first; of more than seven, of the largest.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `results.tracking_dataset` or `motion_dataset`.
-    mode : str, optional
-        Actuation mode; by default that with most active motors.
-
-    Raises
-    ------
-    InputError
-        No such mode, or no body that bends.
-    """
+    """Transverse displacement of links' last ends from the tangents at their first ends; at most the seven largest."""
     run = one_run(data, mode)
     across = run["tip_transverse"].transpose("time", "body").values
-    sizes = np.array([peak(values) for values in across.T])
-    if not sizes.any():
+    if not peak(across):
         raise InputError(
             "no body of these results bends", field="figure", value="link_deflections",
             remedy="choose another figure, or run the mechanism with flexible links",
         )  # fmt: skip
-    largest = [k for k in np.argsort(-sizes, kind="stable")[:_MOST] if sizes[k] > 0.0]
     unit = display_unit("m", across)
-    names = [str(name) for name in run["body"].values]
-    figure, axes = panels(1, 1)
-    draw_curves(axes[0, 0], run, {symbol(names[k]): unit.factor * across[:, k] for k in sorted(largest)})
-    axes[0, 0].set_ylabel(axis_label("displacement", unit=unit.name))
-    shade_rest(axes[0, 0], data)
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=56.0)
+    return largest_over_time(data, run, unit.factor * across, "body", axis_label("displacement", unit=unit.name))
+
+
+@drawn
+def joint_forces(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Magnitude of the force in every joint in time; of more than seven, in those with the largest."""
+    run = one_run(data, mode)
+    forces = np.linalg.norm(run["joint_force"].transpose("time", "joint", "axis").values, axis=2)
+    return largest_over_time(data, run, forces, "joint", axis_label("force"))
 
 
 @drawn
@@ -129,18 +95,6 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
     """Angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14).
 
     In one column those of the first four.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `paraflex.results`.
-    mode : str
-        Actuation mode.
-
-    Raises
-    ------
-    InputError
-        No such mode.
     """
     columns = ("angle", "angular_velocity", "angular_acceleration")
     run, time = select_run(data, mode), data["time"].values
@@ -151,32 +105,17 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
         for panel, body in zip(column, bodies, strict=True):
             draw_actual(panel, run, time, run[variable].sel(body=body).values, linewidth=0.6)
             draw_desired(panel, time, run[f"{variable}_desired"].sel(body=body).values)
-            shade_rest(panel, data)
             keep_flat(panel, scale)
             panel.set_title(f"{symbol(str(body))}: {QUANTITIES[variable].name}")
             panel.set_ylabel(axis_label(variable, short=True))
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=21.5)
+    return finish_over_time(figure, axes, data, panel_height=21.5)
 
 
 @drawn
 def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
-    """Displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16).
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `paraflex.results`.
-    mode : str
-        Actuation mode.
-
-    Raises
-    ------
-    InputError
-        No such mode.
-    """
+    """Displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16)."""
     run, time = select_run(data, mode), data["time"].values
-    directions = [str(axis) for axis in data["axis"].values]
+    directions = names_of(data, "axis")
     figure, axes = panels(len(END_EFFECTOR), len(directions))
     for row, (variable, quantity, factor) in zip(axes, END_EFFECTOR, strict=True):
         desired = factor * run[f"{variable}_desired"]
@@ -184,10 +123,8 @@ def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
         for panel, axis in zip(row, directions, strict=True):
             draw_actual(panel, run, time, factor * run[variable].sel(axis=axis).values)
             draw_desired(panel, time, desired.sel(axis=axis).values)
-            shade_rest(panel, data)
             keep_flat(panel, scale)
             panel.set_ylabel(axis_label(quantity, direction=axis, short=True))
     for panel, axis in zip(axes[0], directions, strict=True):
         panel.set_title(f"${axis}$ direction")
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=33.0)
+    return finish_over_time(figure, axes, data, panel_height=33.0)

@@ -17,7 +17,8 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import peak
 from paraflex.plots.layout import ONE_COLUMN, equal_scales_height, is_narrow, lay_out, panels
 from paraflex.plots.mechanism import draw_mechanism
-from paraflex.plots.runs import START, draw_actual, draw_desired, run_label, select_run
+from paraflex.plots.runs import START, draw_actual, draw_desired
+from paraflex.plots.selection import run_label, select_run
 from paraflex.plots.style import BLUE
 
 # Room round what is drawn, and the height of a panel beside its width, at least and at most.
@@ -29,13 +30,7 @@ _SHOWN_DEVIATION = 0.15
 
 @drawn
 def desired_path(data: xr.Dataset) -> Figure:
-    """The path the end-effector should follow, and the mechanism in its start pose (Fig. 11).
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `paraflex.results`.
-    """
+    """The path the end-effector should follow, and the mechanism in its start pose (Fig. 11)."""
     path = 1e3 * data["end_effector_desired"].isel(mode=0).transpose("time", "axis").values
     figure, axes = workspace_panel()
     axes.plot(*path.T, color=BLUE, linewidth=1.3, zorder=2.6, label="desired path")
@@ -51,17 +46,8 @@ def end_effector_path(data: xr.Dataset, mode: str, magnification: float | None =
 
     Parameters
     ----------
-    data : xarray.Dataset
-        From `paraflex.results`.
-    mode : str
-        Actuation mode.
     magnification : float, optional
         Of the deviation; by default the largest of 1, 2, 5, 10, ... that keeps it small beside the path.
-
-    Raises
-    ------
-    InputError
-        No such mode, or a magnification that is not positive.
     """
     run = select_run(data, mode)
     return deviated_paths({f"actual, {run_label(run)}": run}, magnification)
@@ -70,13 +56,7 @@ def end_effector_path(data: xr.Dataset, mode: str, magnification: float | None =
 def deviated_paths(
     runs: Mapping[str, xr.Dataset], magnification: float | None, looks: Sequence[Mapping[str, Any]] = ({},)
 ) -> Figure:
-    """Paths of the end-effector in runs with one desired path, by their labels, deviations magnified alike.
-
-    Raises
-    ------
-    InputError
-        A magnification that is not positive.
-    """
+    """Paths of the end-effector in runs with one desired path, by their labels, deviations magnified alike."""
     first = next(iter(runs.values()))
     desired = 1e3 * first["end_effector_desired"].transpose("time", "axis").values
     deviations = [1e3 * run["end_effector"].transpose("time", "axis").values - desired for run in runs.values()]

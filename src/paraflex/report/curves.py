@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.plots.labels import display_unit, text_symbol
+from paraflex.plots.selection import names_of
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.page import Chart, Curve, Look
 
@@ -15,9 +18,15 @@ from paraflex.report.page import Chart, Curve, Look
 COLOURS, DASHES = 8, 5
 DOTTED = 2
 MOST_SAMPLES = 2000
-# What the charts of tip displacements show: a deflection is from a link's chord.
-TIP_TITLE, TIP_LABEL = "Displacements of the links' ends across them", "transverse displacement of the tip"
-TIP_NOTE = "Of a link's last end from the tangent at its first end."
+# Charts without their curves. A deflection is from a link's chord, which displacements of ends are not.
+ERRORS = Chart(
+    "errors", "Tracking error", "distance", log=True, note="Distance of the end-effector from its desired place."
+)
+STRAIN = Chart("strain", "Strain energy", "strain energy")
+TIPS = Chart(
+    "deflections", "Displacements of the links' ends across them", "transverse displacement of the tip",
+    choosing="link", note="Of a link's last end from the tangent at its first end.",
+)  # fmt: skip
 
 
 def look(k: int) -> Look:
@@ -25,98 +34,100 @@ def look(k: int) -> Look:
     return Look(k % COLOURS, (k % COLOURS + k // COLOURS) % DASHES)
 
 
+def labelled(label: str, unit: str) -> str:
+    """The label of an axis with its unit, where it has one."""
+    return label if unit in ("1", "") else f"{label} [{unit}]"
+
+
+def largest(values: NDArray[np.float64]) -> float:
+    """Largest finite magnitude; NaN where there is none."""
+    magnitudes = np.abs(values[np.isfinite(values)])
+    return float(magnitudes.max()) if magnitudes.size else float("nan")
+
+
+def errors(data: xr.Dataset) -> xr.DataArray:
+    """Distance of the end-effector from its desired place [m]; dimensions as those of the runs, time last."""
+    gaps = (data["end_effector"] - data["end_effector_desired"]).transpose(..., "axis")
+    return gaps.reduce(np.linalg.norm, "axis").assign_attrs(units="m")
+
+
+def torque_unit(data: xr.Dataset) -> str:
+    """Of the motors: "N m", or "N" of those that slide."""
+    return str(data["torque"].attrs.get("units", "N m"))
+
+
+def torque_chart(data: xr.Dataset) -> Chart:
+    """The chart of what motors do, without its curves."""
+    effort = "force" if torque_unit(data) == "N" else "torque"
+    return Chart("torques", f"Motor {effort}s", effort, choosing="motor")
+
+
+def bending(data: xr.Dataset, name: str = "tip_transverse") -> xr.DataArray:
+    """Displacements of the ends of the links that bend."""
+    bent = [largest(data["tip_transverse"].sel(body=body).values) > 0.0 for body in data["body"].values]
+    return data[name].isel(body=np.flatnonzero(bent))
+
+
 def followed(
-    identity: str,
-    title: str,
-    label: str,
-    unit: str,
-    values: NDArray[np.float64],
-    parts: Sequence[str],
+    chart: Chart,
+    values: xr.DataArray,
     runs: Sequence[str],
     *,
-    desired: NDArray[np.float64] | None = None,
+    desired: xr.DataArray | None = None,
     selecting: str = "mode",
-    choosing: str = "link",
-    note: str = "",
 ) -> Chart:
     """Curves over time of the selected run, one for each part; or those of one part in all runs, if there are more.
 
     Parameters
     ----------
-    identity, title, label, unit : str
-        Of the chart; what stands at its vertical axis; the unit of the values.
-    values : (runs, samples, parts) array
-    parts, runs : sequence of str
-    desired : (samples, parts) array, optional
-        Drawn dashed.
-    selecting, choosing, note : str
+    chart : Chart
+        Without curves and unit.
+    values : (runs, samples, parts) DataArray
+        In the unit that its attributes name; its last dimension names the parts.
+    runs : sequence of str
+    desired : (samples, parts) DataArray, optional
+        Drawn dotted.
+    selecting : str
+        What a run is called.
     """
-    shown = display_unit(unit, values)
-    curves = [
-        Curve(
-            text_symbol(part),
-            shown.factor * values[r, :, p],
-            run=r,
-            shown=(r,),
-            choice=0,
-            look=look(p) if desired is None else Look(look(p).colour),
-        )
-        for r in range(len(runs))
-        for p, part in enumerate(parts)
-    ]
-    if desired is not None:
-        curves += [
-            Curve("desired", shown.factor * desired[:, p], choice=0, look=Look(look(p).colour, DOTTED), quiet=True)
-            for p in range(len(parts))
-        ]
-    choices = [f"all {choosing}s" if len(parts) > 1 else text_symbol(parts[0])] if parts else []
-    if len(runs) > 1:
-        for p, part in enumerate(parts):
-            curves += [
-                Curve(run, shown.factor * values[r, :, p], run=r, choice=len(choices), look=look(r))
-                for r, run in enumerate(runs)
-            ]
-            if desired is not None:
-                curves.append(
-                    Curve("desired", shown.factor * desired[:, p], choice=len(choices), look=Look(dash=DOTTED))
-                )
-            choices.append(f"{text_symbol(part)}, all {selecting}s")
-    return Chart(
-        identity, title, f"{label} [{shown.name}]", curves,
-        choices=choices if len(choices) > 1 else (), choosing=choosing, note=note,
-    )  # fmt: skip
-
-
-def compared(
-    identity: str,
-    title: str,
-    label: str,
-    unit: str,
-    values: NDArray[np.float64],
-    runs: Sequence[str],
-    *,
-    log: bool = False,
-    note: str = "",
-) -> Chart:
-    """A quantity (runs, samples) over time in all runs."""
-    shown = display_unit(unit, values)
-    factor = shown.factor
-    curves = [Curve(run, factor * values[r], run=r, look=look(r)) for r, run in enumerate(runs)]
-    name = f"{label} [{shown.name}]" if shown.name not in ("1", "") else label
-    return Chart(identity, title, name, curves, log=log, note=note)
-
-
-def plane_path(actual: NDArray[np.float64], desired: NDArray[np.float64], runs: Sequence[str]) -> Chart:
-    """Paths of the end-effector (runs, samples, 2), deviations also magnified, and where it should go.
-
-    The desired path is of all runs (samples, 2), or of each (runs, samples, 2).
-    """
+    parts = names_of(values, str(values.dims[-1]))
+    unit = display_unit(values.attrs["units"], values.values)
+    shown = unit.factor * values.values
+    wanted = None if desired is None else unit.factor * desired.values
+    choices = [f"all {_plural(chart.choosing)}" if len(parts) > 1 else text_symbol(parts[0])] if parts else []
     curves = []
     for r in range(len(runs)):
-        way, shown = (1e3 * desired, None) if desired.ndim == 2 else (1e3 * desired[r], (r,))
+        for p, part in enumerate(parts):
+            own = look(p) if wanted is None else Look(look(p).colour)
+            curves.append(Curve(text_symbol(part), shown[r, :, p], run=r, shown=(r,), choice=0, look=own))
+    if wanted is not None:
+        for p in range(len(parts)):
+            curves.append(Curve("desired", wanted[:, p], choice=0, look=Look(look(p).colour, DOTTED), quiet=True))
+    for p, part in enumerate(parts if len(runs) > 1 else ()):
+        choice = len(choices)
+        curves += [Curve(run, shown[r, :, p], run=r, choice=choice, look=look(r)) for r, run in enumerate(runs)]
+        if wanted is not None:
+            curves.append(Curve("desired", wanted[:, p], choice=choice, look=Look(dash=DOTTED)))
+        choices.append(f"{text_symbol(part)}, all {_plural(selecting)}")
+    choices = choices if len(choices) > 1 else ()
+    return replace(chart, y=labelled(chart.y, unit.name), curves=curves, choices=choices)
+
+
+def compared(chart: Chart, values: xr.DataArray, runs: Sequence[str]) -> Chart:
+    """A quantity (runs, samples) over time in all runs, in a chart without curves and unit."""
+    unit = display_unit(values.attrs["units"], values.values)
+    curves = [Curve(run, unit.factor * values.values[r], run=r, look=look(r)) for r, run in enumerate(runs)]
+    return replace(chart, y=labelled(chart.y, unit.name), curves=curves)
+
+
+def plane_path(data: xr.Dataset, runs: Sequence[str], *, common: bool = True) -> Chart:
+    """Paths of the end-effector, deviations also magnified, and where it should go: in common, or each run its own."""
+    actual, desired = (1e3 * data[name].values for name in ("end_effector", "end_effector_desired"))
+    curves = []
+    for r in range(len(runs)):
+        places, way, shown = actual[r], desired[0 if common else r], None if common else (r,)
         if r == 0 or shown:
             curves.append(Curve("desired", way[:, 1], way[:, 0], Look(dash=1), shown=shown))
-        places = 1e3 * actual[r]
         curves.append(Curve("actual", places[:, 1], places[:, 0], Look(0), run=r, shown=(r,)))
         times = round_magnification(places - way, float(np.ptp(way, axis=0).max()))
         if times > 1.0:
@@ -126,6 +137,21 @@ def plane_path(actual: NDArray[np.float64], desired: NDArray[np.float64], runs: 
     return Chart("path", "End-effector path", "y [mm]", curves, x="x [mm]", equal=True, over_time=False)
 
 
-def thinned(samples: int) -> slice:
+def energies(data: xr.Dataset, runs: Sequence[str]) -> Chart:
+    """Kinetic and strain energy and work of the selected run."""
+    names = {"kinetic_energy": "kinetic", "strain_energy": "strain", "work": "work done on it"}
+    curves = [
+        Curve(label, data[name].values[r], run=r, shown=(r,), look=look(k))
+        for r in range(len(runs))
+        for k, (name, label) in enumerate(names.items())
+    ]
+    return Chart("energies", "Energies", "energy [J]", curves)
+
+
+def thinned(data: xr.Dataset) -> xr.Dataset:
     """Every so manieth sample, where there are more than a chart can show."""
-    return slice(None, None, max(1, -(-samples // MOST_SAMPLES)))
+    return data.isel(time=slice(None, None, max(1, -(-data.sizes["time"] // MOST_SAMPLES))))
+
+
+def _plural(what: str) -> str:
+    return "bodies" if what == "body" else f"{what}s"

@@ -75,19 +75,13 @@ class Studied:
 
 
 def read_studied(files: Sequence[Path]) -> Studied:
-    """The rows of a study, from the files that `tables_of` its folder names.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read, or is none of ours.
-    """
+    """The rows of a study, from the files that `tables_of` its folder names."""
     import pyarrow as pa
 
     table = read_designs(files)
-    told = pa.concat_tables([read_table(file).select(["run", "design", "status", "reason"]) for file in files])
-    texts = {name: np.array(told[name].to_pylist(), dtype=str) for name in ("status", "reason")}
-    studied = Studied(table, told["run"].to_numpy(), told["design"].to_numpy(), **texts)
+    rows = pa.concat_tables([read_table(file).select(["run", "design", "status", "reason"]) for file in files])
+    texts = {name: np.array(rows[name].to_pylist(), dtype=str) for name in ("status", "reason")}
+    studied = Studied(table, rows["run"].to_numpy(), rows["design"].to_numpy(), **texts)
     order = np.argsort(studied.run, kind="stable")
     return studied if np.array_equal(order, np.arange(order.size)) else studied.only(order)
 
@@ -147,9 +141,9 @@ def reasons(studied: Studied) -> list[tuple[str, str, int]]:
         if status != _COMPLETE:
             groups.setdefault((status, _NUMBER.sub("#", reason)), []).append(reason)
     most = sorted(groups.items(), key=lambda group: -len(group[1]))
-    told = [(status, texts[0], len(texts)) for (status, _), texts in most[:_REASONS]]
+    found = [(status, texts[0], len(texts)) for (status, _), texts in most[:_REASONS]]
     left = sum(len(texts) for _, texts in most[_REASONS:])
-    return [*told, *([("", "other reasons; the table has them", left)] if left else [])]
+    return [*found, *([("", "other reasons; the table has them", left)] if left else [])]
 
 
 def _is_wide(values: NDArray[np.float64], share: float) -> bool:

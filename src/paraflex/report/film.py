@@ -51,7 +51,7 @@ class Animation:
     scenes: Sequence[Scene | None]
     path: Array | None = None
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The animation as JSON holds it."""
         known = [one for one in self.scenes if one is not None]
         limits = common_limits(known) if known else Limits(-1.0, 1.0, -1.0, 1.0)

@@ -8,13 +8,13 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.plots.labels import DisplayUnit, display_unit, text_symbol
-from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, followed, look, thinned
+from paraflex.plots.labels import DisplayUnit, text_symbol
+from paraflex.plots.selection import names_of
+from paraflex.report.curves import TIPS, bending, energies, followed, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
-from paraflex.report.text import count, number, pairs
-from paraflex.report.tracking import energies, largest
+from paraflex.report.text import count, number, pairs, quantity
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.validity import validity_line, validity_summary
@@ -30,7 +30,7 @@ def motion_page(data: xr.Dataset) -> Page:
     check_kind(data, "motion")
     data = data.transpose("time", ...)
     moving = animation(data, ())
-    few = data.isel(time=thinned(data.sizes["time"]))
+    few = thinned(data)
     status = str(data["status"].item())
     return Page(
         title=data.attrs["mechanism"],
@@ -73,25 +73,20 @@ def _table(data: xr.Dataset) -> str:
 
 
 def _panels(data: xr.Dataset) -> list[Panel]:
-    bodies = [str(name) for name in data["body"].values]
-
-    def of_bodies(identity: str, title: str, label: str, unit: str, variable: str) -> Chart:
-        return followed(identity, title, label, unit, data[variable].values[None], bodies, _ALONE, choosing="body")
-
-    motion = [
-        of_bodies("angles", "Angles", "angle", "rad", "angle"),
-        of_bodies("rates", "Angular velocities", "angular velocity", "rad/s", "angular_velocity"),
-    ]
-    bent = [b for b in range(len(bodies)) if largest(data["tip_transverse"].values[:, b]) > 0.0]
-    if bent:
-        names, values = [bodies[b] for b in bent], data["tip_transverse"].values[None, :, bent]
-        motion.append(followed("deflections", TIP_TITLE, TIP_LABEL, "m", values, names,
-                               _ALONE, note=TIP_NOTE))  # fmt: skip
+    # A run beside no other.
+    run, bodies = data.expand_dims("run"), names_of(data, "body")
+    angles, rates = (
+        Chart("angles", "Angles", "angle", choosing="body"),
+        Chart("rates", "Angular velocities", "angular velocity", choosing="body"),
+    )
+    motion = [followed(angles, run["angle"], _ALONE), followed(rates, run["angular_velocity"], _ALONE)]
+    if bending(run).size:
+        motion.append(followed(TIPS, bending(run), _ALONE))
     motion.append(_phases(data, bodies))
     points = _points(data)
     if points is not None:
         motion.append(points)
-    panels = [Panel("Motion", motion), Panel("Energies", [energies(data, list(_ALONE))])]
+    panels = [Panel("Motion", motion), Panel("Energies", [energies(run, _ALONE)])]
     if data.sizes["joint"]:
         panels.append(Panel("Joints", [_joint_forces(data)]))
     return [*panels, Panel("Coordinates", [_coordinates(data, bodies)])]
@@ -106,7 +101,7 @@ def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:
 def _points(data: xr.Dataset) -> Chart | None:
     """Paths of the points that move and that no joint made by the program holds."""
     places = data["point_position"].transpose("point", "time", "axis").values
-    names = [str(name) for name in data["point"].values]
+    names = names_of(data, "point")
     moving = [
         k for k, name in enumerate(names)
         if "._" not in name and np.isfinite(places[k, :, 0]).any() and np.nanmax(np.nanstd(places[k], axis=0)) > 1e-9
@@ -125,7 +120,7 @@ def _points(data: xr.Dataset) -> Chart | None:
 
 def _joint_forces(data: xr.Dataset) -> Chart:
     force = data["joint_force"].transpose("joint", "time", "axis").values
-    names = [str(name) for name in data["joint"].values][:_MOST]
+    names = names_of(data, "joint")[:_MOST]
     curves = []
     for j in range(len(names)):
         magnitude = np.linalg.norm(force[j], axis=-1)
@@ -139,7 +134,7 @@ def _joint_forces(data: xr.Dataset) -> Chart:
 
 def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
     """Coordinates of one body at a time: its frame's place and angle, and its flexible ones."""
-    names = [str(name) for name in data["coordinate"].values]
+    names = names_of(data, "coordinate")
     values = data["coordinate_value"].transpose("coordinate", "time").values
     curves, choices = [], []
     for body in bodies[:_MOST]:
@@ -169,10 +164,9 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     name = "deflection" if "deflection" in data else "tip_transverse"
     deflections = np.abs(data[name].transpose("time", "body").values)
     if largest(deflections) > 0.0:
-        unit = display_unit("m", deflections)
         body = int(np.argmax([largest(one) for one in deflections.T]))
-        value = f"{number(largest(deflections), unit.factor)} {unit.name}"
-        tiles.append(("largest deflection", value, text_symbol(str(data["body"].values[body]))))
+        name = text_symbol(str(data["body"].values[body]))
+        tiles.append(("largest deflection", quantity(largest(deflections), "m"), name))
     force = np.linalg.norm(data["joint_force"].transpose("joint", "time", "axis").values, axis=-1)
     if largest(force) > 0.0:
         joint = int(np.argmax([np.nan_to_num(largest(one)) for one in force]))

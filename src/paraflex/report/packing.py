@@ -39,7 +39,7 @@ class Series:
             self.rows.append(raw)
         return self._numbers[raw]
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """All rows as JSON holds them: their lengths, and their bytes."""
         joined = np.frombuffer(b"".join(self.rows), dtype=np.uint8)
         return {"lengths": [len(row) // 4 for row in self.rows], "data": _deflated(joined.reshape(-1, 4))}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from html import escape
 from importlib.metadata import version
@@ -58,7 +58,7 @@ class Curve:
     choice : int, optional
         Which of the chart's choices shows it; every one by default.
     quiet : bool
-        Not told of where the pointer is.
+        Left out of what is said of where the pointer is.
     """
 
     name: str
@@ -263,7 +263,7 @@ def render(page: Page) -> str:
         no_survey="" if page.survey else "hidden",
         version=escape(version("paraflex")),
         style="\n".join(map(_asset, _STYLES)),
-        data=_script_json(_told(page)),
+        data=_script_json(_data(page)),
         scripts="\n".join(map(_asset, _SCRIPTS)),
         plotly=plotly_script(),
     )
@@ -283,13 +283,7 @@ def save_page(page: Page, path: str | Path) -> None:
 
 @cache
 def plotly_script() -> str:
-    """Plotly's own script, from its Python package, which is not imported for it: that would take a second.
-
-    Raises
-    ------
-    InputError
-        The package is not installed, or has no script in it.
-    """
+    """Plotly's own script, from its Python package, which is not imported for it: that would take a second."""
     found = find_spec("plotly")
     for folder in (found.submodule_search_locations or []) if found else []:
         script = Path(folder) / "package_data" / "plotly.min.js"
@@ -301,60 +295,52 @@ def plotly_script() -> str:
     )
 
 
-def _told(page: Page) -> dict[str, Any]:
+def _data(page: Page) -> dict[str, Any]:
     """What the scripts are given."""
     series = Series()
     time = series.add(page.time, exact=True)
+
+    def panels(some: Sequence[Panel]) -> list[dict[str, Any]]:
+        return [{"title": one.title, "charts": [_chart(chart, series, time) for chart in one.charts]} for one in some]
+
     return {
         "time": time,
         "runs": list(page.runs),
         "selecting": page.selecting,
         "selected": page.selected,
-        "panels": _panels(page.panels, series, time),
-        "survey": _panels(page.survey, series, time),
+        "panels": panels(page.panels),
+        "survey": panels(page.survey),
         "designs": None if page.designs is None else _designs(page.designs, series),
-        "film": None if page.film is None else page.film.told(),
-        "series": series.told(),
+        "film": None if page.film is None else page.film.to_dict(),
+        "series": series.to_dict(),
     }
 
 
-def _panels(panels: Sequence[Panel], series: Series, time: int) -> list[dict[str, Any]]:
-    return [
-        {"title": panel.title, "charts": [_chart(chart, series, time) for chart in panel.charts]} for panel in panels
-    ]
+def _fields(thing: Any, *left_out: str) -> dict[str, Any]:
+    """Fields of a dataclass as they are, but for some."""
+    return {one.name: getattr(thing, one.name) for one in fields(thing) if one.name not in left_out}
 
 
 def _designs(designs: Designs, series: Series) -> dict[str, Any]:
-    plain = ("identity", "name", "unit", "parameter", "log")
     numbers = {name: series.add(getattr(designs, name), exact=True) for name in ("member", "number", "shown")}
     return numbers | {
         "telling": designs.telling,
-        "columns": [
-            {name: getattr(column, name) for name in plain} | {"row": series.add(column.values)}
-            for column in designs.columns
-        ],
-        "series": [{"name": name, "colour": look.colour, "dash": look.dash} for name, look in designs.series],
+        "columns": [_fields(column, "values") | {"row": series.add(column.values)} for column in designs.columns],
+        "series": [{"name": name} | look._asdict() for name, look in designs.series],
     }
 
 
 def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
-    plain = ("identity", "title", "y", "x", "choosing", "log", "equal", "over_time", "note", "drawer")
-    return {name: getattr(chart, name) for name in plain} | {
+    return _fields(chart) | {
         "pickers": [picker._asdict() for picker in chart.pickers],
         "choices": list(chart.choices),
         "figure": None if chart.figure is None else dict(chart.figure),
-        "curves": [_curve(curve, series, time) for curve in chart.curves],
-    }
-
-
-def _curve(curve: Curve, series: Series, time: int) -> dict[str, Any]:
-    plain = ("name", "run", "shown", "choice", "quiet")
-    return {name: getattr(curve, name) for name in plain} | {
-        "colour": curve.look.colour,
-        "dash": curve.look.dash,
-        "x": time if curve.x is None else series.add(curve.x),
-        "y": series.add(curve.y),
-    }
+        "curves": [
+            _fields(curve, "look") | curve.look._asdict()
+            | {"x": time if curve.x is None else series.add(curve.x), "y": series.add(curve.y)}
+            for curve in chart.curves
+        ],
+    }  # fmt: skip
 
 
 def _sections(parts: Sequence[tuple[str, str]]) -> str:

@@ -14,18 +14,19 @@ from paraflex.results.doubts import FINDINGS, verdict_of
 
 # What a run takes where nothing is said.
 _FLAGS = ("rigid", "ked", "balanced")
-_GIVEN = {
-    "duration": "--duration",
-    "samples": "--samples",
-    "tolerance": "--tol",
-    "method": "--method",
-    "step": "--step",
-    "constraints": "--constraints",
-    "segments": "--segments",
-    "reference": "--reference",
-    "curvature": "--curvature",
-    "after": "--after",
-}
+_NAMED = (
+    "duration",
+    "samples",
+    "tolerance",
+    "method",
+    "step",
+    "constraints",
+    "segments",
+    "reference",
+    "curvature",
+    "after",
+)
+_GIVEN = {name: f"--{name}" for name in _NAMED} | {"tolerance": "--tol"}
 
 
 def asked(data: xr.Dataset) -> dict[str, Any]:

@@ -11,7 +11,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.report.choice import Picked, drawn_rows
-from paraflex.report.curves import TIP_LABEL, TIP_NOTE, TIP_TITLE, compared, followed, plane_path, thinned
+from paraflex.report.curves import (
+    ERRORS,
+    STRAIN,
+    TIPS,
+    bending,
+    compared,
+    errors,
+    followed,
+    plane_path,
+    thinned,
+    torque_chart,
+)
 from paraflex.report.designs import Studied, columns, metric_name, reasons, shown_unit
 from paraflex.report.film import animation
 from paraflex.report.page import Page, Panel
@@ -31,7 +42,7 @@ _COORDINATES = (
 )  # fmt: skip
 
 
-class Parameter(NamedTuple):
+class VariedParameter(NamedTuple):
     """What was varied: fields of the mechanism's file, unit, lowest and highest value, how they are spread."""
 
     fields: tuple[str, ...]
@@ -52,7 +63,7 @@ class StudyAccount:
     name, mechanism : str
     total : int or None
         Runs of the whole study.
-    parameters : mapping of str to Parameter
+    parameters : mapping of str to VariedParameter
     facts : sequence of (str, str)
     runs : mapping of int to Dataset
         Runs made again, by row.
@@ -67,7 +78,7 @@ class StudyAccount:
     name: str
     mechanism: str
     total: int | None
-    parameters: Mapping[str, Parameter]
+    parameters: Mapping[str, VariedParameter]
     facts: Sequence[tuple[str, str]] = ()
     runs: Mapping[int, xr.Dataset] = field(default_factory=dict)
     failed: Mapping[int, str] = field(default_factory=dict)
@@ -93,7 +104,7 @@ def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount
     units = {name: one.unit for name, one in account.parameters.items()}
     logarithmic = [name for name, one in account.parameters.items() if one.spread == "log"]
     drawn = columns(studied, rows, units, logarithmic)
-    few = None if data is None else data.isel(time=thinned(data.sizes["time"]))
+    few = None if data is None else thinned(data)
     missing = dict(account.failed) | dict.fromkeys(
         others, "it has other bodies, joints, motors or springs than the first"
     )
@@ -183,11 +194,11 @@ def _subtitle(studied: Studied, account: StudyAccount) -> str:
     designs = len(np.unique(studied.design))
     modes = list(dict.fromkeys(studied.table.mode.tolist()))
     paths = list(dict.fromkeys(studied.table.path.tolist()))
-    told = [account.mechanism, f"{count(designs)} designs" if designs != 1 else "one design"]
+    parts = [account.mechanism, f"{count(designs)} designs" if designs != 1 else "one design"]
     if modes:
-        told.append(f"modes {', '.join(modes)}" if len(modes) > 1 else f"mode {modes[0]}")
-        told.append(f"paths {', '.join(paths)}" if len(paths) > 1 else f"path “{paths[0]}”")
-    return ", ".join(told)
+        parts.append(f"modes {', '.join(modes)}" if len(modes) > 1 else f"mode {modes[0]}")
+        parts.append(f"paths {', '.join(paths)}" if len(paths) > 1 else f"path “{paths[0]}”")
+    return ", ".join(parts)
 
 
 def _tiles(studied: Studied, account: StudyAccount) -> list[tuple[str, str, str]]:
@@ -217,8 +228,7 @@ def _best_table(studied: Studied, picked: Sequence[Picked], shown: Sequence[int]
     heads.append(("best in", ""))
     for name, parameter in named[:_MOST_COLUMNS]:
         values = (studied.table.parameters if parameter else studied.table.metrics)[name]
-        told = units.get(name, "") if parameter else studied.table.units.get(name, "")
-        unit, factor = shown_unit(told, values)
+        unit, factor = shown_unit((units if parameter else studied.table.units).get(name, ""), values)
         heads.append((name.replace("_", " ") if parameter else metric_name(name), f"[{unit}]" if unit else ""))
         for row, _ in picked:
             cells[row].append(number(values[row], factor))
@@ -244,10 +254,10 @@ def _parameter_table(account: StudyAccount) -> str:
 
 def _trouble(studied: Studied) -> list[tuple[str, str]]:
     """Why runs are not complete, alike ones together."""
-    told = reasons(studied)
-    if not told:
+    found = reasons(studied)
+    if not found:
         return []
-    rows = [(status or NOTHING, [count(number), reason]) for status, reason, number in told]
+    rows = [(status or NOTHING, [count(number), reason]) for status, reason, number in found]
     heads = [("status", ""), ("runs", ""), ("reason", "one of those alike")]
     return [("Runs that are not complete", f'<div class="long">{table(heads, rows, caption="Reasons")}</div>')]
 
@@ -265,26 +275,13 @@ def _not_shown(studied: Studied, missing: Mapping[int, str]) -> list[str]:
 
 def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     """The runs shown in motion, over time."""
-    place, desired = (data[name].transpose("mode", "time", "axis").values for name in _KEPT[:2])
-    gaps = np.linalg.norm(place - desired, axis=-1)
-    motors, bodies = ([str(name) for name in data[dim].values] for dim in ("motor", "body"))
-    torque = data["torque"].transpose("mode", "time", "motor").values
-    unit = str(data["torque"].attrs.get("units", "N m"))
+    data = data.transpose("mode", "time", ...)
     charts = [
-        compared("errors", "Tracking error", "distance", "m", gaps, runs, log=True,
-                 note="Distance of the end-effector from its desired place."),
-        plane_path(place, desired, runs),
-        followed("torques", "Motor forces" if unit == "N" else "Motor torques", "force" if unit == "N" else "torque",
-                 unit, torque, motors, runs, selecting="design", choosing="motor"),
-    ]  # fmt: skip
-    deflection = data["tip_transverse"].transpose("mode", "time", "body").values
-    bent = [b for b in range(len(bodies)) if np.nanmax(np.abs(deflection[:, :, b]), initial=0.0) > 0.0]
-    if bent:
-        charts.append(followed(
-            "deflections", TIP_TITLE, TIP_LABEL, "m", deflection[:, :, bent],
-            [bodies[b] for b in bent], runs, selecting="design",
-            note=TIP_NOTE,
-        ))  # fmt: skip
-    energy = data["strain_energy"].transpose("mode", "time").values
-    charts.append(compared("strain", "Strain energy", "strain energy", "J", energy, runs))
+        compared(ERRORS, errors(data), runs),
+        plane_path(data, runs, common=False),
+        followed(torque_chart(data), data["torque"], runs, selecting="design"),
+    ]
+    if bending(data).size:
+        charts.append(followed(TIPS, bending(data), runs, selecting="design"))
+    charts.append(compared(STRAIN, data["strain_energy"], runs))
     return [Panel("The best designs in motion", charts)]

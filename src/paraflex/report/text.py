@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from paraflex.plots.labels import raised
+from paraflex.plots.labels import display_unit, raised
 
 # Magnitudes written out; others as powers of ten.
 _SMALLEST, _LARGEST = 1e-3, 1e5
@@ -29,6 +29,12 @@ def number(value: float | None, factor: float = 1.0) -> str:
     # Whole numbers of four or five digits are kept.
     text = f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:#.3g}".rstrip(".")
     return text.replace("-", "−")
+
+
+def quantity(value: float, unit: str) -> str:
+    """A value in the unit that suits it: "0.377 mm"."""
+    shown = display_unit(unit, value)
+    return f"{number(value, shown.factor)} {shown.name}"
 
 
 def count(value: float | None) -> str:
@@ -69,11 +75,7 @@ def table(
         f'<th scope="col"{_WORDS if words else ""}>{escape(name)}{_small(unit)}</th>'
         for (name, unit), words in zip(heads, wordy, strict=True)
     )
-    body = "".join(
-        f"<tr{_data_run(runs.get(name))}{_data_keys(keys, name)}>"
-        f"{_row_head(name, runs.get(name))}{''.join(map(_cell, cells))}</tr>"
-        for name, cells in rows
-    )
+    body = "".join(_row(name, cells, runs.get(name), keys[name] if keys else None) for name, cells in rows)
     sortable = _SORTABLE if keys else ""
     below = f'<p class="note">{escape(note)}</p>' if note else ""
     return (
@@ -92,20 +94,15 @@ def _small(text: str) -> str:
     return f"<small>{escape(text)}</small>" if text else ""
 
 
-def _data_run(run: int | None) -> str:
-    return "" if run is None else f' data-run="{run}"'
-
-
-def _data_keys(keys: Mapping[str, Sequence[float | str | None]] | None, name: str) -> str:
-    if keys is None:
-        return ""
-    plain = [None if isinstance(key, float) and not math.isfinite(key) else key for key in keys[name]]
-    return f' data-keys="{escape(json.dumps(plain))}"'
-
-
-def _row_head(name: str, run: int | None) -> str:
-    inner = escape(name) if run is None else f'<button type="button" class="pick">{escape(name)}</button>'
-    return f'<th scope="row">{inner}</th>'
+def _row(name: str, cells: Sequence[str], run: int | None, keys: Sequence[float | str | None] | None) -> str:
+    """A row; one of a run of the page is a button, keys are what it is sorted by."""
+    about, head = "", escape(name)
+    if run is not None:
+        about, head = f' data-run="{run}"', f'<button type="button" class="pick">{head}</button>'
+    if keys is not None:
+        plain = [None if isinstance(key, float) and not math.isfinite(key) else key for key in keys]
+        about += f' data-keys="{escape(json.dumps(plain))}"'
+    return f'<tr{about}><th scope="row">{head}</th>{"".join(map(_cell, cells))}</tr>'
 
 
 def _cell(text: str) -> str:

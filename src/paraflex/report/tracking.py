@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -10,22 +11,28 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.plots.labels import display_unit, text_symbol
-from paraflex.plots.runs import default_mode
+from paraflex.plots.selection import default_mode, names_of
 from paraflex.report.curves import (
     DOTTED,
-    TIP_LABEL,
-    TIP_NOTE,
-    TIP_TITLE,
+    ERRORS,
+    STRAIN,
+    TIPS,
+    bending,
     compared,
+    energies,
+    errors,
     followed,
+    largest,
     look,
     plane_path,
     thinned,
+    torque_chart,
+    torque_unit,
 )
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
-from paraflex.report.text import NOTHING, count, number, table
+from paraflex.report.text import NOTHING, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
 from paraflex.results.formulas import during_motion
@@ -46,12 +53,12 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     """
     check_kind(data, "tracking")
     data = data.transpose("mode", "time", ...)
-    runs = [str(name) for name in data["mode"].values]
+    runs = names_of(data, "mode")
     run = asked(data)
     path = run.get("path")
     modes = f"{len(runs)} actuation modes" if len(runs) > 1 else f"actuation mode {runs[0]}"
     moving = animation(data)
-    few = data.isel(time=thinned(data.sizes["time"]))
+    few = thinned(data)
     return Page(
         title=data.attrs["mechanism"],
         kind="run",
@@ -70,26 +77,15 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     )
 
 
-def errors(data: xr.Dataset) -> NDArray[np.float64]:
-    """Distance of the end-effector from its desired place [m]; dimensions as those of the runs, time last."""
-    gaps = (data["end_effector"] - data["end_effector_desired"]).transpose(..., "axis").values
-    return np.linalg.norm(gaps, axis=-1)
-
-
-def torque_unit(data: xr.Dataset) -> str:
-    """Of the motors: "N m", or "N" of those that slide."""
-    return str(data["torque"].attrs.get("units", "N m"))
-
-
 def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     """What every mode came to."""
-    runs = [str(name) for name in data["mode"].values]
+    runs = names_of(data, "mode")
     errors_rms, words = headline(data)
-    gaps, deflections = errors(data), _deflections(data)
+    gaps, deflections = errors(data).values, _deflections(data)
     ranked = gaps[:, during_motion(data["time"].values, data.attrs["motion_end"])] if ranked_by_motion(data) else gaps
     length, bend = display_unit("m", gaps), display_unit("m", deflections)
     after = _after_columns(data)
-    motors = [str(name) for name in data["motor"].values]
+    motors = names_of(data, "motor")
     efforts = [data[name].transpose("mode", "motor").values for name in ("peak_torque", "rms_torque")]
     heads = [
         ("mode", ""), ("status", ""), ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
@@ -162,67 +158,38 @@ def _deflections(data: xr.Dataset) -> NDArray[np.float64]:
     return np.abs(data[name].transpose("mode", "time", "body").values)
 
 
-def largest(values: NDArray[np.float64]) -> float:
-    """Largest finite magnitude; NaN where there is none."""
-    magnitudes = np.abs(values[np.isfinite(values)])
-    return float(magnitudes.max()) if magnitudes.size else float("nan")
-
-
 def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
-    motors, bodies = ([str(name) for name in data[dim].values] for dim in ("motor", "body"))
-    effort = "Motor forces" if torque_unit(data) == "N" else "Motor torques"
-    bent = [b for b in range(len(bodies)) if largest(data["tip_transverse"].values[:, :, b]) > 0.0]
-    charts = [
-        Panel("Following the path", [
-            compared("errors", "Tracking error", "distance", "m", errors(data), runs, log=True,
-                     note="Distance of the end-effector from its desired place."),
-            plane_path(data["end_effector"].values, data["end_effector_desired"].values[0], runs),
-        ]),
-        Panel("Motors", [
-            followed("torques", effort, effort.split()[1][:-1], torque_unit(data), data["torque"].values, motors, runs,
-                     choosing="motor"),
-            compared("condition", "Condition number of the actuation matrix", "condition number", "1",
-                     data["actuation_condition"].values, runs, log=True,
-                     note="Of the matrix from motor torques to forces along the path: it grows without bound towards "
-                          "positions where the active motors lose control of a direction."),
-        ]),
-    ]  # fmt: skip
+    def of_links(identity: str, title: str, label: str, name: str) -> Chart:
+        chart = Chart(identity, title, label, choosing="link")
+        return followed(chart, data[name], runs, desired=data[f"{name}_desired"][0])
+
+    condition = Chart(
+        "condition", "Condition number of the actuation matrix", "condition number", log=True,
+        note="Of the matrix from motor torques to forces along the path: it grows without bound towards positions "
+             "where the active motors lose control of a direction.",
+    )  # fmt: skip
     links = [
-        followed("angles", "Link angles", "angle", "rad", data["angle"].values, bodies, runs,
-                 desired=data["angle_desired"].values[0]),
-        followed("rates", "Link angular velocities", "angular velocity", "rad/s", data["angular_velocity"].values,
-                 bodies, runs, desired=data["angular_velocity_desired"].values[0]),
-        _phases(data, bodies, runs),
-    ]  # fmt: skip
-    if bent:
-        names = [bodies[b] for b in bent]
-        links.insert(0, followed(
-            "deflections", TIP_TITLE, TIP_LABEL, "m",
-            data["tip_transverse"].values[:, :, bent], names, runs,
-            note=TIP_NOTE,
-        ))  # fmt: skip
-        links.insert(1, followed(
-            "axial", "Displacements of the links' ends along them", "axial displacement of the tip", "m",
-            data["tip_axial"].values[:, :, bent], names, runs, note=TIP_NOTE,
-        ))  # fmt: skip
-    return [*charts, Panel("Links", links), Panel("Energies", [energies(data, runs), _strain(data, runs)])]
-
-
-def energies(data: xr.Dataset, runs: list[str]) -> Chart:
-    """Kinetic and strain energy and work of the selected run."""
-    names = {"kinetic_energy": "kinetic", "strain_energy": "strain", "work": "work done on it"}
-    values = np.stack([data[name].values.reshape(len(runs), -1) for name in names], axis=-1)
-    curves = [
-        Curve(name, values[r, :, k], run=r, shown=(r,), look=look(k))
-        for r in range(len(runs))
-        for k, name in enumerate(names.values())
+        of_links("angles", "Link angles", "angle", "angle"),
+        of_links("rates", "Link angular velocities", "angular velocity", "angular_velocity"),
+        _phases(data, names_of(data, "body"), runs),
     ]
-    return Chart("energies", "Energies", "energy [J]", curves)
-
-
-def _strain(data: xr.Dataset, runs: list[str]) -> Chart:
-    strain = data["strain_energy"].values
-    return compared("strain", "Strain energy", "strain energy", "J", strain, runs)
+    if bending(data).size:
+        axial = "Displacements of the links' ends along them"
+        axial_chart = replace(TIPS, identity="axial", title=axial, y="axial displacement of the tip")
+        links = [
+            followed(TIPS, bending(data), runs),
+            followed(axial_chart, bending(data, "tip_axial"), runs),
+            *links,
+        ]
+    return [
+        Panel("Following the path", [compared(ERRORS, errors(data), runs), plane_path(data, runs)]),
+        Panel("Motors", [
+            followed(torque_chart(data), data["torque"], runs),
+            compared(condition, data["actuation_condition"], runs),
+        ]),
+        Panel("Links", links),
+        Panel("Energies", [energies(data, runs), compared(STRAIN, data["strain_energy"], runs)]),
+    ]  # fmt: skip
 
 
 def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
@@ -251,8 +218,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     tiles = []
     if np.isfinite(errors_rms).any():
         best = int(np.nanargmin(errors_rms))
-        unit = display_unit("m", errors_rms[best : best + 1])
-        value = f"{number(errors_rms[best], unit.factor)} {unit.name}"
+        value = quantity(errors_rms[best], "m")
         tiles.append((f"{'least ' if several else ''}RMS error {words}", value, _name(data, best)))
     if np.isfinite(peaks).any():
         least = int(np.nanargmin(peaks))
@@ -262,9 +228,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     deflections = np.array([largest(one) for one in _deflections(data)])
     if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
         most = int(np.nanargmax(deflections))
-        unit = display_unit("m", deflections[most : most + 1])
-        value = f"{number(deflections[most], unit.factor)} {unit.name}"
-        tiles.append(("largest deflection", value, _name(data, most)))
+        tiles.append(("largest deflection", quantity(deflections[most], "m"), _name(data, most)))
     total = float(np.nansum(data["wall_time"].values))
     tiles.append(("computed in", f"{number(total)} s", f"{data.sizes['mode']} runs" if several else "one run"))
     return tiles

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,13 @@ from paraflex.arguments import checked_arguments
 from paraflex.findings import Finding
 from paraflex.plots.agreement import printed
 from paraflex.plots.labels import display_unit, text_symbol
+from paraflex.plots.selection import names_of
 from paraflex.plots.workspace import round_magnification
-from paraflex.report.curves import TIP_LABEL, TIP_TITLE, look, thinned
+from paraflex.report.curves import TIPS, errors, labelled, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, verify_command_line
-from paraflex.report.text import NOTHING, count, number, table
-from paraflex.report.tracking import errors, torque_unit
+from paraflex.report.text import NOTHING, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.kinds import check_kind
@@ -33,8 +34,7 @@ class _Runs:
     """Which runs there are: every model in every mode, modes first."""
 
     def __init__(self, data: xr.Dataset) -> None:
-        self.modes = [str(name) for name in data["mode"].values]
-        self.models = [str(name) for name in data["model"].values]
+        self.modes, self.models = names_of(data, "mode"), names_of(data, "model")
         several = len(self.modes) > 1
         self.names = [
             f"{mode}, {printed(model)}" if several else printed(model) for mode in self.modes for model in self.models
@@ -48,14 +48,23 @@ class _Runs:
         """Values (modes, models, samples, ...)."""
         return values.transpose("mode", "model", "time", ...).values
 
-    def overlaid(self, values: NDArray[np.float64], choice: int | None = None, factor: float = 1.0) -> list[Curve]:
-        """Curves of values (modes, models, samples): all models of the selected run's mode."""
-        return [
-            Curve(printed(model), factor * values[m, k], run=self.of_mode(m)[k], shown=self.of_mode(m), choice=choice,
-                  look=look(k))
+    def overlaid(self, chart: Chart, values: NDArray[np.float64], unit: str) -> Chart:
+        """A chart with curves of values (modes, models, samples): all models of the selected run's mode.
+
+        Where the chart has choices, there is a last axis of them.
+        """
+        shown = display_unit(unit, values)
+        values = shown.factor * values
+        parts = [(k, values[..., k]) for k in range(len(chart.choices))] if chart.choices else [(None, values)]
+        curves = [
+            Curve(
+                printed(model), part[m, k], run=self.of_mode(m)[k], shown=self.of_mode(m), choice=choice, look=look(k)
+            )
+            for choice, part in parts
             for m in range(len(self.modes))
             for k, model in enumerate(self.models)
-        ]  # fmt: skip
+        ]
+        return replace(chart, y=labelled(chart.y, shown.name), curves=curves)
 
 
 @checked_arguments()
@@ -73,7 +82,7 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
     runs, asked_for = _Runs(data), asked(data)
     reference = str(data.attrs["reference"])
     moving = animation(data, ("mode", "model"))
-    few = data.isel(time=thinned(data.sizes["time"]))
+    few = thinned(data)
     tables = [(f"Models, mode {name}", _models(mode, reference, runs, name)) for name, mode in figures["modes"].items()]
     more = []
     for name, mode in figures["modes"].items():
@@ -166,60 +175,49 @@ def _differences(mode: Mapping[str, Any], links: Sequence[str], reference: str) 
 
 
 def _panels(data: xr.Dataset, runs: _Runs, reference: str) -> list[Panel]:
-    datum = runs.models.index(reference)
+    datum, name = runs.models.index(reference), printed(reference)
+
+    def of_parts(chart: Chart, variable: str, *, difference: bool = False) -> Chart:
+        """A quantity of one link or motor at a time in all models, or its difference from the reference."""
+        values = runs.array(data[variable])
+        parts = [text_symbol(part) for part in names_of(data, "motor" if variable == "torque" else "body")]
+        values = values - values[:, datum : datum + 1] if difference else values
+        return runs.overlaid(replace(chart, choices=parts), values, data[variable].attrs["units"])
+
+    def of_links(identity: str, title: str, label: str, variable: str) -> list[Chart]:
+        chart = Chart(identity, title, label, choosing="link")
+        apart = replace(
+            chart, identity=identity[:-1] + "_differences", title=f"{title}, difference from {name}", y="difference"
+        )
+        return [of_parts(chart, variable), of_parts(apart, variable, difference=True)]
+
+    def of_energy(identity: str, name: str) -> Chart:
+        values = runs.array(data[f"{identity}_energy"])
+        return runs.overlaid(Chart(identity, f"{name} energy", f"{name.lower()} energy"), values, "J")
+
     places = runs.array(data["end_effector"])
-    gaps = np.where((far := errors(data.transpose("mode", "model", "time", ...))) > _SHORTEST, far, np.nan)
+    far = errors(data.transpose("mode", "model", "time", ...)).values
     apart = np.linalg.norm(places - places[:, datum : datum + 1], axis=-1)
-    apart = np.where(apart > _SHORTEST, apart, np.nan)
-    name = printed(reference)
+    far, apart = (np.where(one > _SHORTEST, one, np.nan) for one in (far, apart))
+    far_chart = Chart("errors", "Tracking error: distance from the desired place", "distance", log=True)
+    apart_chart = Chart("apart", f"Distance from {name}", "distance", log=True)
     return [
         Panel("End-effector", [
-            _one("errors", "Tracking error: distance from the desired place", "distance", "m", gaps, runs, log=True),
-            _one("apart", f"Distance from {name}", "distance", "m", apart, runs, log=True),
+            runs.overlaid(far_chart, far, "m"),
+            runs.overlaid(apart_chart, apart, "m"),
             _paths(data, runs),
         ]),
         Panel("Links", [
-            _links("angles", "Link angles", "angle", "rad", data, "chord_angle", runs),
-            _links("angle_differences", f"Link angles, difference from {name}", "difference", "rad", data,
-                   "chord_angle", runs, datum),
-            _links("rates", "Link angular velocities", "angular velocity", "rad/s", data, "chord_velocity", runs),
-            _links("rate_differences", f"Link angular velocities, difference from {name}", "difference", "rad/s", data,
-                   "chord_velocity", runs, datum),
-            _links("deflections", TIP_TITLE, TIP_LABEL, "m", data,
-                   "tip_transverse", runs),
+            *of_links("angles", "Link angles", "angle", "chord_angle"),
+            *of_links("rates", "Link angular velocities", "angular velocity", "chord_velocity"),
+            of_parts(replace(TIPS, note=""), "tip_transverse"),
         ]),
         Panel("Motors and energies", [
-            _links("torques", "Motor torques", "torque", torque_unit(data), data, "torque", runs, dim="motor"),
-            _one("kinetic", "Kinetic energy", "kinetic energy", "J", runs.array(data["kinetic_energy"]), runs),
-            _one("strain", "Strain energy", "strain energy", "J", runs.array(data["strain_energy"]), runs),
+            of_parts(Chart("torques", "Motor torques", "torque", choosing="motor"), "torque"),
+            of_energy("kinetic", "Kinetic"),
+            of_energy("strain", "Strain"),
         ]),
     ]  # fmt: skip
-
-
-def _one(
-    identity: str, title: str, label: str, unit: str, values: NDArray[np.float64], runs: _Runs, *, log: bool = False
-) -> Chart:
-    shown = display_unit(unit, values)
-    curves = runs.overlaid(values, factor=shown.factor)
-    return Chart(identity, title, f"{label} [{shown.name}]", curves, log=log)
-
-
-def _links(
-    identity: str, title: str, label: str, unit: str, data: xr.Dataset, variable: str, runs: _Runs,
-    datum: int | None = None, dim: str = "body",
-) -> Chart:  # fmt: skip
-    """A quantity of one link or motor at a time in all models, or its difference from a model."""
-    values = runs.array(data[variable])
-    if datum is not None:
-        values = values - values[:, datum : datum + 1]
-    shown, names = display_unit(unit, values), [str(name) for name in data[dim].values]
-    curves = [
-        curve for p in range(len(names)) for curve in runs.overlaid(values[..., p], choice=p, factor=shown.factor)
-    ]
-    return Chart(
-        identity, title, f"{label} [{shown.name}]", curves, choices=[text_symbol(name) for name in names],
-        choosing="link" if dim == "body" else dim,
-    )  # fmt: skip
 
 
 def _paths(data: xr.Dataset, runs: _Runs) -> Chart:
@@ -248,13 +246,11 @@ def _tiles(figures: Mapping[str, Any], reference: str) -> list[tuple[str, str, s
     for title, pick in (("nearest to the reference", min), ("farthest from it", max)):
         if apart:
             model = pick(apart, key=apart.__getitem__)
-            unit = display_unit("m", np.array([apart[model]]))
-            tiles.append((title, f"{number(apart[model], unit.factor)} {unit.name}", f"{printed(model)}, mode {name}"))
+            tiles.append((title, quantity(apart[model], "m"), f"{printed(model)}, mode {name}"))
     error = mode["models"].get(reference, {}).get("tracking_error")
     if error is not None:
-        unit = display_unit("m", np.array([error]))
         span = SPAN_WORDS[ErrorSpan(figures.get("error", ErrorSpan.WHOLE.value))]
-        tiles.append((f"RMS error {span}", f"{number(error, unit.factor)} {unit.name}", printed(reference)))
+        tiles.append((f"RMS error {span}", quantity(error, "m"), printed(reference)))
     whole = all(one["status"] == "complete" for by in figures["modes"].values() for one in by["models"].values())
     tiles.append(("models", str(len(mode["models"])), "all complete" if whole else "not all complete"))
     return tiles

@@ -33,3 +33,32 @@ class InfoRequest:
         bool, Option("--balanced", help="Frequencies about static equilibrium, motors held; else undeformed.")
     ] = False
     json: Json = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModesRequest:
+    """What `paraflex modes` is asked for."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    path: PathOption = None
+    json: Json = False
+
+
+@dataclass(frozen=True)
+class MethodsRequest:
+    """What `paraflex methods` is asked for."""
+
+    json: Json = False
+
+
+@dataclass(frozen=True)
+class NewRequest:
+    """What `paraflex new` is asked for."""
+
+    name: Annotated[str, Argument(metavar="NAME", help="Of the file to write, NAME.toml.")]
+    template: Annotated[str, Option("--from", metavar="NAME", help="Library mechanism to start from.")] = "five_bar"
+
+
+@dataclass(frozen=True)
+class SchemaRequest:
+    """Nothing is asked of `paraflex schema`."""

@@ -14,13 +14,7 @@ class Command(TyperCommand):
     """A command that refuses a second value of an option that takes one."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse as every command does; before that, look for options given twice.
-
-        Raises
-        ------
-        InputError
-            An option of one value is given twice, or a switch on and off.
-        """
+        """Parse as every command does; before that, look for options given twice."""
         if not ctx.resilient_parsing:  # in completion, where the line is not yet whole
             self._refuse_second_values(ctx, list(args))
         return super().parse_args(ctx, args)

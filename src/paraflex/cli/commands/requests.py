@@ -1,7 +1,7 @@
 """Requests: dataclasses whose fields are what a shell may give, each with its `typer.Option` or `typer.Argument`.
 
-A command is a function of one request or several. The shell sees an option for each of their fields; a field that is
-itself a request, of options that several commands share, stands for its own fields.
+The shell sees an option for each field; a field that is itself a request, of options that several commands share,
+stands for its own fields.
 """
 
 from __future__ import annotations
@@ -9,62 +9,53 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import MISSING, fields, is_dataclass
-from functools import wraps
 from typing import Any, get_type_hints
 
 import typer
 
 
-def with_options(command: Callable[..., int | None]) -> Callable[..., None]:
-    """The command as Typer takes it, with a parameter for each option; what it returns is the exit code."""
+def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable[..., None]:
+    """A command as Typer takes it, with a parameter for each option of its request; the answer is the exit code."""
 
-    @wraps(command)
     def called(**given: Any) -> None:
-        raise typer.Exit(_filled(command, given) or 0)
+        raise typer.Exit(answer(_filled(request, given)) or 0)
 
-    called.__signature__ = inspect.Signature([*_parameters(command)])  # type: ignore[attr-defined]
+    called.__signature__ = inspect.Signature([*_parameters(request)])  # type: ignore[attr-defined]
     called.__annotations__ = {}
     return called
 
 
 def flags(request: object) -> dict[str, str]:
     """The flag of every option of a request, by its field: {"tolerance": "--tol"}."""
-    return {one.name: _flag(one) for one in _parameters(type(request)) if _is_option(one)}
-
-
-def _parameters(owner: Any) -> Iterator[inspect.Parameter]:
-    """What a function or a request is given, in order, the fields of requests in the place of these."""
-    for name, (kind, default) in _given(owner).items():
-        if is_dataclass(kind):
-            yield from _parameters(kind)
-        else:
-            yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-
-
-def _given(owner: Any) -> dict[str, tuple[Any, Any]]:
-    """Kind and default by name; None for a default that is made anew each time."""
-    kinds = get_type_hints(owner, include_extras=True)
-    if is_dataclass(owner):
-        none = inspect.Parameter.empty
-        defaults = {
-            one.name: one.default if one.default is not MISSING else none if one.default_factory is MISSING else None
-            for one in fields(owner)
-        }
-    else:
-        defaults = {name: one.default for name, one in inspect.signature(owner).parameters.items()}
-    return {name: (kinds[name], default) for name, default in defaults.items()}
-
-
-def _filled(owner: Any, given: dict[str, Any]) -> Any:
-    """The function or request called with what a shell has given; what it has not is left to the defaults."""
-    values = {
-        name: _filled(kind, given) if is_dataclass(kind) else given[name] for name, (kind, _) in _given(owner).items()
+    return {
+        one.name: _flag(one)
+        for one in _parameters(type(request))
+        if isinstance(one.annotation.__metadata__[0], typer.models.OptionInfo)
     }
-    return owner(**{name: value for name, value in values.items() if value is not None})
 
 
-def _is_option(one: inspect.Parameter) -> bool:
-    return isinstance(one.annotation.__metadata__[0], typer.models.OptionInfo)
+def _parameters(request: Any) -> Iterator[inspect.Parameter]:
+    """What a request is given, in order, the fields of requests in the place of these."""
+    kinds = get_type_hints(request, include_extras=True)
+    for one in fields(request):
+        if is_dataclass(kinds[one.name]):
+            yield from _parameters(kinds[one.name])
+            continue
+        default = one.default
+        if default is MISSING:
+            # None stands for a default that is made anew each time.
+            default = inspect.Parameter.empty if one.default_factory is MISSING else None
+        yield inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kinds[one.name])
+
+
+def _filled(request: Any, given: dict[str, Any]) -> Any:
+    """The request with what a shell has given; what it has not is left to the defaults."""
+    kinds = get_type_hints(request)
+    values = {
+        one.name: _filled(kinds[one.name], given) if is_dataclass(kinds[one.name]) else given[one.name]
+        for one in fields(request)
+    }
+    return request(**{name: value for name, value in values.items() if value is not None})
 
 
 def _flag(one: inspect.Parameter) -> str:

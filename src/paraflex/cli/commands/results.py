@@ -12,6 +12,19 @@ Force = Annotated[bool, Option("--force", help="Write over what is there.")]
 
 
 @dataclass(frozen=True, kw_only=True)
+class ReportRequest:
+    """What `paraflex report` is asked for."""
+
+    results: Annotated[
+        str, Argument(metavar="RESULTS", help="A folder that run, verify, sweep or optimise wrote, or a file of it.")
+    ]
+    output: Annotated[
+        str | None, Option("--output", metavar="FILE", help="Default: report.html beside the results.")
+    ] = None
+    force: Annotated[bool, Option("--force", help="Write over a file that is there.")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
 class AnimateRequest:
     """What `paraflex animate` is asked for."""
 

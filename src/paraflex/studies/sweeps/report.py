@@ -25,7 +25,7 @@ from paraflex.report import Page
 from paraflex.report.choice import MOST_RUNS, Picked, best_runs
 from paraflex.report.designs import Studied, read_studied
 from paraflex.report.survey import Step
-from paraflex.report.sweep import Parameter, StudyAccount, sweep_page
+from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.metrics import VALIDITY
 
@@ -118,14 +118,14 @@ def _again(
     return runs, failed, differ
 
 
-def _parameters(study: StudyFolder, studied: Studied) -> dict[str, Parameter]:
+def _parameters(study: StudyFolder, studied: Studied) -> dict[str, VariedParameter]:
     out = {}
     for name, places in zip(study.setting.names, study.setting.places, strict=True):
         values = studied.table.parameters[name]
         low, high, spread = study.ranges.get(name, (float(values.min()), float(values.max()), study.sampling))
         units = {unit_of(place) for place in places}
         fields = tuple(".".join(map(str, place)) for place in places)
-        out[name] = Parameter(fields, units.pop() if len(units) == 1 else "", low, high, spread)
+        out[name] = VariedParameter(fields, units.pop() if len(units) == 1 else "", low, high, spread)
     return out
 
 

@@ -1,0 +1,74 @@
+"""Which of the runs of some results a figure shows: by mode, by model, or the one there is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from paraflex.errors import InputError
+from paraflex.plots.labels import is_signs, mode_label
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def place_of(name: str, names: Sequence[str], what: str, field: str = "") -> int:
+    """The place of a mode or model among those of results."""
+    if name not in names:
+        remedy = "one of " + ", ".join(names)
+        raise InputError(f"no such {what} in these results", field=field or what, value=name, remedy=remedy)
+    return list(names).index(name)
+
+
+def names_of(data: xr.Dataset | xr.DataArray, dim: str) -> list[str]:
+    """Names along a dimension: of modes, models, bodies, motors."""
+    return [str(name) for name in data[dim].values]
+
+
+def select_run(data: xr.Dataset, mode: str) -> xr.Dataset:
+    """The run of one mode."""
+    return data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+
+
+def select_model(data: xr.Dataset, model: str) -> xr.Dataset:
+    """The runs of one model."""
+    return data.isel(model=place_of(model, names_of(data, "model"), "model"))
+
+
+def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
+    """The floating frame's best model and the most independent other one, as Figs. 22 and 23 compare them."""
+    names = names_of(data, "model")
+    ours = next((name for name in ("second-order", "linear") if name in names), None)
+    other = next((name for name in ("segments", "mujoco", "exudyn") if name in names), None)
+    return None if ours is None or other is None else (ours, other)
+
+
+def default_mode(data: xr.Dataset) -> str:
+    """The mode with most active motors where modes are named by their signs; else the first."""
+    names = names_of(data, "mode")
+    return max(names, key=lambda name: name.count("+")) if all(map(is_signs, names)) else names[0]
+
+
+def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
+    """The run of a mode, by default of `default_mode`; of results without modes the one there is."""
+    if "mode" not in data.dims:
+        if mode is not None:
+            raise InputError(
+                "these results have no modes", field="mode", value=mode, remedy="leave it out: motors were not driven"
+            )
+        return data
+    return select_run(data, default_mode(data) if mode is None else mode)
+
+
+def run_label(run: xr.Dataset) -> str:
+    """A run's mode for legends."""
+    return f"mode {mode_label(str(run['mode'].item()))}"
+
+
+def samples(run: xr.Dataset) -> int:
+    """How many samples of a run there are before the end or the first one it did not get to."""
+    moving = run["end_effector"] if "end_effector" in run else run["angle"]
+    missing = ~np.isfinite(moving.values).all(axis=-1)
+    return int(np.argmax(missing)) if missing.any() else missing.size
