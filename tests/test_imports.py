@@ -4,6 +4,7 @@ import ast
 import re
 import sys
 import tomllib
+from collections import Counter
 from graphlib import CycleError, TopologicalSorter
 from importlib.metadata import packages_distributions
 from pathlib import Path
@@ -38,6 +39,12 @@ def test_families_of_studies_do_not_know_one_another(family, others):
     names = [f"paraflex.studies.{name}" for name in (family, others)]
     assert not graph.chain_exists(*names, as_packages=True)
     assert not graph.chain_exists(*reversed(names), as_packages=True)
+
+
+def test_a_class_has_a_name_of_its_own():
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for file in (ROOT / "src").rglob("*.py")]
+    names = Counter(node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 def imported(tree):

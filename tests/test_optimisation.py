@@ -23,7 +23,7 @@ from paraflex.files.document import document_text
 from paraflex.plots import convergence
 from paraflex.studies import load_optimisation, optimise
 from paraflex.studies.optimisation.evaluate import Evaluate
-from paraflex.studies.optimisation.problem import Problem
+from paraflex.studies.optimisation.problem import DesignProblem
 from paraflex.studies.optimisation.slopes import differences, slopes_of
 from paraflex.studies.sweeps import open_engine, run_task
 
@@ -150,7 +150,7 @@ def test_where_nothing_runs_the_slope_leads_back(tmp_path, evaluate_of):
 
     study = study_of(tmp_path, OBJECTIVE)
     evaluate = evaluate_of(study, tmp_path / "out", made_up(tracking_rms=slope))
-    problem = Problem(study, study.objective, evaluate, slopes_of(study, evaluate))
+    problem = DesignProblem(study, study.objective, evaluate, slopes_of(study, evaluate))
     problem.slope(problem.start)
     x, step = np.array([0.1, 0.7]), np.diag([1e-4, 1e-4])
     rise = [(problem.value(x + h) - problem.value(x - h)) / 2e-4 for h in step]

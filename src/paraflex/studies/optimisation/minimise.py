@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.studies.optimisation.problem import Problem
+from paraflex.studies.optimisation.problem import DesignProblem
 
 Array = NDArray[np.float64]
 SLSQP, TRUST, LBFGSB, SIMPLEX = "slsqp", "trust-constr", "l-bfgs-b", "nelder-mead"
@@ -30,7 +30,7 @@ _POPULATION = 8
 _BATCH = 4
 
 
-def minimise(problem: Problem, method: str | None, start: Array) -> str:
+def minimise(problem: DesignProblem, method: str | None, start: Array) -> str:
     """Look for the least objective from a start; why it stopped, in words.
 
     Raises
@@ -54,19 +54,19 @@ def minimise(problem: Problem, method: str | None, start: Array) -> str:
         return _METHODS[name](problem, start)
 
 
-def _tolerance(problem: Problem) -> float:
+def _tolerance(problem: DesignProblem) -> float:
     given = problem.study.search.tolerance
     return _TOLERANCE if given is None else given
 
 
-def _slsqp(problem: Problem, start: Array) -> str:
+def _slsqp(problem: DesignProblem, start: Array) -> str:
     limits = {"type": "ineq", "fun": problem.room, "jac": problem.room_slope}
     constraints = [limits] if problem.objective.limits else []
     options = {"ftol": _tolerance(problem) * problem.cost, "maxiter": _MANY}
     return _scipy(problem, start, "SLSQP", constraints=constraints, options=options)
 
 
-def _trust(problem: Problem, start: Array) -> str:
+def _trust(problem: DesignProblem, start: Array) -> str:
     from scipy.optimize import NonlinearConstraint
 
     limits = NonlinearConstraint(problem.room, 0.0, np.inf, jac=problem.room_slope)  # pyright: ignore[reportArgumentType]
@@ -76,18 +76,18 @@ def _trust(problem: Problem, start: Array) -> str:
     return _scipy(problem, start, "trust-constr", constraints=constraints, options=options)
 
 
-def _lbfgsb(problem: Problem, start: Array) -> str:
+def _lbfgsb(problem: DesignProblem, start: Array) -> str:
     return _scipy(problem, start, "L-BFGS-B", options={"ftol": _tolerance(problem), "maxfun": _MANY, "maxiter": _MANY})
 
 
-def _scipy(problem: Problem, start: Array, method: str, **given: Any) -> str:
+def _scipy(problem: DesignProblem, start: Array, method: str, **given: Any) -> str:
     from scipy.optimize import minimize
 
     bounds = [(0.0, 1.0)] * start.size
     return _told(minimize(problem.value, start, jac=problem.slope, method=method, bounds=bounds, **given))
 
 
-def _simplex(problem: Problem, start: Array) -> str:
+def _simplex(problem: DesignProblem, start: Array) -> str:
     from scipy.optimize import minimize
 
     # Edges point away from the nearer bound.
@@ -101,7 +101,7 @@ def _simplex(problem: Problem, start: Array) -> str:
     )
 
 
-def _evolution(problem: Problem, start: Array) -> str:
+def _evolution(problem: DesignProblem, start: Array) -> str:
     from scipy.optimize import differential_evolution
 
     return _told(
@@ -121,7 +121,7 @@ def _evolution(problem: Problem, start: Array) -> str:
     )
 
 
-def _optuna(problem: Problem, start: Array) -> str:
+def _optuna(problem: DesignProblem, start: Array) -> str:
     optuna = _import_optuna()
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     names = problem.study.setting.names
@@ -149,7 +149,7 @@ def _import_optuna() -> Any:
     return optuna
 
 
-_METHODS: Mapping[str, Callable[[Problem, Array], str]] = {
+_METHODS: Mapping[str, Callable[[DesignProblem, Array], str]] = {
     SLSQP: _slsqp,
     TRUST: _trust,
     LBFGSB: _lbfgsb,

@@ -15,7 +15,7 @@ from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, minimise
 from paraflex.studies.optimisation.objective import Objective
-from paraflex.studies.optimisation.problem import Problem, best_of, holds_limits
+from paraflex.studies.optimisation.problem import DesignProblem, best_of, holds_limits
 from paraflex.studies.optimisation.result import SearchResult, of_session
 from paraflex.studies.optimisation.schema import ObjectiveTable, StudyTable
 from paraflex.studies.optimisation.session import Session, sampled_start, search
@@ -162,7 +162,7 @@ def _objective(table: ObjectiveTable) -> Objective:
 
 def _solve(study: OptimisationStudy, evaluate: Evaluate) -> str:
     objective = study.objective
-    problem = Problem(study, objective, evaluate, slopes_of(study, evaluate))
+    problem = DesignProblem(study, objective, evaluate, slopes_of(study, evaluate))
     start = sampled_start(study, evaluate, lambda designs: best_of(objective, problem.scales, designs))
     return minimise(problem, study.search.method, study.unit(start.design))
 

@@ -23,7 +23,7 @@ _OUTSIDE, _FAILED = 1e2, 1e4
 _REFUSED = 3.0
 
 
-class Problem:
+class DesignProblem:
     """The objective and its limits over the unit cube.
 
     Parameters
