@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 KERNELS := $(wildcard src/paraflex/kernel/*.py)
 
-.PHONY: run test lint types imports tests docs clean
+.PHONY: run test lint types imports tests coverage docs clean
 
 run: $(VENV)/.run
 	$(BIN)/paraflex run --out results
@@ -22,6 +22,10 @@ imports: $(VENV)/.dev
 	$(BIN)/lint-imports
 
 tests: $(VENV)/.dev $(VENV)/.kernels
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
+# Which lines no test reaches; a third slower, so not a part of the test.
+coverage: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --cov --cov-report=term
 
 docs: $(VENV)/.dev

@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from command_line import paraflex
 from paraflex.errors import InputError
 from paraflex.files import load
 from paraflex.simulate import plan_tracking
+from shell import paraflex
 
 # A five-bar with everything in it that a file may say.
 MODEL = """

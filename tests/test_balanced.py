@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import paraflex.dynamics.equilibrium as equilibria
-from command_line import paraflex
 from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.inspect import describe
 from paraflex.dynamics import (
@@ -46,6 +45,7 @@ from paraflex.mechanism import (
 )
 from paraflex.motion import simulate_motion
 from paraflex.simulate import plan_tracking
+from shell import paraflex
 
 SPEED, LENGTH, MODULUS, DENSITY, TIP = 60.0, 0.5, 70e9, 2700.0, 0.2
 SECTION = Section.rectangle(0.02, 0.002)

@@ -10,7 +10,6 @@ import pandas
 import pytest
 import scipy.optimize
 
-from command_line import paraflex
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError, ModelWarning, ResultWarning, SliderOffBeamError, UnreachablePathError
 from paraflex.files import library_names, load
@@ -37,6 +36,7 @@ from paraflex.mechanism import (
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, motion_summary, summary, tracking_dataset
 from paraflex.simulate import plan_tracking, simulate
+from shell import paraflex
 
 BASE, CRANK, LENGTH = 0.2, 0.1, 0.25
 START, SPEED = 2.5, -5.0

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from command_line import interrupted, paraflex
 from paraflex.files import library_file
 from paraflex.results import load_results
+from shell import interrupted, paraflex
 
 FAST = ["--tol", "1e-3", "--duration", "0.1", "--samples", "51"]
 

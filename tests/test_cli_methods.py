@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from command_line import paraflex
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import integration_options, parse_event
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults, library_text, load
 from paraflex.integrators import METHODS, DeflectionLimit, JointLimit, SingularDistance
 from paraflex.results import load_results
+from shell import paraflex
 
 
 @pytest.mark.parametrize(

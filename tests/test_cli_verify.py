@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from command_line import interrupted, paraflex
 from paraflex.files import load
 from paraflex.kinematics import length_fraction
 from paraflex.results import load_results
+from shell import interrupted, paraflex
 from test_cli import FAST
 
 SHORT = ["--duration", "0.02", "--samples", "11", "--tol", "1e-5"]

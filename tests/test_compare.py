@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from command_line import interrupted, paraflex
 from paraflex import plots
 from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import InputError, IntegrationError
@@ -26,6 +25,7 @@ from paraflex.studies import (
     motion_case,
     tracking_case,
 )
+from shell import interrupted, paraflex
 from test_plots import stays_on_the_page
 
 LOOSE = ComparisonOptions(tolerances=(1e-3, 1e-4), repetitions=1)

@@ -5,8 +5,8 @@ import tomllib
 
 import pytest
 
-from command_line import paraflex
 from paraflex.files import library_file, library_names, load
+from shell import paraflex
 from test_cli import FAST
 
 

@@ -6,7 +6,6 @@ import json
 
 import pytest
 
-from command_line import paraflex
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.dynamics.points import tip_deflection
 from paraflex.files import library_file, library_names, load
@@ -22,6 +21,7 @@ from paraflex.mechanism import (
     Section,
     raparm_i,
 )
+from shell import paraflex
 
 PAPER = ("raparm_i", "raparm_ii")
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scipy
 
-from command_line import paraflex
 from paraflex.dynamics import State, brake, build_system, joint_coordinate, momentum
 from paraflex.dynamics.sparse import sparse_mass
 from paraflex.errors import InputError, IntegrationError
@@ -33,6 +32,7 @@ from paraflex.mechanism import (
 from paraflex.results import summary, tracking_dataset
 from paraflex.simulate import Ending, plan_tracking
 from paraflex.studies import run_study, verify
+from shell import paraflex
 
 PAPER = raparm_i().with_geometry(Geometry.LINEAR)
 SIDE = Line((-0.01, 0.264), (0.01, 0.264), 20.0)

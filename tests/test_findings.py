@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from command_line import paraflex
 from paraflex.findings import CODES, Finding, Level, Verdict
 from paraflex.mechanism import FlexibleBeam, Material, Section
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.doubts import verdict_of
+from shell import paraflex
 
 MODELS = Path(__file__).parent / "data" / "slips"
 DOCS = Path(__file__).parents[1] / "docs"

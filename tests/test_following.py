@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from command_line import paraflex
 from paraflex.dynamics import (
     across_chord,
     build_system,
@@ -39,6 +38,7 @@ from paraflex.results.formulas import drift_speed, vibration
 from paraflex.results.outlines import deflections, outlines
 from paraflex.simulate import plan_tracking
 from paraflex.studies import run_study
+from shell import paraflex
 
 SQUARE = Polygon(((0.05, 0.314), (-0.05, 0.314), (-0.05, 0.214), (0.05, 0.214)), 40.0)
 # The paper's model, whatever defaults are.

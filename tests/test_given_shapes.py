@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from command_line import paraflex
 from conftest import RUBBER
 from paraflex import plots
 from paraflex.cli.inspect import describe
@@ -57,6 +56,7 @@ from paraflex.results import tracking_dataset
 from paraflex.results.record import record
 from paraflex.simulate import plan_tracking
 from paraflex.studies import verify
+from shell import paraflex
 from test_elastodynamics import SWING
 
 CLAMPED_FREE = [1.8751040687119611, 4.694091132974175, 7.854757438237613]  # textbook

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from command_line import paraflex
 from made_up import STUDY, made_up, write_study
 from paraflex.errors import InputError
 from paraflex.plots import targets_reached
@@ -13,6 +12,7 @@ from paraflex.studies import identify, load_identification
 from paraflex.studies.optimisation.confidence import confidence
 from paraflex.studies.optimisation.fit import residual_slopes
 from paraflex.studies.sweeps import Task, run_task
+from shell import paraflex
 
 TARGET = """
 [[target]]

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from command_line import paraflex
 from made_up import STUDY, made_up, write_study
 from paraflex.errors import InputError
 from paraflex.plots import sobol_bars
 from paraflex.studies import load_indices, sobol_indices
+from shell import paraflex
 
 ISHIGAMI = """
 mechanism = "raparm_i"

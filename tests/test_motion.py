@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scipy.special
 
-from command_line import paraflex
 from paraflex import plots
 from paraflex.errors import InputError, IntegrationError
 from paraflex.files import library_file, load
@@ -26,6 +25,7 @@ from paraflex.mechanism import (
 from paraflex.motion import simulate_motion
 from paraflex.report import motion_page
 from paraflex.results import load_results, motion_dataset, motion_summary, open_results, save_results
+from shell import paraflex
 from test_loads import INERTIA, MASS, REACH, G, pendulum
 
 J = INERTIA + MASS * REACH**2

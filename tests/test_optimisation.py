@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 
 import paraflex as pf
-from command_line import paraflex
 from journals import rows_in
 from made_up import STUDY, made_up, write_study
 from paraflex.campaign.journal import write_journal
@@ -26,6 +25,7 @@ from paraflex.studies.optimisation.evaluate import Evaluate
 from paraflex.studies.optimisation.problem import DesignProblem
 from paraflex.studies.optimisation.slopes import differences, slopes_of
 from paraflex.studies.sweeps import open_engine, run_task
+from shell import paraflex
 
 OBJECTIVE = """
 [objective]

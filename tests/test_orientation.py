@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from command_line import paraflex
 from paraflex.errors import InputError
 from paraflex.files import load
 from paraflex.kinematics import PointPath, follow_path
 from paraflex.results import load_results
+from shell import paraflex
 
 # Two links of 0.4 and 0.3 m that carry a tool of 0.1 m.
 ARM = """

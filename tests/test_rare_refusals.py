@@ -95,7 +95,7 @@ def differentiated(tmp_path):
 
 
 def test_derivatives_where_there_are_none(differentiated, monkeypatch):
-    monkeypatch.setattr(variation, "_UNSETTLED", -1.0)
+    monkeypatch.setattr(variation, "_LARGEST_RESIDUAL", -1.0)
     with pytest.raises(IntegrationError, match="the equations of a step cannot be solved to rounding") as caught:
         sensitivities(differentiated)
     assert caught.value.remedy == "choose a finer tolerance, or take derivatives by differences"

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from command_line import paraflex
 from paraflex.errors import InputError, OutputError
 from paraflex.plots.catalogue import CATALOGUE
 from paraflex.plots.labels import text_symbol as symbol
@@ -32,6 +31,7 @@ from paraflex.report.page import plotly_script
 from paraflex.report.text import count, number
 from paraflex.results import load_results, open_results
 from reports import FAILED, MODES, STOPPED, array_of, chart_of, html_of, rows_of, told, tracked, verified
+from shell import paraflex
 from test_cli import FAST
 
 OLD = Path(__file__).parent / "data" / "schema1.nc"

@@ -13,7 +13,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import paraflex as pf
-from command_line import paraflex
 from paraflex.dynamics import build_system, consistent_state, start_state
 from paraflex.errors import InputError, SingularPositionError
 from paraflex.files import generator_names, library_text, load
@@ -23,6 +22,7 @@ from paraflex.kernel.near import NEAR_PART
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Motor, Start, chain_of_segments, finite_segments, four_bars_in_a_row
 from paraflex.motion import simulate_motion
+from shell import paraflex
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 import twins
-from command_line import paraflex
 from paraflex.cli.commands.studies import SensitivityRequest
 from paraflex.cli.sensitivity import sensitivity_command
 from paraflex.designs.derivatives.changes import Change
@@ -29,6 +28,7 @@ from paraflex.simulate import simulate
 from paraflex.studies import load_sensitivities, metric_gradients, sensitivities
 from paraflex.studies.sensitivities import SMOOTH, nominal_values
 from paraflex.studies.sweeps import METRICS, Task, run_task
+from shell import paraflex
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "sensitivity_study.toml"
 STUDY = """

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import twins
-from command_line import paraflex
 from conftest import make_five_bar
 from paraflex.checks import check
 from paraflex.cli.commands.models import InfoRequest
@@ -29,6 +28,7 @@ from paraflex.files.model import StudyDefaults
 from paraflex.findings import Level
 from paraflex.mechanism import ActuationMode, Assembly, Mechanism, Motor, PrescribedAngle, RigidBody, loops
 from paraflex.mechanism.joints import SampledAngle
+from shell import paraflex
 from test_consistency import joint, many, parallelogram
 
 

@@ -8,7 +8,6 @@ import pytest
 import scipy.integrate
 import scipy.optimize
 
-from command_line import paraflex
 from paraflex.cli.inspect import describe
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.dynamics.points import tip_deflection
@@ -29,6 +28,7 @@ from paraflex.mechanism import (
     Section,
     finite_segments,
 )
+from shell import paraflex
 from test_segments import first_frequency
 
 CLAMPED_FREE = [1.8751040687119611, 4.694091132974175, 7.854757438237613]  # textbook

@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 
-from command_line import paraflex
 from paraflex.dynamics import (
     build_system,
     consistent_state,
@@ -38,6 +37,7 @@ from paraflex.mechanism import (
     Start,
 )
 from paraflex.motion import simulate_motion
+from shell import paraflex
 
 LENGTH, EI = 0.8, 70e9 * 0.02 * 0.004**3 / 12
 TIP = PointRef("beam", "tip")

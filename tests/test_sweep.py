@@ -12,7 +12,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import paraflex
-from command_line import paraflex as shell
 from paraflex.campaign import journal, tables
 from paraflex.campaign.journal import read_journal
 from paraflex.designs.measure import metrics_of
@@ -23,6 +22,7 @@ from paraflex.results import load_results, summary, tracking_dataset
 from paraflex.simulate import plan_tracking
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps import METRICS, Outcome, Task, run_task
+from shell import paraflex as shell
 
 STUDY = """
 mechanism = "raparm_i"

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from command_line import paraflex
 from paraflex.designs.reopen import open_study, run_again
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
@@ -21,6 +20,7 @@ from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
 from paraflex.studies.sweeps.report import study_page
 from reports import array_of, chart_of, html_of, rows_of, told
+from shell import paraflex
 
 STUDY = """
 name = "thickness <& mass>"

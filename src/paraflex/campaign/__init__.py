@@ -1,6 +1,6 @@
 """What every study is; and of many runs the workers that compute them, the journal that keeps them, their tables."""
 
-from paraflex.campaign.folder import STUDY, TRAJECTORIES, open_campaign, read_study
+from paraflex.campaign.folder import STUDY, TRAJECTORIES, not_ours, of_another_study, open_campaign, read_study
 from paraflex.campaign.journal import Journal, Row, held
 from paraflex.campaign.study import KeptResult, OnProgress, Progress, Result, Study, Workers, kept_in
 from paraflex.campaign.tables import CSV, RESULTS, UNFINISHED, read_data, read_table, tables_of, write_table
@@ -39,6 +39,8 @@ __all__ = [
     "Workers",
     "held",
     "kept_in",
+    "not_ours",
+    "of_another_study",
     "open_campaign",
     "open_engine",
     "outcomes",

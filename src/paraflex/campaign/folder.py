@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,6 +75,18 @@ def read_study(file: Path) -> dict[str, Any]:
     return found
 
 
+def not_ours(folder: Path, names: Collection[str]) -> InputError:
+    """The error of a folder with files that no study wrote."""
+    problem = f"the folder holds other files ({', '.join(sorted(names)[:3])})"
+    return InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
+
+
+def of_another_study(folder: Path) -> InputError:
+    """The error of a folder whose results are not those of the study that is to go on there."""
+    problem = "the folder holds results of another study, or of this one before it was changed"
+    return InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
+
+
 def _check_ours(folder: Path) -> None:
     """Refuse a folder that holds files and no study."""
     try:
@@ -82,18 +94,12 @@ def _check_ours(folder: Path) -> None:
     except OSError as error:
         raise no_folder(folder, error) from error
     if names and not names & {STUDY, JOURNAL}:
-        raise InputError(
-            f"the folder holds other files ({', '.join(sorted(names)[:3])})", field="--output", value=str(folder),
-            remedy="name a new folder",
-        )  # fmt: skip
+        raise not_ours(folder, names)
 
 
 def _check_same(folder: Path, found: Mapping[str, Any], study: Mapping[str, Any]) -> None:
     if found.get("content") != study["content"]:
-        raise InputError(
-            "the folder holds results of another study, or of this one before it was changed", field="--output",
-            value=str(folder), remedy="name a new folder",
-        )  # fmt: skip
+        raise of_another_study(folder)
     for name, wanted in study["versions"].items():
         had = found.get("versions", {}).get(name)
         if had != wanted:

@@ -21,9 +21,8 @@ from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
 from paraflex.kernel.stage import equations
 
 Sparse = scipy.sparse.csr_matrix
-# The smallest change that rows (m,) ask for, and the weights (n, n) it is small in at coordinates (n,).
+# The smallest change that rows (m,) ask for.
 LeastChange = Callable[[Array], Array]
-Metric = Callable[[Array], Sparse]
 
 _MAX_ITERATIONS = 50
 # Closure error that counts as closed [rad], and as a part of the mechanism's size: thousands of rounding errors.
@@ -44,12 +43,12 @@ def assemble(
     signals: Signals,
     t: float,
     q: Array,
-    metric: Metric,
+    change_at: Callable[[Array], LeastChange],
     *,
     free: NDArray[np.bool_] | None = None,
     longest: float = math.inf,
 ) -> tuple[Array, Array]:
-    """Newton's iteration on Phi(q, t) = 0, each step the least change in a metric.
+    """Newton's iteration on Phi(q, t) = 0, each step the least change of some measure.
 
     Parameters
     ----------
@@ -59,8 +58,8 @@ def assemble(
         [s]
     q : (n,) array
         Where it begins.
-    metric : callable
-        Weights (n, n) at coordinates (n,), say `link_metric`.
+    change_at : callable
+        The least change of the free coordinates at coordinates (n,), say by `constraint_change`.
     free : (n,) array of bool, optional
         Coordinates that may change; all by default.
     longest : float
@@ -76,8 +75,7 @@ def assemble(
     for _ in range(_MAX_ITERATIONS):
         if closed(system, q, phi) or not np.any(free):
             break
-        rows = constraint_jacobian(system, q)[:, free]
-        change = least_change(metric(q)[free][:, free], rows, system.row_units)(phi)
+        change = change_at(q)(phi)
         q[free] -= change * shortened(change / system.units[free], longest)
         phi, _ = system.constraints(signals, t, q)
     return q, phi
@@ -129,11 +127,20 @@ def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.
 
 
 def constraint_change(
-    system: System, q: Array, stiffness: float = 0.0, damping: float = 0.0, *, every_spring: bool = False
+    system: System,
+    q: Array,
+    stiffness: float = 0.0,
+    damping: float = 0.0,
+    *,
+    every_spring: bool = False,
+    free: NDArray[np.bool_] | None = None,
 ) -> LeastChange:
-    """`least_change` in `link_metric` with the rows Phi_q."""
+    """`least_change` in `link_metric` with the rows Phi_q, of all coordinates or the free ones (n,)."""
     metric = link_metric(system, q, stiffness, every_spring=every_spring)
-    return least_change(metric, constraint_jacobian(system, q), system.row_units, damping)
+    rows = constraint_jacobian(system, q)
+    if free is not None:
+        metric, rows = metric[free][:, free], rows[:, free]
+    return least_change(metric, rows, system.row_units, damping)
 
 
 def project(change: LeastChange, x: Array, left: Callable[[Array], Array]) -> Array:

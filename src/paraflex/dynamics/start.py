@@ -14,7 +14,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.joint_coordinates import marker_place
-from paraflex.dynamics.projection import assemble, least_change, link_metric, project
+from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import State, reference_pose
@@ -158,8 +158,8 @@ def _coordinates(system: System, signals: Signals, start: Start, assembly: Assem
 
 def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArray[np.bool_]) -> Array:
     """Joints closed by the least change of the coordinates that are not held."""
-    metric = partial(link_metric, system, stiffness=_POSITION_STIFFNESS)
-    q, phi = assemble(system, signals, time, q, metric, free=~held)
+    change = partial(constraint_change, system, stiffness=_POSITION_STIFFNESS, free=~held)
+    q, phi = assemble(system, signals, time, q, change, free=~held)
     worst = int(np.argmax(np.abs(phi) / system.row_units)) if phi.size else 0
     if system.gap(phi) > _GAP:
         raise InputError(

@@ -19,7 +19,6 @@ from paraflex.dynamics.projection import (
     constraint_change,
     gap_unit,
     joint_gaps,
-    link_metric,
     project,
     refuse_conflict,
     second_rates,
@@ -126,7 +125,8 @@ def project_position(system: System, signals: Signals, t: float, q: Array) -> Ar
     AssemblyError
         The loops cannot be closed from there; its partial result is where they come closest to it.
     """
-    closest, phi = assemble(system, signals, t, q, partial(link_metric, system, stiffness=_POSITION_STIFFNESS))
+    change = partial(constraint_change, system, stiffness=_POSITION_STIFFNESS)
+    closest, phi = assemble(system, signals, t, q, change)
     if closed(system, closest, phi) and _keeps_shape(system, q, closest):
         return closest
     closest = _closest(system, signals, t, q)

@@ -13,12 +13,9 @@ from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
 
-# Of each method: the solver, at how many times of a step it evaluates, evaluations of an iteration (none: explicit).
-_SOLVERS: dict[str, tuple[type[scipy.integrate.OdeSolver], int, int]] = {
-    "rk45": (scipy.integrate.RK45, 5, 0),
-    "radau": (scipy.integrate.Radau, 3, 3),
-    "ndf": (scipy.integrate.BDF, 1, 1),
-}
+# Of each method: the solver in `scipy.integrate`, which is loaded when one runs; at how many times of a step it
+# evaluates, and evaluations of an iteration (none: explicit).
+_SOLVERS = {"rk45": ("RK45", 5, 0), "radau": ("Radau", 3, 3), "ndf": ("BDF", 1, 1)}
 # The least relative tolerance that SciPy takes without a warning.
 _RELATIVE = 1e-13
 
@@ -27,7 +24,8 @@ class ScipyStepper:
     """Steps by one of SciPy's solvers, the absolute tolerances given: see `Stepper`."""
 
     def __init__(self, method: str, form: OdeForm, tolerances: Array, steps: Steps) -> None:
-        self._class, self._places, self._stages = _SOLVERS[method]
+        name, self._places, self._stages = _SOLVERS[method]
+        self._class = getattr(scipy.integrate, name)
         self.form, self._tolerances, self._steps = form, tolerances, steps
         self._seen: list[float] = []
         self._past, self._rejected, self._dense = SolverCounts(0, 0, 0, 0), 0, None

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.joint_coordinates import marker_place, material_angle
-from paraflex.dynamics.projection import assemble, closed, shortened
+from paraflex.dynamics.projection import LeastChange, assemble, closed, shortened
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PointRef
 
@@ -157,8 +156,7 @@ class PoseSearch:
     def closed(self, t: float, q: Array) -> Array | None:
         """The pose with loops closed from there by least changes; None where they do not close."""
         system = self.system
-        weights = scipy.sparse.csr_matrix(scipy.sparse.diags(1.0 / system.units**2))
-        pose, phi = assemble(system, self.signals, t, q, lambda _: weights, longest=_LONGEST)
+        pose, phi = assemble(system, self.signals, t, q, self._change_at, longest=_LONGEST)
         return pose if closed(system, pose, phi) else None
 
     def tracked(self, times: Sequence[float] | Array, goals: Array, q: Array) -> list[Nearest]:
@@ -216,6 +214,11 @@ class PoseSearch:
     def _square(self, q: Array, goal: Array) -> float:
         off = (self._task(q)[0] - goal) / self._units
         return float(off @ off)
+
+    def _change_at(self, q: Array) -> LeastChange:
+        """The change without dimension that is least; dense, for a search closes thousands of poses."""
+        jacobian, units, row_units = self._jacobian(q), self.system.units, self.system.row_units
+        return lambda phi: units * np.linalg.lstsq(jacobian, phi / row_units, rcond=_DEPENDENT)[0]
 
     def _jacobian(self, q: Array) -> Array:
         """Phi_q without dimension."""

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, held
+from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, held, not_ours, of_another_study
 from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+_COLUMNS = ("path", "mode", "metric", "unit", "parameter", "nominal", "value", "derivative", "relative", "error")
 TABLE, LINES, FIGURES = "sensitivity.csv", "sensitivity.parquet", "figures"
 
 
@@ -120,9 +121,8 @@ class Sensitivities(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One line for each row, metric and parameter."""
-        import pandas as pd
-
-        return pd.DataFrame(list(self._lines()))
+        dims = ["run", "metric", "parameter"]
+        return self.data.drop_vars("unsettled").to_dataframe(dims).reset_index()[list(_COLUMNS)]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values; None for what is no number."""
@@ -161,24 +161,6 @@ class Sensitivities(Result):
             for kind, array in arrays.items()
         }
         return {"value": finite_or_none(self.values[i, j]), **by_parameter}
-
-    def _lines(self):
-        relative = self.relative
-        for i, (path, mode) in enumerate(self.rows):
-            for j, metric in enumerate(self.metrics):
-                for k, parameter in enumerate(self.parameters):
-                    yield {
-                        "path": path,
-                        "mode": mode,
-                        "metric": metric,
-                        "unit": self.units[j],
-                        "parameter": parameter,
-                        "nominal": self.nominal[k],
-                        "value": self.values[i, j],
-                        "derivative": self.derivatives[i, j, k],
-                        "relative": relative[i, j, k],
-                        "error": self.errors[i, j, k],
-                    }
 
 
 @dataclass(frozen=True)
@@ -346,21 +328,13 @@ def _gathered(
 
 def _claim(folder: Path, asked: str) -> None:
     """Check that the folder is empty or holds what the same study wrote."""
-    others = sorted(
-        entry.name
-        for entry in folder.iterdir()
-        if entry.name not in {Sensitivities.values_file, TABLE, LINES, FIGURES, ".lock"}
-    )
+    ours = {Sensitivities.values_file, TABLE, LINES, FIGURES, ".lock"}
+    others = {entry.name for entry in folder.iterdir()} - ours
     if others:
-        raise InputError(
-            f"the folder holds other files ({', '.join(others[:3])})", field="--output", value=str(folder),
-            remedy="name a new folder",
-        )  # fmt: skip
-    if (folder / Sensitivities.values_file).exists() and _content(folder / Sensitivities.values_file) != asked:
-        raise InputError(
-            "the folder holds results of another study, or of this one before it was changed", field="--output",
-            value=str(folder), remedy="name a new folder",
-        )  # fmt: skip
+        raise not_ours(folder, others)
+    file = folder / Sensitivities.values_file
+    if file.exists() and _content(file) != asked:
+        raise of_another_study(folder)
 
 
 def _content(file: Path) -> Any:
