@@ -122,7 +122,7 @@ class Sensitivities(Result):
     def to_frame(self) -> pd.DataFrame:
         """One line for each row, metric and parameter."""
         dims = ["run", "metric", "parameter"]
-        return self.data.drop_vars("unsettled").to_dataframe(dims).reset_index()[list(_COLUMNS)]
+        return self.data.drop_vars("unsettled").to_dataframe(dims).reset_index().reindex(columns=list(_COLUMNS))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values; None for what is no number."""
