@@ -108,7 +108,7 @@ def test_every_command_and_option_stands_on_the_page():
     from typer.main import get_command
 
     from paraflex.cli.app import app
-    from shell import command_line_page
+    from command_line import command_line_page
 
     page = command_line_page()
     for name, command in get_command(app).commands.items():
