@@ -107,8 +107,8 @@ def hooks(monkeypatch):
 def test_every_command_and_option_stands_on_the_page():
     from typer.main import get_command
 
-    from paraflex.cli.app import app
     from command_line import command_line_page
+    from paraflex.cli.app import app
 
     page = command_line_page()
     for name, command in get_command(app).commands.items():

@@ -99,6 +99,15 @@ def write_json(path: Path, figures: Any, **options: Any) -> None:
     write_text(path, json.dumps(figures, indent=2, default=str) + "\n", **options)
 
 
+def read_json(file: Path) -> dict[str, Any]:
+    """What a file of JSON holds; nothing of one that cannot be read, or that is no table."""
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
 def unwritable(error: OSError, field: str, remedy: str, value: str | None = None) -> OutputError:
     """The error of a place that cannot be written, with the system's reason."""
     reason = (error.strerror or str(error)).lower()

@@ -2,7 +2,7 @@
 
 from paraflex.campaign.folder import STUDY, TRAJECTORIES, not_ours, of_another_study, open_campaign, read_study
 from paraflex.campaign.journal import Journal, Row, held
-from paraflex.campaign.study import KeptResult, OnProgress, Progress, Result, Study, Workers, kept_in
+from paraflex.campaign.study import KeptResult, OnProgress, Progress, Result, Study, Workers, kept_in, no_workers
 from paraflex.campaign.tables import CSV, RESULTS, UNFINISHED, read_data, read_table, tables_of, write_table
 from paraflex.campaign.workers import (
     DASK,
@@ -39,6 +39,7 @@ __all__ = [
     "Workers",
     "held",
     "kept_in",
+    "no_workers",
     "not_ours",
     "of_another_study",
     "open_campaign",

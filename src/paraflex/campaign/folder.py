@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from paraflex.campaign.journal import JOURNAL, LOCK, Journal, held, no_folder, write_journal
 from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA, UNFINISHED, read_table
 from paraflex.errors import InputError, OutputError
-from paraflex.writing import GO_ON, write_json
+from paraflex.writing import GO_ON, read_json, write_json
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -66,11 +66,8 @@ def read_study(file: Path) -> dict[str, Any]:
     InputError
         It cannot be read, or is none of ours.
     """
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        found = None
-    if not isinstance(found, dict) or "content" not in found:
+    found = read_json(file)
+    if "content" not in found:
         raise InputError("not the study of a campaign", field=str(file), remedy="name a new folder")
     return found
 

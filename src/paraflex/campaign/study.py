@@ -183,6 +183,18 @@ class Study(ABC, Generic[R_co]):
         """
 
 
+def no_workers(workers: Workers | None, why: str) -> None:
+    """None where no workers are given to a study that has no work for them.
+
+    Raises
+    ------
+    InputError
+        They are.
+    """
+    if workers is not None:
+        raise InputError(why, field="workers", remedy="leave it out")
+
+
 def kept_in(folder: str | Path | None) -> Path:
     """The folder of a study of many runs.
 

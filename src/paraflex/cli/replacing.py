@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import time
 from pathlib import Path
 from typing import Any
 
 from paraflex.cli.tables import plain_console
+from paraflex.writing import read_json
 
 # Beside the files of numbers all commands write these.
 _DRAWN = ("figures", "report.html")
@@ -55,15 +55,6 @@ def _described(folder: Path, kind: str) -> str:
         # Damaged, or of another version: it is replaced all the same.
         text = f"a {kind}"
     return f"{text}, {when}"
-
-
-def read_json(file: Path) -> Any:
-    """What a file of JSON holds; nothing of one that cannot be read, or that is no table."""
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _what(folder: Path, kind: str, found: dict[str, Any]) -> str:

@@ -83,16 +83,16 @@ def open_study(folder: str | Path) -> StudyFolder:
         `study.json` cannot be read, or is not that of a study.
     """
     folder = Path(folder)
-    told = read_study(folder / STUDY)
+    account = read_study(folder / STUDY)
     try:
         return StudyFolder(
             folder=folder,
-            name=told["name"],
-            runs=told.get("runs"),
-            sampling=told.get("sampling", "search"),
-            setting=_setting(told["study"], told.get("versions", {})),
-            ranges={name: (low, high, spread) for name, (low, high, spread) in told.get("ranges", {}).items()},
-            versions=told.get("versions", {}),
+            name=account["name"],
+            runs=account.get("runs"),
+            sampling=account.get("sampling", "search"),
+            setting=_setting(account["study"], account.get("versions", {})),
+            ranges={name: (low, high, spread) for name, (low, high, spread) in account.get("ranges", {}).items()},
+            versions=account.get("versions", {}),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError("not the study of a folder of ours", field=str(folder / STUDY), remedy=_AGAIN) from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -94,8 +95,8 @@ class Verification(Result):
             runs.failure for by_model in self.runs.values() for runs in by_model.values()
         )
 
-    @property
-    def data(self) -> xr.Dataset | None:
+    @cached_property
+    def data(self) -> xr.Dataset | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
 
         Modes that every model began; where there is none, models that every mode begun has; None where there are none.

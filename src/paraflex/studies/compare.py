@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, checked_arguments
-from paraflex.campaign import OnProgress, Progress, Study, Workers
+from paraflex.campaign import OnProgress, Progress, Study, Workers, no_workers
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.methods import Family, Method, find_method
@@ -117,8 +117,7 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
         IntegrationError
             No converged run to compare with.
         """
-        if workers is not None:
-            raise InputError("runs come one after the other", field="workers", remedy="leave it out")
+        no_workers(workers, "runs come one after the other")
         case, options = self.case, self.options or ComparisonOptions()
         chosen = [find_method(name) for name in dict.fromkeys(METHODS if self.methods is None else self.methods)]
         plans = {method.name: _plan(method, options) for method in chosen}

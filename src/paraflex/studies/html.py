@@ -57,13 +57,13 @@ def study_html(result: StudyResult) -> str:
 def sweep_html(result: SweepResult) -> str:
     """How many runs are done and how they ended, and where the table is."""
     rate = f"{result.fresh} runs in {result.seconds:.3g} s" if result.fresh else None
-    told = [
+    known = [
         ("runs", f"{result.done} of {result.total}"),
         *sorted(result.counts.items()),
         ("in this session", rate),
         ("table", str(result.table)),
     ]
-    return page(f"sweep: {_state(result.complete, result.interrupted)}", facts(told))
+    return page(f"sweep: {_state(result.complete, result.interrupted)}", facts(known))
 
 
 @view.register(OptimisationResult)

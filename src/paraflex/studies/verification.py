@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from paraflex.arguments import CheckedFields, checked_arguments
-from paraflex.campaign import OnProgress, Progress, Study, Workers
+from paraflex.campaign import OnProgress, Progress, Study, Workers, no_workers
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
@@ -104,8 +104,7 @@ class VerificationStudy(Study[Verification], CheckedFields):
             An unknown model or mode, an engine that is not installed, or one that cannot express the mechanism: before
             anything runs.
         """
-        if workers is not None:
-            raise InputError("runs come one after the other", field="workers", remedy="leave it out")
+        no_workers(workers, "runs come one after the other")
         models = tuple(dict.fromkeys(self.models))
         for name in models:
             check_model(name, self.task.mechanism)

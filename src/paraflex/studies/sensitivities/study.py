@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, held, not_ours, of_another_study
+from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, held, no_workers, not_ours, of_another_study
 from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
@@ -25,7 +24,7 @@ from paraflex.designs.setting import Setting, digest, make_setting
 from paraflex.errors import InputError, OutputError, suggestion
 from paraflex.findings import Verdict
 from paraflex.results.summary import finite_or_none
-from paraflex.writing import whole_file
+from paraflex.writing import read_json, whole_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -207,8 +206,7 @@ class SensitivityStudy(Study[Sensitivities]):
         NumericalError
             A run that cannot be made.
         """
-        if workers is not None:
-            raise InputError("one path is differentiated after the other", field="workers", remedy="leave it out")
+        no_workers(workers, "one path is differentiated after the other")
         if folder is None:
             return self._found(on_progress)
         with held(Path(folder)):
@@ -333,15 +331,8 @@ def _claim(folder: Path, asked: str) -> None:
     if others:
         raise not_ours(folder, others)
     file = folder / Sensitivities.values_file
-    if file.exists() and _content(file) != asked:
+    if file.exists() and read_json(file).get("content") != asked:
         raise of_another_study(folder)
-
-
-def _content(file: Path) -> Any:
-    try:
-        return json.loads(file.read_text(encoding="utf-8")).get("content")
-    except (OSError, ValueError, AttributeError):
-        return None
 
 
 def _to_parquet(lines: Any, file: Path) -> None:
