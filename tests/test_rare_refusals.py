@@ -12,6 +12,7 @@ import pytest
 
 import paraflex as pf
 from paraflex.actuation import feed_forward
+from paraflex.campaign import Workers
 from paraflex.checks import check_planned
 from paraflex.designs.derivatives import changes, gradient
 from paraflex.dynamics import State, build_system
@@ -104,7 +105,7 @@ def test_derivatives_where_there_are_none(differentiated, monkeypatch):
 def test_packages_that_are_missing(study, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     refused(
-        lambda: sweep(study, tmp_path / "out", engine="dask"),
+        lambda: sweep(study, tmp_path / "out", workers=Workers("dask")),
         "--engine", "Dask is not installed", "pip install 'paraflex[cluster]'",
     )  # fmt: skip
     monkeypatch.setitem(sys.modules, "sksundae", None)

@@ -10,7 +10,7 @@ from paraflex.cli.request import COMPLETE, INTERRUPTED
 from paraflex.cli.tables import number, plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_search_figures
-from paraflex.studies import IndicesResult, load_indices, sobol_indices
+from paraflex.studies import IndicesResult, load_indices
 
 
 def indices_command(request: IndicesRequest) -> int:
@@ -20,10 +20,8 @@ def indices_command(request: IndicesRequest) -> int:
     compile_kernels_for(study.sweep.model().mechanism, console.print)
     with bars(console, "{task.completed}/{task.total}") as progress:
         bar = progress.add_task(study.sweep.name, total=study.sweep.runs)
-        result = sobol_indices(
-            study, request.folder, on_progress=lambda at: progress.update(bar, completed=at.done),
-            **request.workers.given,
-        )  # fmt: skip
+        report = lambda at: progress.update(bar, completed=at.done)  # noqa: E731
+        result = study.run(request.folder, workers=request.workers.chosen, on_progress=report)
     if not result.complete:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED

@@ -22,13 +22,11 @@ from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResu
 R = TypeVar("R", OptimisationResult, IdentificationResult)
 
 
-def search_command(
-    request: SearchRequest, study: DesignStudy, look: Callable[..., R], report: Callable[[R], None], what: str
-) -> int:
+def search_command(request: SearchRequest, study: DesignStudy[R], report: Callable[[R], None], what: str) -> int:
     """Do what is left of a search, write its figures and say what it found; the exit code."""
     console = plain_console(stderr=True)
     compile_kernels_for(study.base.model().mechanism, console.print)
-    result = _with_bar(console, study, request, look, what)
+    result = _with_bar(console, study, request, what)
     if result.interrupted and not result.values:
         console.print("interrupted before the first design was done")
         return INTERRUPTED
@@ -57,7 +55,7 @@ def parameter_table(result: R, **columns: dict[str, str]) -> Table:
     return table
 
 
-def _with_bar(console: Console, study: DesignStudy, request: SearchRequest, look: Callable[..., R], what: str) -> R:
+def _with_bar(console: Console, study: DesignStudy[R], request: SearchRequest, what: str) -> R:
     with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[best]}") as progress:
         bar = progress.add_task(study.name, total=study.search.evaluations, best="")
 
@@ -65,7 +63,7 @@ def _with_bar(console: Console, study: DesignStudy, request: SearchRequest, look
             best = "" if at.best is None else f"{what} {at.best:.4g}"
             progress.update(bar, completed=at.done, best=best)
 
-        return look(study, request.folder, on_progress=tell, **request.workers.given)
+        return study.run(request.folder, workers=request.workers.chosen, on_progress=tell)
 
 
 def _say_end(console: Console, result: OptimisationResult | IdentificationResult, folder: Path) -> None:

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.campaign import THREADS, Engine, OnProgress, Study, Workers
+from paraflex.campaign import OnProgress, Study, Workers
 from paraflex.designs.run import COMPLETE, run_task
 from paraflex.designs.samples import RANDOM
 from paraflex.designs.schema import SamplingTable, study_table
@@ -207,20 +207,18 @@ def sobol_indices(
     study: IndicesStudy | str | Path,
     folder: str | Path,
     *,
-    engine: str | Engine = THREADS,
-    workers: int | None = None,
-    cluster: str | None = None,
+    workers: Workers | int | None = None,
     on_progress: OnProgress | None = None,
     run: RunTask = run_task,
     **read: Any,
 ) -> IndicesResult:
     """First-order and total Sobol indices of metrics, from Saltelli's samples run as a sweep.
 
-    `study.run(folder)` in one call: see there, and `Workers` for engine, workers and cluster. Of a file `metrics`,
+    `study.run(folder)` in one call: see there and `Workers`. Of a file `metrics`,
     `samples` and `seed` may be given as to `load_indices`.
     """
     study = study if isinstance(study, IndicesStudy) else load_indices(study, **read)
-    return study.run(folder, workers=Workers(engine, workers, cluster), on_progress=on_progress, run=run)
+    return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
 
 
 def _indices(study: IndicesStudy, table: Path) -> list[SobolIndices]:
