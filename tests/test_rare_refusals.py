@@ -46,8 +46,9 @@ PENDULUM = library_text("pendulum")
 
 
 def designs(metrics):
-    runs = np.array(["", ""])
-    return DesignTable({"arm": np.array([1.0, 2.0])}, metrics, {}, runs, runs, np.array([True, True]))
+    number, text = np.arange(2), np.array(["", ""])
+    status = np.array(["complete", "complete"])
+    return DesignTable({"arm": np.array([1.0, 2.0])}, metrics, {}, number, number, text, text, status, text)
 
 
 @pytest.fixture

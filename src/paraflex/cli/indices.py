@@ -40,15 +40,15 @@ def _report(result: IndicesResult) -> None:
     title = "Sobol indices and half the width of their intervals of 95 %"
     keys = ("first", "first_confidence", "total", "total_confidence")
     rows = (
-        [each.metric, each.path, each.mode, row["parameter"], *(number(row[key], ".3f") for key in keys)]
-        for each in result.indices
-        for row in each.rows()
+        [row["metric"], row["path"], row["mode"], row["parameter"], *(number(row[key], ".3f") for key in keys)]
+        for row in result.to_dict()["indices"]
     )
     heads = ("first", "±", "total", "±")
     console = plain_console()
     console.print(plain_table("metric", "path", "mode", "parameter", numbers=heads, rows=rows, title=title))
-    for each in result.indices:
-        if each.dropped:
-            share = f"{each.dropped} of {each.dropped + each.samples} base samples"
-            where = f"{each.metric}, {each.path}, {each.mode}"
+    indices = result.indices
+    for k, dropped in enumerate(indices["dropped"].values):
+        if dropped:
+            share = f"{dropped} of {dropped + indices['samples'].values[k]} base samples"
+            where = ", ".join(str(indices[name].values[k]) for name in ("metric", "path", "mode"))
             console.print(f"{where}: {share} left out: not all their runs are complete", soft_wrap=True)
