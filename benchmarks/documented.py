@@ -90,11 +90,11 @@ PICTURES = {
 
 def draw(kind: str, figures: dict[str, Any]) -> None:
     """Bring the picture on the page up to date."""
-    from paraflex.plots import save_search_figures
+    from paraflex.plots import save_figures
 
     written, shown = PICTURES[kind]
     with tempfile.TemporaryDirectory() as folder:
-        save_search_figures({"kind": kind} | figures, folder)
+        save_figures({"kind": kind} | figures, folder)
         shutil.copyfile(Path(folder) / f"{written}.png", DOCS / "images" / f"{shown}.png")
 
 

@@ -9,7 +9,7 @@ from paraflex.cli.commands.studies import IndicesRequest
 from paraflex.cli.request import COMPLETE, INTERRUPTED
 from paraflex.cli.tables import number, plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
-from paraflex.plots import save_search_figures
+from paraflex.plots import save_figures
 from paraflex.studies import IndicesResult, load_indices
 
 
@@ -25,7 +25,7 @@ def indices_command(request: IndicesRequest) -> int:
     if not result.complete:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED
-    save_search_figures(result.to_dict(), request.folder / "figures")
+    save_figures(result.to_dict(), request.folder / "figures")
     verdict = study.sweep.setting.verdict()
     warn_of(console if request.json else plain_console(), verdict)
     if request.json:

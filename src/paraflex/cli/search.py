@@ -16,7 +16,7 @@ from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
 from paraflex.cli.tables import plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
-from paraflex.plots import save_search_figures
+from paraflex.plots import save_figures
 from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
@@ -30,7 +30,7 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Callab
     if result.interrupted and not result.values:
         console.print("interrupted before the first design was done")
         return INTERRUPTED
-    save_search_figures(result.to_dict(), request.folder / "figures")
+    save_figures(result.to_dict(), request.folder / "figures")
     verdict = study.base.setting.verdict()
     warn_of(console if request.json else plain_console(), verdict)
     if request.json:
