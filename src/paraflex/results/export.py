@@ -20,6 +20,7 @@ from paraflex.writing import whole_file
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
@@ -145,19 +146,23 @@ def export_results(
 def _write_table(table: pd.DataFrame, file: Path, to: str, about: Mapping[str, str]) -> None:
     """Write a table as CSV, units in the names of columns, or Parquet, units in their metadata."""
     import pyarrow as pa
-    from pyarrow import csv, parquet
+    from pyarrow import parquet
 
     units, meanings = table.attrs["units"], table.attrs["meanings"]
     found = pa.Table.from_pandas(table, preserve_index=False)
     if to == "csv":
-        csv.write_csv(
-            found.rename_columns([f"{name} [{units[name]}]" if units[name] else name for name in table]), file
-        )
+        _write_csv(found, units, file)
         return
-    fields = [
-        field.with_metadata({"unit": units[field.name], "long_name": meanings[field.name]}) for field in found.schema
-    ]
+    about_columns = {name: {"unit": units[name], "long_name": meanings[name]} for name in units}
+    fields = [field.with_metadata(about_columns[field.name]) for field in found.schema]
     parquet.write_table(found.cast(pa.schema(fields, metadata=dict(about))), file, compression="zstd")
+
+
+def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
+    from pyarrow import csv
+
+    names = [f"{name} [{units[name]}]" if units[name] else name for name in table.column_names]
+    csv.write_csv(table.rename_columns(names), file)
 
 
 def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
@@ -238,13 +243,12 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
         raise InputError(
             "damaged or cut short: not a readable table", field=str(source), remedy="run the study again"
         ) from error
-    table = found.to_pandas()
-    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in found.schema}
-    table.attrs = {"units": units, "meanings": dict.fromkeys(units, "")}
     with whole_file(file) as unfinished:
         if to == "csv":
-            _write_table(table, unfinished, to, {})
+            units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in found.schema}
+            _write_csv(found, units, unfinished)
         else:
+            table = found.to_pandas()
             columns = {matlab_name(name): _matlab_value(_known(table[name]).to_numpy()) for name in table}
             _write_mat({"results": columns}, unfinished)
     return [file]
