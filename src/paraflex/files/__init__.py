@@ -13,6 +13,7 @@ from paraflex.files.model import (
     load_data as load_data,
     load_path as load_path,
     model_from as model_from,
+    plan as plan,
 )
 from paraflex.files.schema import model_schema as model_schema
 from paraflex.files.study import StudyDefaults as StudyDefaults

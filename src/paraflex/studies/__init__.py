@@ -25,11 +25,11 @@ from paraflex.studies.optimisation import (
     OptimisationResult as OptimisationResult,
     OptimisationStudy as OptimisationStudy,
     identify as identify,
+    indices as indices,
     load_identification as load_identification,
     load_indices as load_indices,
     load_optimisation as load_optimisation,
     optimise as optimise,
-    sobol_indices as sobol_indices,
 )
 from paraflex.studies.sensitivities import (
     Sensitivities as Sensitivities,

@@ -11,8 +11,8 @@ from paraflex.studies.optimisation.identify import (
 from paraflex.studies.optimisation.indices import (
     IndicesResult as IndicesResult,
     IndicesStudy as IndicesStudy,
+    indices as indices,
     load_indices as load_indices,
-    sobol_indices as sobol_indices,
 )
 from paraflex.studies.optimisation.objective import Objective as Objective, Target as Target
 from paraflex.studies.optimisation.optimise import (
