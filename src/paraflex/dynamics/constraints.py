@@ -10,14 +10,9 @@ import scipy
 
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
 from paraflex.mechanism import (
-    AxisJoint,
     Joint,
     Mechanism,
-    PointJoint,
     PointRef,
-    PrismaticJoint,
-    SlidingJoint,
-    WeldJoint,
 )
 
 
@@ -69,25 +64,23 @@ class Constraint:
 def _joint_constraints(joint: Joint) -> list[Constraint]:
     """What a joint holds."""
     name, a, b = joint.name, joint.a, joint.b
-    parts = []
-    if isinstance(joint, PointJoint):
-        parts.append(Constraint(name, name, POINT, a, b, (f"{name} x", f"{name} y")))
-    if isinstance(joint, AxisJoint):
-        normal, carrier = joint.direction + 0.5 * np.pi, "track" if isinstance(joint, SlidingJoint) else "material"
-        parts.append(Constraint(name, name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier))
-    if isinstance(joint, PrismaticJoint | WeldJoint):
-        parts.append(Constraint(name, name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
-    return parts
+    normal, carrier = joint.direction + 0.5 * np.pi, "track" if joint.follows_beam else "material"
+    parts = {
+        "points": Constraint(name, name, POINT, a, b, (f"{name} x", f"{name} y")),
+        "axis": Constraint(name, name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier),
+        "angle": Constraint(name, name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle),
+    }
+    return [parts[held] for held in joint.holds]
 
 
-def axis_of(joint: AxisJoint) -> dict[str, Any]:
+def axis_of(joint: Joint) -> dict[str, Any]:
     """Direction and carrier of the axis that a joint's travel is measured on."""
-    return {"direction": joint.direction, "carrier": "frame" if isinstance(joint, SlidingJoint) else "material"}
+    return {"direction": joint.direction, "carrier": "frame" if joint.follows_beam else "material"}
 
 
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    if isinstance(joint, AxisJoint):
+    if joint.slides:
         keywords |= axis_of(joint)
         return Constraint(name, joint.name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
     return Constraint(name, joint.name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
@@ -110,6 +103,11 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
         slope = friction.limit / friction.speed
         constraints.append(_along(joint, friction.name, row=FRICTION, compliance=1.0 / slope, limit=friction.limit))
     return constraints
+
+
+def constraint_count(mechanism: Mechanism) -> int:
+    """How many constraints joints and prescribed motions are, redundant ones included."""
+    return sum(len(one.labels) for one in _constraints(mechanism) if one.row == CONSTRAINT)
 
 
 def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
