@@ -40,17 +40,9 @@ def not_negative(value: float, field: str, unit: str) -> None:
 def said(
     description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: bool = False
 ) -> dict[str, Any]:
-    """Metadata of a member's field.
+    """Metadata of a member's field: what model files, their schema and errors say of it, with the unit behind "in".
 
-    Parameters
-    ----------
-    description : str
-        As model files, their schema and errors have it; a unit stands behind "in".
-    check : callable, optional
-        Of its number: `finite`, `positive` or `not_negative`, the last two with a unit to ask for.
-    unit : str
-    joint : bool
-        Whether it names a joint.
+    A number is checked by `finite`, or `positive` or `not_negative` with a unit to ask for; a name may be a joint's.
     """
     checked = partial(check, unit=unit) if check is not None and unit else check
     return {"description": description, "check": checked, "joint": joint}

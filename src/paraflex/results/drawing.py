@@ -12,15 +12,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
-from paraflex.mechanism import (
-    Body,
-    Joint,
-    Mechanism,
-    PointRef,
-    Pose,
-    RigidBody,
-    placed_poses,
-)
+from paraflex.mechanism import Body, Joint, Mechanism, PointRef, Pose, RigidBody, placed_poses
 from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape, turned
 
 Array = NDArray[np.float64]
