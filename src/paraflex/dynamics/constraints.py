@@ -9,16 +9,7 @@ import numpy as np
 import scipy
 
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
-from paraflex.mechanism import (
-    AxisJoint,
-    Joint,
-    Mechanism,
-    PointJoint,
-    PointRef,
-    PrismaticJoint,
-    SlidingJoint,
-    WeldJoint,
-)
+from paraflex.mechanism import Joint, Mechanism, PointRef
 
 
 @dataclass(frozen=True)
@@ -69,25 +60,23 @@ class Constraint:
 def _joint_constraints(joint: Joint) -> list[Constraint]:
     """What a joint holds."""
     name, a, b = joint.name, joint.a, joint.b
-    parts = []
-    if isinstance(joint, PointJoint):
-        parts.append(Constraint(name, name, POINT, a, b, (f"{name} x", f"{name} y")))
-    if isinstance(joint, AxisJoint):
-        normal, carrier = joint.direction + 0.5 * np.pi, "track" if isinstance(joint, SlidingJoint) else "material"
-        parts.append(Constraint(name, name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier))
-    if isinstance(joint, PrismaticJoint | WeldJoint):
-        parts.append(Constraint(name, name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
-    return parts
+    normal, carrier = joint.direction + 0.5 * np.pi, "track" if joint.follows_beam else "material"
+    parts = {
+        "points": Constraint(name, name, POINT, a, b, (f"{name} x", f"{name} y")),
+        "axis": Constraint(name, name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier),
+        "angle": Constraint(name, name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle),
+    }
+    return [parts[held] for held in joint.holds]
 
 
-def axis_of(joint: AxisJoint) -> dict[str, Any]:
+def axis_of(joint: Joint) -> dict[str, Any]:
     """Direction and carrier of the axis that a joint's travel is measured on."""
-    return {"direction": joint.direction, "carrier": "frame" if isinstance(joint, SlidingJoint) else "material"}
+    return {"direction": joint.direction, "carrier": "frame" if joint.follows_beam else "material"}
 
 
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    if isinstance(joint, AxisJoint):
+    if joint.slides:
         keywords |= axis_of(joint)
         return Constraint(name, joint.name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
     return Constraint(name, joint.name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
@@ -96,20 +85,19 @@ def _along(joint: Joint, name: str, **keywords) -> Constraint:
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
     constraints = [part for joint in mechanism.joints for part in _joint_constraints(joint)]
     # Signals are the motors' torques first, then the prescribed motions.
-    for k, prescribed in enumerate(mechanism.prescribed):
-        joint = mechanism.joint(prescribed.joint)
-        constraints.append(_along(joint, prescribed.name, signal=len(mechanism.motors) + k))
-    for spring in mechanism.springs:
-        joint = mechanism.joint(spring.joint)
-        constraints.append(_along(joint, spring.name, row=SPRING, compliance=1.0 / spring.stiffness, rest=spring.rest))
-    for damper in mechanism.dampers:
-        joint = mechanism.joint(damper.joint)
-        constraints.append(_along(joint, damper.name, row=DAMPER, compliance=1.0 / damper.coefficient))
-    for friction in mechanism.frictions:
-        joint = mechanism.joint(friction.joint)
-        slope = friction.limit / friction.speed
-        constraints.append(_along(joint, friction.name, row=FRICTION, compliance=1.0 / slope, limit=friction.limit))
-    return constraints
+    at_joints: list[tuple[Any, dict[str, Any]]] = [
+        *((one, {"signal": len(mechanism.motors) + k}) for k, one in enumerate(mechanism.prescribed)),
+        *((one, {"row": SPRING, "compliance": 1.0 / one.stiffness, "rest": one.rest}) for one in mechanism.springs),
+        *((one, {"row": DAMPER, "compliance": 1.0 / one.coefficient}) for one in mechanism.dampers),
+        *((one, {"row": FRICTION, "compliance": 1.0 / (one.limit / one.speed), "limit": one.limit})
+          for one in mechanism.frictions),
+    ]  # fmt: skip
+    return constraints + [_along(mechanism.joint(one.joint), one.name, **keywords) for one, keywords in at_joints]
+
+
+def constraint_count(mechanism: Mechanism) -> int:
+    """How many constraints joints and prescribed motions are, redundant ones included."""
+    return sum(len(one.labels) for one in _constraints(mechanism) if one.row == CONSTRAINT)
 
 
 def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:

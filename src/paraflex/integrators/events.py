@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.errors import InputError, suggestion
-from paraflex.mechanism import AtEnd, FlexibleBeam, Mechanism, RigidBody, SlidingJoint, WeldJoint
+from paraflex.errors import InputError
+from paraflex.mechanism import AtEnd, FlexibleBeam, Mechanism, RigidBody
+from paraflex.mechanism.quantities import known
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:
     """Ends of the beams that joints slide along, of those that do not ignore them."""
     found = []
     for joint in mechanism.joints:
-        if isinstance(joint, SlidingJoint) and joint.at_end is not AtEnd.IGNORE:
+        if joint.at_end is not AtEnd.IGNORE:
             beam = mechanism.body(joint.a.body)
             assert isinstance(beam, FlexibleBeam)
             found.append(BeamEnd(joint.name, beam.name, beam.length, joint.at_end))
@@ -143,26 +144,18 @@ def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:
     """
     for event in events:
         if isinstance(event, JointLimit):
-            _known("joint", event.joint, [joint.name for joint in mechanism.joints])
-            if isinstance(mechanism.joint(event.joint), WeldJoint):
-                raise InputError(
-                    "a weld does not move", field="events", value=event.joint, remedy="name a joint that does"
-                )
+            known(event.joint, [joint.name for joint in mechanism.joints], "events", "joint")
+            mechanism.joint(event.joint).check_moves("events")
         elif isinstance(event, DeflectionLimit):
-            _known("body", event.body, [body.name for body in mechanism.bodies])
+            known(event.body, [body.name for body in mechanism.bodies], "events", "body")
             body = mechanism.body(event.body)
             if isinstance(body, RigidBody) or not body.flexible:
                 raise InputError("a rigid body does not bend", field="events", value=event.body, remedy="leave it out")
         elif isinstance(event, SingularDistance):
             for name in event.motors:
-                _known("motor", name, [motor.name for motor in mechanism.motors])
+                known(name, [motor.name for motor in mechanism.motors], "events", "motor")
         else:
             raise InputError(
                 "not an event", field="events", value=event,
                 remedy="give JointLimit, DeflectionLimit or SingularDistance",
             )  # fmt: skip
-
-
-def _known(kind: str, name: str, names: list[str]) -> None:
-    if name not in names:
-        raise InputError(f"unknown {kind}", field="events", value=name, remedy=suggestion(name, names))

@@ -15,14 +15,14 @@ from paraflex.mechanism.bodies import (
 )
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping, stiffness_proportional
+from paraflex.mechanism.groups import Group, grouped, groups_of
 from paraflex.mechanism.joints import (
     GROUND,
+    JOINT_KINDS,
     AngleLaw,
     AtEnd,
-    AxisJoint,
     Joint,
     Motor,
-    PointJoint,
     PointRef,
     PrescribedAngle,
     PrismaticJoint,
@@ -31,6 +31,7 @@ from paraflex.mechanism.joints import (
     SlidingJoint,
     SlotJoint,
     WeldJoint,
+    points_named,
 )
 from paraflex.mechanism.laws import ConstantSpeed, PiecewiseLaw, TabulatedLaw
 from paraflex.mechanism.loads import (
@@ -47,6 +48,7 @@ from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import ActuationMode, Assembly, EndEffector, Geometry
 from paraflex.mechanism.modal import ModalBody, ModalPoint
 from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
+from paraflex.mechanism.quantities import joints_named
 from paraflex.mechanism.raparm import raparm_i
 from paraflex.mechanism.rows import chain_of_segments, four_bars_in_a_row
 from paraflex.mechanism.segments import (
@@ -63,6 +65,7 @@ from paraflex.mechanism.start import BodyValues, Deflection, Start, check_start
 __all__ = [
     "FIRST_END",
     "GROUND",
+    "JOINT_KINDS",
     "LAST_END",
     "ActuationMode",
     "AngleLaw",
@@ -70,7 +73,6 @@ __all__ = [
     "Assembly",
     "AssumedModesBeam",
     "AtEnd",
-    "AxisJoint",
     "Body",
     "BodyValues",
     "ConstantSpeed",
@@ -80,6 +82,7 @@ __all__ = [
     "EndEffector",
     "FlexibleBeam",
     "Geometry",
+    "Group",
     "Joint",
     "JointFriction",
     "LinearSpring",
@@ -94,7 +97,6 @@ __all__ = [
     "Motor",
     "PiecewiseLaw",
     "PointForce",
-    "PointJoint",
     "PointRef",
     "Polynomial",
     "Pose",
@@ -123,12 +125,16 @@ __all__ = [
     "finite_segments",
     "four_bars_in_a_row",
     "given_shapes",
+    "grouped",
+    "groups_of",
     "is_hinge",
+    "joints_named",
     "loops",
     "mode_of_motors",
     "mode_of_signs",
     "parse_mode",
     "placed_poses",
+    "points_named",
     "proportional_segments",
     "raparm_i",
     "stiffness_proportional",

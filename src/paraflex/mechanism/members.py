@@ -9,10 +9,20 @@ from functools import cached_property
 from typing import Self, TypeVar
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body
-from paraflex.mechanism.joints import GROUND, AxisJoint, Joint, Motor, PointRef, PrescribedAngle
-from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.groups import Group, group, grouped
+from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
+from paraflex.mechanism.loads import (
+    AppliedTorque,
+    JointFriction,
+    LinearSpring,
+    Load,
+    PointForce,
+    TorsionalDamper,
+    TorsionalSpring,
+)
+from paraflex.mechanism.quantities import known
 
 T = TypeVar("T")
 
@@ -102,22 +112,27 @@ class Geometry(Enum):
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Members(CheckedFields):
-    """The members of a mechanism and how they are found by name: see `Mechanism`, which they make once checked."""
+    """The members of a mechanism and how they are found by name: see `Mechanism`, which they make once checked.
+
+    A field with a `group` is a group of members: files, checks, engines and tables go through these.
+    """
 
     name: str
     ground: Mapping[str, tuple[float, float]]
-    bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...]
-    motors: tuple[Motor, ...] = ()
-    prescribed: tuple[PrescribedAngle, ...] = ()
+    bodies: tuple[Body, ...] = field(metadata={"group": Group("body", "body", plural="bodies", engines=True)})
+    joints: tuple[Joint, ...] = field(metadata={"group": Group("joint", "joint", engines=True)})
+    motors: tuple[Motor, ...] = group("motor", "motor", engines=True)
+    prescribed: tuple[PrescribedAngle, ...] = group("prescribed", "prescribed angle")
     end_effector: EndEffector | None = None
-    assemblies: tuple[Assembly, ...] = ()
-    modes: tuple[ActuationMode, ...] = ()
-    springs: tuple[TorsionalSpring, ...] = ()
-    dampers: tuple[TorsionalDamper, ...] = ()
-    frictions: tuple[JointFriction, ...] = ()
-    linear_springs: tuple[LinearSpring, ...] = ()
-    loads: tuple[Load, ...] = ()
+    assemblies: tuple[Assembly, ...] = group("assembly", "assembly", plural="assemblies", engines=True)
+    modes: tuple[ActuationMode, ...] = group("mode", "actuation mode", engines=True)
+    springs: tuple[TorsionalSpring, ...] = group("spring", "spring", TorsionalSpring, engines=True, resists=True)
+    dampers: tuple[TorsionalDamper, ...] = group("damper", "damper", TorsionalDamper, resists=True)
+    frictions: tuple[JointFriction, ...] = group("friction", "friction law", JointFriction, resists=True)
+    linear_springs: tuple[LinearSpring, ...] = group(
+        "linear_spring", "spring between points", LinearSpring, plural="springs between points", resists=True
+    )
+    loads: tuple[Load, ...] = group("load", "load", PointForce, AppliedTorque)
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
@@ -137,10 +152,8 @@ class Members(CheckedFields):
         return self._by_name("joint", name, self._joints_by_name)
 
     def _by_name(self, kind: str, name: str, members: Mapping[str, T]) -> T:
-        try:
-            return members[name]
-        except (KeyError, TypeError):
-            raise InputError(f"unknown {kind}", field=kind, value=name, remedy=suggestion(name, members)) from None
+        known(name, members, kind, kind)
+        return members[name]
 
     @cached_property
     def _bodies_by_name(self) -> dict[str, Body]:
@@ -164,6 +177,12 @@ class Members(CheckedFields):
                 found[name].append(joint)
         return found
 
+    @property
+    def points_used(self) -> set[PointRef]:
+        """Points that a joint, a spring, a load or another member names, or the end-effector."""
+        used = {point for _, members in grouped(self) for one in members for point in points_named(one).values()}
+        return used if self.end_effector is None else used | {self.end_effector.point}
+
     def reached(self, start: str, past: str = "") -> set[str]:
         """A body or the ground, and all that joints lead to from there past another body."""
         seen, waiting = {start, past}, [start]
@@ -176,7 +195,7 @@ class Members(CheckedFields):
 
     def slides(self, joint: str) -> bool:
         """Whether a joint, by its name, has a travel and not an angle."""
-        return isinstance(self.joint(joint), AxisJoint)
+        return self.joint(joint).slides
 
     def motor_units(self) -> tuple[str, ...]:
         """What each motor's torque is counted in: N m, or N where its joint slides."""
@@ -190,8 +209,8 @@ class Members(CheckedFields):
         InputError
             If there is none.
         """
-        known = ", ".join(assembly.name for assembly in self.assemblies) or "none"
+        names = ", ".join(assembly.name for assembly in self.assemblies) or "none"
         for assembly in self.assemblies:
             if name is None or assembly.name == name:
                 return assembly
-        raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {known}")
+        raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {names}")

@@ -1,9 +1,12 @@
-"""Checks of single numbers that the checks of mechanisms and bodies share."""
+"""What members of a mechanism say of their fields, and checks of single numbers that those of bodies share."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import fields
+from functools import partial
+from typing import Any, cast
 
 from paraflex.errors import InputError, suggestion
 
@@ -14,9 +17,10 @@ def known(name: str, names: Collection[str], field: str, kind: str) -> None:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 
-def finite(values: Iterable[float], field: str) -> None:
-    """Raise an `InputError` unless all values are finite."""
-    for value in values:
+def finite(values: float | Iterable[float], field: str) -> None:
+    """Raise an `InputError` unless a value, or each of several, is finite."""
+    several = isinstance(values, Iterable) and getattr(values, "ndim", 1)
+    for value in cast("Iterable[float]", values if several else (values,)):
         if not math.isfinite(value):
             raise InputError("not a finite number", field=field, value=value, remedy="give a number")
 
@@ -31,3 +35,32 @@ def not_negative(value: float, field: str, unit: str) -> None:
     """Raise an `InputError` unless a value is zero or positive and finite."""
     if not (math.isfinite(value) and value >= 0.0):
         raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")
+
+
+def said(
+    description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: bool = False
+) -> dict[str, Any]:
+    """Metadata of a member's field: what model files, their schema and errors say of it, with the unit behind "in".
+
+    A number is checked by `finite`, or `positive` or `not_negative` with a unit to ask for; a name may be a joint's.
+    """
+    checked = partial(check, unit=unit) if check is not None and unit else check
+    return {"description": description, "check": checked, "joint": joint}
+
+
+AT_JOINT = said("the name of a joint", joint=True)
+
+
+def check_numbers(member: Any, place: str) -> None:
+    """Check the numbers of a member, each as its field says."""
+    for each in fields(member):
+        check = each.metadata.get("check")
+        if check is not None:
+            check(getattr(member, each.name), f"{place}.{each.name}")
+
+
+def joints_named(member: Any) -> Iterator[tuple[str, str]]:
+    """Fields of a member that name joints, and the joints."""
+    for each in fields(member):
+        if each.metadata.get("joint"):
+            yield each.name, getattr(member, each.name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,7 +48,9 @@ class Mark(NamedTuple):
 
 def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of the ground, at one time."""
-    found = [(joint.name, ground_of(joint, limits)) for joint in shown.joints if joint.grounded]
+    # What neither slides nor holds a point stands on nothing.
+    held = [joint for joint in shown.joints if joint.slides or {"pin", "weld"} & SYMBOLS.get(joint.kind, {}).keys()]
+    found = [(joint.name, ground_of(joint, limits)) for joint in held if joint.grounded]
     found += [("", support(place, limits)) for place in shown.anchors]
     return [
         Mark(look, name, _joined(pieces)[None])
@@ -60,11 +62,9 @@ def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
 def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of springs and joints."""
     out = [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
-    out += [Mark("block", joint.name, block(joint, limits)) for joint in shown.joints if joint.slides]
-    out += [Mark("weld", joint.name, square(joint.place, limits)) for joint in shown.joints if joint.kind == "weld"]
-    # What slides and turns, turns on a pin; what is welded to a block does neither.
-    turning = [joint for joint in shown.joints if joint.kind in ("pin", "slot", "sliding")]
-    return out + [Mark("pin", joint.name, joint.place[:, None]) for joint in turning]
+    parts = [(joint, look, shape) for joint in shown.joints for look, shape in SYMBOLS.get(joint.kind, {}).items()]
+    out += [Mark(look, joint.name, shape(joint, limits)) for joint, look, shape in parts]
+    return sorted(out, key=lambda mark: list(LOOKS).index(mark.look))
 
 
 def by_look(marks: Sequence[Mark]) -> dict[str, list[Mark]]:
@@ -136,10 +136,15 @@ def block(joint: DrawnJoint, limits: Limits) -> Array:
     return joint.place[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
-def square(place: Array, limits: Limits) -> Array:
+def square(joint: DrawnJoint, limits: Limits) -> Array:
     """Corners (f, 5, 2) of a weld."""
     d = 0.9 * PIN * limits.size
-    return place[:, None] + d * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+    return joint.place[:, None] + d * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+
+
+def dot(joint: DrawnJoint, _: Limits) -> Array:
+    """The place (f, 1, 2) of a pin."""
+    return joint.place[:, None]
 
 
 def zigzag(ends: Array, limits: Limits) -> Array:
@@ -152,3 +157,14 @@ def zigzag(ends: Array, limits: Limits) -> Array:
     swing = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], _TEETH // 2), [0.0, 0.0]])
     swing = 0.4 * TRIANGLE * limits.size * swing
     return a[:, None] + along[:, None] * d[:, None] + swing[:, None] * across[:, None]
+
+
+# Shapes of what moves of a joint by their looks, by `Joint.symbol`; a joint that has none is not drawn. What slides and
+# turns, turns on a pin; what is welded to a block does neither.
+SYMBOLS: dict[str, dict[str, Callable[[DrawnJoint, Limits], Array]]] = {
+    "pin": {"pin": dot},
+    "weld": {"weld": square},
+    "slider": {"block": block},
+    "slot": {"block": block, "pin": dot},
+    "sliding": {"block": block, "pin": dot},
+}

@@ -12,33 +12,10 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
-from paraflex.mechanism import (
-    AxisJoint,
-    Body,
-    Joint,
-    Mechanism,
-    PointRef,
-    Pose,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
-    SlidingJoint,
-    SlotJoint,
-    WeldJoint,
-    placed_poses,
-)
+from paraflex.mechanism import Body, Joint, Mechanism, PointRef, Pose, RigidBody, placed_poses
 from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape, turned
 
 Array = NDArray[np.float64]
-
-# Joints as files name them, but a revolute one is drawn as a pin and a prismatic one as a slider.
-JOINT_KINDS = {
-    RevoluteJoint: "pin",
-    PrismaticJoint: "slider",
-    SlotJoint: "slot",
-    SlidingJoint: "sliding",
-    WeldJoint: "weld",
-}
 
 
 @dataclass(frozen=True)
@@ -104,7 +81,7 @@ def drawing(
     }
     directions = np.full((samples, len(mechanism.joints)), np.nan)
     for i, joint in enumerate(mechanism.joints):
-        if isinstance(joint, AxisJoint):
+        if joint.slides:
             directions[:, i] = _direction(joint, angle, frame)
     springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
     return Drawing(
@@ -192,7 +169,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
         "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
         "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
-        "joint_kind": ("joint", [JOINT_KINDS[type(joint)] for joint in joints]),
+        "joint_kind": ("joint", [joint.symbol for joint in joints]),
         "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
         **of_springs,
     }
@@ -213,7 +190,7 @@ def _base(
     held: dict[int, PointRef] = {}
     moving = []
     for joint, ref in joined:
-        if isinstance(joint, SlidingJoint) and ref is joint.a:
+        if joint.follows_beam and ref is joint.a:
             moving.append(_contact(place(joint.b), *frame(one.body)))
         else:
             held.setdefault(one.points[ref.point], ref)
@@ -237,9 +214,8 @@ def _contact(place: Array, origin: Array, angle: Array) -> Hold:
 def _direction(
     joint: Joint, angle: Callable[[PointRef], Array], frame: Callable[[str], tuple[Array, Array]]
 ) -> Array | float:
-    if isinstance(joint, SlidingJoint):
+    if joint.follows_beam:
         return frame(joint.a.body)[1]
-    assert isinstance(joint, PrismaticJoint | SlotJoint)
     return joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
 
 
