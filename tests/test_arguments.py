@@ -288,7 +288,7 @@ SLIPS = [
     ("natural_frequencies(model)", "system: not a system"),
     ("natural_frequencies(system,'out')", "state: not a state"),
     ("pf.IntegrationOptions(max_steps='many')", "max_steps: not a whole number"),
-    ("pf.IntegrationOptions(parameters=3)", "parameters: not a dictionary"),
+    ("pf.IntegrationOptions(parameters=3)", "parameters: parameters belong to the method"),
     ("pf.IntegrationOptions(constraints=3)", "constraints: not a Treatment"),
     ("pf.IntegrationOptions(automatic_gains='yes')", "automatic_gains: not True or False"),
     ("pf.IntegrationOptions(1e-5,'x')", "alpha: not a number"),

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         ValidityWarning,
     )
     from paraflex.files import Model, library_names, load, load_path
-    from paraflex.integrators import METHODS, DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance
+    from paraflex.integrators import METHODS, DeflectionLimit, IntegrationOptions, JointLimit, SingularDistance, methods
     from paraflex.kinematics import Circle, Line, PointPath, Polygon
     from paraflex.mechanism import Mechanism, chain_of_segments, four_bars_in_a_row, raparm_i
     from paraflex.results import load_results, open_results, save_results, summary, tracking_dataset
@@ -90,6 +90,8 @@ _HOME = {
     "tracking_dataset": "results",
 }
 
+_MODULES = {"methods": "paraflex.integrators.methods", "plots": "paraflex.plots"}
+
 __all__ = [
     "METHODS",
     "Circle",
@@ -123,6 +125,7 @@ __all__ = [
     "load_results",
     "load_sensitivities",
     "load_sweep",
+    "methods",
     "open_results",
     "optimise",
     "plan_tracking",
@@ -142,8 +145,8 @@ ensure_cache_folder(Path(__file__).parent / "kernel")
 
 
 def __getattr__(name: str) -> Any:
-    if name == "plots":
-        return import_module("paraflex.plots")
+    if name in _MODULES:
+        return import_module(_MODULES[name])
     if name in _HOME:
         return getattr(import_module(f"paraflex.{_HOME[name]}"), name)
     raise AttributeError(f"module 'paraflex' has no attribute {name!r}")

@@ -22,7 +22,7 @@ from paraflex.dynamics import (
 )
 from paraflex.errors import InputError, IntegrationError, ResultWarning, suggestion
 from paraflex.findings import Finding, warn_of
-from paraflex.integrators import IntegrationOptions, Solution, check_times, choose, integrate
+from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start
 from paraflex.validity import Validity, assess, doubtful_results, warn, with_blame
@@ -68,7 +68,7 @@ def simulate_motion(
     assembly: str | None = None,
     torques: Mapping[str, float] | None = None,
     start: State | Start | None = None,
-    method: str | None = None,
+    method: Method | str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
     warning: bool = True,
@@ -89,8 +89,8 @@ def simulate_motion(
         Constant torque of each motor by name [N m]; zero for the others.
     start : State or Start, optional
         In place of the assembly: see `dynamics.consistent_state` and `mechanism.Start`.
-    method : str, optional
-        Of integration: that of the options by default; see `paraflex.METHODS`.
+    method : Method or str, optional
+        Of integration: that of the options by default; an object of `paraflex.methods` or a name in `paraflex.METHODS`.
     options : IntegrationOptions, optional
     on_progress : callable, optional
         Called with the time reached [s].

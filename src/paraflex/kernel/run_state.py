@@ -76,6 +76,7 @@ class Controls(NamedTuple):
     beta: float
     gain: float  # where positive alpha and beta are this over the step
     treatment: int
+    least_step: float  # a run that needs shorter ones is given up [s]
     max_step: float
     fixed_step: float  # zero where steps are chosen by their errors
     near_error: float  # error allowed in a step near a singular position, where that is more [m]
