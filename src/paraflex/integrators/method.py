@@ -52,7 +52,6 @@ def parameter(default: float, low: float, high: float, meaning: str, *, follows:
     return field(default=None if follows else default, metadata={"is": Parameter(default, low, high, meaning)})
 
 
-@given_as("a method of integration", 'its name, such as "tr-bdf2", or an object of paraflex.methods')
 @dataclass(frozen=True)
 class Method(CheckedFields, ABC):
     """A method of integration; the fields of its dataclass are its parameters.
@@ -126,6 +125,9 @@ class Method(CheckedFields, ABC):
     def highest_order(self) -> int:
         """That it goes up to."""
         return int(self.values.get("max_order", self.order))
+
+
+given_as("a method of integration", 'its name, such as "tr-bdf2", or an object of paraflex.methods')(Method | str)
 
 
 class NativeMethod(Method):

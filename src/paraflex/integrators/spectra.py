@@ -190,10 +190,14 @@ def wilson_step(x: float, theta: float) -> Array:
     )
 
 
+def highest_order(method: Method) -> int:
+    """Up to which a multistep method has formulas; a run may be held to fewer."""
+    return int(method.parameters["max_order"].high) if "max_order" in method.parameters else method.order
+
+
 def multistep_formula(method: Method, order: int | None) -> tuple[Array, Array]:
     """Coefficients of the new and old values and of their derivatives, the newest first, padded to one length."""
-    # All of them are stable formulas, of which a run may be held to fewer.
-    highest = int(method.parameters["max_order"].high) if method.parameters else method.order
+    highest = highest_order(method)
     if order is None or not (isinstance(order, int) and 1 <= order <= highest):
         raise InputError(
             f"{method} needs an order", field="order", value=order, remedy=f"choose one from 1 to {highest}"
