@@ -22,7 +22,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
 from paraflex.plots import mechanism_drawing
-from paraflex.plots.film import FilmOptions, find_encoder, plan_film, animate
+from paraflex.plots.film import FilmOptions, animate, find_encoder, plan_film
 from paraflex.plots.marks import block, ground_of, is_guide, zigzag
 from paraflex.plots.scene import figure_of, scale_bar, scene, select
 from paraflex.results import motion_dataset

@@ -10,7 +10,7 @@ import pytest
 from made_up import STUDY, made_up, write_study
 from paraflex.errors import InputError
 from paraflex.plots import sobol_bars
-from paraflex.studies import load_indices, indices
+from paraflex.studies import indices, load_indices
 from shell import paraflex
 
 ISHIGAMI = """
