@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
 
 from paraflex.arguments import checked_arguments, given_as, refused
 from paraflex.display import Shown
@@ -58,6 +60,11 @@ class Mechanism(Members, Shown):
         super().__post_init__()
         object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the model file of this mechanism, from which `load` reads an equal one; see `Model.save`."""
+        # Files stand above what they hold; they are imported when one is written.
+        import_module("paraflex.files").Model(self).save(path)
 
     @classmethod
     def made_of(cls, given: object) -> Mechanism:
