@@ -84,7 +84,7 @@ class RunDerivatives:
     derivatives : Motion
     steps : int
         Accepted ones.
-    unsettled : float
+    residual : float
         Largest last correction of any stage's equations, as a part of what it corrected: what they are solved to.
     """
 
@@ -92,7 +92,7 @@ class RunDerivatives:
     motion: Motion
     derivatives: Motion
     steps: int
-    unsettled: float
+    residual: float
 
 
 def check_differentiable(options: IntegrationOptions) -> None:
@@ -159,7 +159,7 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
         if derivatives
         else Motion(*empty),
         steps=int(run.state.counts[STEPS]),
-        unsettled=varied.unsettled,
+        residual=varied.residual,
     )
 
 
@@ -226,7 +226,7 @@ class _Varied:
     """A run solved to rounding, and its derivatives, as far as they have come."""
 
     def __init__(self, problem: Problem, run: NativeRun, directions: Sequence[Direction]) -> None:
-        self.problem, self.run, self.directions, self.unsettled = problem, run, directions, 0.0
+        self.problem, self.run, self.directions, self.residual = problem, run, directions, 0.0
         system, initial, stages = problem.system, problem.initial, run.scheme.c.size
         self.march = make_march(system.n, system.m, stages, len(system.mechanism.motors))
         self.march.q[:], self.march.v[:] = initial.q, initial.v
@@ -286,8 +286,8 @@ class _Varied:
 
     def _check(self, chunk: _Chunk, left: Array) -> None:
         left = left[: chunk.count]
-        self.unsettled = max(self.unsettled, float(left.max()))
-        if not self.unsettled <= _LARGEST_RESIDUAL:
+        self.residual = max(self.residual, float(left.max()))
+        if not self.residual <= _LARGEST_RESIDUAL:
             worst = int(np.argmax(~(left <= _LARGEST_RESIDUAL)))
             raise IntegrationError(
                 "the equations of a step cannot be solved to rounding, as derivatives need,",

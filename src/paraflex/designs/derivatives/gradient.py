@@ -46,7 +46,7 @@ class ModeGradients:
     errors : dict of str to (parameters,) array
         Estimates of what differences leave in `gradients`: those over numbers of the file and over signals.
     steps : int
-    unsettled : float
+    residual : float
         See `RunDerivatives`.
     """
 
@@ -55,7 +55,7 @@ class ModeGradients:
     gradients: dict[str, Array]
     errors: dict[str, Array]
     steps: int
-    unsettled: float
+    residual: float
 
 
 def metric_gradients(
@@ -123,7 +123,7 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Chan
         gradients=dict(zip(names, values, strict=True)),
         errors=dict(zip(names, errors, strict=True)),
         steps=found.steps,
-        unsettled=found.unsettled,
+        residual=found.residual,
     )
 
 
