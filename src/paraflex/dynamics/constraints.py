@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,19 +23,44 @@ from paraflex.mechanism import (
 
 
 @dataclass(frozen=True)
+class Term:
+    """What a joint contributes to a constraint: a quantity of point b less that of point a, times a weight.
+
+    Attributes
+    ----------
+    joint : str
+    kind : int
+        The quantity: POINT, both coordinates; ANGLE; or AXIS, the place of b along an axis that a carries.
+    a, b : PointRef
+    weight : float
+    direction : float
+        Of an axis against body a [rad].
+    carrier : str
+        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
+        origin on.
+    """
+
+    joint: str
+    kind: int
+    a: PointRef
+    b: PointRef
+    weight: float = 1.0
+    direction: float = 0.0
+    carrier: str = "material"
+
+
+@dataclass(frozen=True)
 class Constraint:
     """A joint or part of one, a prescribed motion, a spring, damper or friction before packing.
 
-    A spring is a compliant constraint: value - rest = compliance * multiplier; so is a damper, of the value's rate.
+    Its value is a sum of terms. A spring is a compliant constraint: value - rest = compliance * multiplier; so is a
+    damper, of the value's rate.
 
     Attributes
     ----------
     name : str
-    joint : str
-        The joint that it is of or acts in.
-    kind : int
-        Of its ports: POINT, ANGLE or AXIS.
-    a, b : PointRef
+    terms : tuple of Term
+        The first says what the value is: a length or an angle.
     labels : tuple of str
         One a row.
     signal : int
@@ -44,26 +70,21 @@ class Constraint:
     compliance, limit : float
     rest : float
         What the value is compared with: of a spring at rest, of an angle held.
-    direction : float
-        Of an axis against body a [rad].
-    carrier : str
-        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
-        origin on.
     """
 
     name: str
-    joint: str
-    kind: int
-    a: PointRef
-    b: PointRef
+    terms: tuple[Term, ...]
     labels: tuple[str, ...]
     signal: int = -1
     row: int = CONSTRAINT
     compliance: float = 0.0
     limit: float = 0.0
     rest: float = 0.0
-    direction: float = 0.0
-    carrier: str = "material"
+
+    @property
+    def points(self) -> Iterator[PointRef]:
+        """Of all terms."""
+        return (ref for term in self.terms for ref in (term.a, term.b))
 
 
 def _joint_constraints(joint: Joint) -> list[Constraint]:
@@ -71,12 +92,13 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
     name, a, b = joint.name, joint.a, joint.b
     parts = []
     if isinstance(joint, PointJoint):
-        parts.append(Constraint(name, name, POINT, a, b, (f"{name} x", f"{name} y")))
+        parts.append(Constraint(name, (Term(name, POINT, a, b),), (f"{name} x", f"{name} y")))
     if isinstance(joint, AxisJoint):
         normal, carrier = joint.direction + 0.5 * np.pi, "track" if isinstance(joint, SlidingJoint) else "material"
-        parts.append(Constraint(name, name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier))
+        term = Term(name, AXIS, a, b, direction=normal, carrier=carrier)
+        parts.append(Constraint(name, (term,), (f"{name} normal",)))
     if isinstance(joint, PrismaticJoint | WeldJoint):
-        parts.append(Constraint(name, name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle))
+        parts.append(Constraint(name, (Term(name, ANGLE, a, b),), (f"{name} angle",), rest=joint.angle))
     return parts
 
 
@@ -85,12 +107,17 @@ def axis_of(joint: AxisJoint) -> dict[str, Any]:
     return {"direction": joint.direction, "carrier": "frame" if isinstance(joint, SlidingJoint) else "material"}
 
 
+def _coordinate(joint: Joint, weight: float = 1.0) -> Term:
+    """A joint's coordinate times a weight."""
+    if isinstance(joint, AxisJoint):
+        return Term(joint.name, AXIS, joint.a, joint.b, weight, **axis_of(joint))
+    return Term(joint.name, ANGLE, joint.a, joint.b, weight)
+
+
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    if isinstance(joint, AxisJoint):
-        keywords |= axis_of(joint)
-        return Constraint(name, joint.name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
-    return Constraint(name, joint.name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
+    what = "travel" if isinstance(joint, AxisJoint) else "angle"
+    return Constraint(name, (_coordinate(joint),), (f"{name} {what}",), **keywords)
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
@@ -120,7 +147,7 @@ def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
     touched = [
         (i, index[ref.body])
         for i, constraint in enumerate(constraints)
-        for ref in (constraint.a, constraint.b)
+        for ref in constraint.points
         if not ref.on_ground
     ]
     rows, columns = zip(*touched, strict=True)
