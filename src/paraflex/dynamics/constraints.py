@@ -12,6 +12,7 @@ import scipy
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
 from paraflex.mechanism import (
     AxisJoint,
+    Gear,
     Joint,
     Mechanism,
     PointJoint,
@@ -114,10 +115,14 @@ def _coordinate(joint: Joint, weight: float = 1.0) -> Term:
     return Term(joint.name, ANGLE, joint.a, joint.b, weight)
 
 
+def _what(joint: Joint) -> str:
+    """What a joint's coordinate is."""
+    return "travel" if isinstance(joint, AxisJoint) else "angle"
+
+
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    what = "travel" if isinstance(joint, AxisJoint) else "angle"
-    return Constraint(name, (_coordinate(joint),), (f"{name} {what}",), **keywords)
+    return Constraint(name, (_coordinate(joint),), (f"{name} {_what(joint)}",), **keywords)
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
@@ -136,7 +141,17 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
         joint = mechanism.joint(friction.joint)
         slope = friction.limit / friction.speed
         constraints.append(_along(joint, friction.name, row=FRICTION, compliance=1.0 / slope, limit=friction.limit))
+    for gear in mechanism.gears:
+        constraints.append(_gear_constraint(mechanism, gear))
     return constraints
+
+
+def _gear_constraint(mechanism: Mechanism, gear: Gear) -> Constraint:
+    """Coordinate of the second joint less ratio times that of the first, less the phase."""
+    first, second = (mechanism.joint(name) for name in gear.joints)
+    assert gear.phase is not None
+    terms = (_coordinate(second), _coordinate(first, -gear.ratio))
+    return Constraint(gear.name, terms, (f"{gear.name} {_what(second)}",), rest=gear.phase)
 
 
 def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:

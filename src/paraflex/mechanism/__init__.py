@@ -15,6 +15,7 @@ from paraflex.mechanism.bodies import (
 )
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping, stiffness_proportional
+from paraflex.mechanism.gears import Gear
 from paraflex.mechanism.joints import (
     GROUND,
     AngleLaw,
@@ -79,6 +80,7 @@ __all__ = [
     "Deflection",
     "EndEffector",
     "FlexibleBeam",
+    "Gear",
     "Geometry",
     "Joint",
     "JointFriction",

@@ -28,6 +28,7 @@ def check_mechanism(mechanism: Members) -> None:
     check_ground(mechanism)
     check_joints(mechanism)
     check_members_at_joints(mechanism)
+    check_gears(mechanism)
     check_assemblies(mechanism)
     check_connected(mechanism)
     check_task(mechanism)
@@ -44,6 +45,7 @@ def check_names(mechanism: Members) -> None:
         "spring": mechanism.springs,
         "damper": mechanism.dampers,
         "friction": mechanism.frictions,
+        "gear": mechanism.gears,
         "linear_spring": mechanism.linear_springs,
         "load": mechanism.loads,
         "assembly": mechanism.assemblies,
@@ -115,6 +117,28 @@ def check_members_at_joints(mechanism: Members) -> None:
     for mode in mechanism.modes:
         for name in mode.motors:
             known(name, motors, f"mode.{mode.name}", "motor")
+
+
+def check_gears(mechanism: Members) -> None:
+    """Gears join two different joints that move, in a finite ratio."""
+    joints = {joint.name: joint for joint in mechanism.joints}
+    for gear in mechanism.gears:
+        field = f"gear.{gear.name}"
+        for name in gear.joints:
+            known(name, joints, f"{field}.joints", "joint")
+            if isinstance(joints[name], WeldJoint):
+                raise InputError(
+                    "a weld does not move", field=f"{field}.joints", value=name, remedy="name another joint"
+                )
+        if gear.first_joint == gear.second_joint:
+            raise InputError(
+                "a gear needs two different joints", field=f"{field}.joints", value=gear.first_joint,
+                remedy="name the two whose angles or travels belong together",
+            )  # fmt: skip
+        finite([gear.ratio, gear.phase or 0.0], field)
+        if gear.ratio == 0.0:
+            remedy = "leave the gear out; what is to hold a joint is a [prescribed] motion or a weld"
+            raise InputError("a gear's ratio must not be zero", field=f"{field}.ratio", value=gear.ratio, remedy=remedy)
 
 
 def check_assemblies(mechanism: Members) -> None:

@@ -12,6 +12,7 @@ from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
+from paraflex.mechanism.phases import with_phases
 
 
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
@@ -35,6 +36,8 @@ class Mechanism(Members, Shown):
     frictions : tuple of JointFriction
     linear_springs : tuple of LinearSpring
     loads : tuple of PointForce or AppliedTorque
+    gears : tuple of Gear
+        Each with its phase.
     gravity : (x, y)
         Acceleration of free fall in the ground frame [m/s^2]; none by default.
     end_effector : EndEffector, optional
@@ -56,6 +59,7 @@ class Mechanism(Members, Shown):
         super().__post_init__()
         object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
+        object.__setattr__(self, "gears", with_phases(self))
 
     @classmethod
     def made_of(cls, given: object) -> Mechanism:

@@ -11,6 +11,7 @@ from typing import Self, TypeVar
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism.bodies import Body
+from paraflex.mechanism.gears import Gear
 from paraflex.mechanism.joints import GROUND, AxisJoint, Joint, Motor, PointRef, PrescribedAngle
 from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
 
@@ -118,6 +119,7 @@ class Members(CheckedFields):
     frictions: tuple[JointFriction, ...] = ()
     linear_springs: tuple[LinearSpring, ...] = ()
     loads: tuple[Load, ...] = ()
+    gears: tuple[Gear, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)

@@ -1,0 +1,42 @@
+"""Gears: one joint's coordinate follows another's in a constant ratio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from paraflex.arguments import CheckedFields
+
+
+@dataclass(frozen=True)
+class Gear(CheckedFields):
+    """The coordinate of the second joint is ratio times that of the first, plus phase.
+
+    Of two wheels with fixed centres the ratio is -r1/r2 where they mesh outside, r1/r2 where one lies within the other,
+    or where a belt or a chain joins them. A joint that slides has a travel: of a pinion and its rack the ratio is the
+    pinion's radius [m/rad]. Angles count turns. Like a motor a gear acts on the material at the joints, by torques
+    about them (a force along the axis where a joint slides): what teeth bear on the joints besides is not in it.
+
+    Attributes
+    ----------
+    name : str
+    first_joint, second_joint : str
+        Their coordinates are those of body b against body a, slopes of beams included.
+    ratio : float
+        By the kinds of the joints without unit, in m/rad or in rad/m.
+    phase : float, optional
+        Coordinate of the second joint where that of the first is zero [rad or m]. By default as the first assembly
+        stands; a mechanism has the number.
+    """
+
+    _table = "gear"
+
+    name: str
+    first_joint: str
+    second_joint: str
+    ratio: float
+    phase: float | None = None
+
+    @property
+    def joints(self) -> tuple[str, str]:
+        """Names of the two, the first first."""
+        return self.first_joint, self.second_joint
