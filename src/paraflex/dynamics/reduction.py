@@ -91,6 +91,7 @@ def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
         for joint in mechanism.joints
         if isinstance(joint, WeldJoint | PrismaticJoint)
     ]
+    pins += [(f"the gear {gear.name}", mechanism.joint(name)) for gear in mechanism.gears for name in gear.joints]
     causes += [(cause, joint) for cause, joint in pins if not isinstance(joint, AxisJoint)]
     for cause, joint in causes:
         for point in (joint.a, joint.b):

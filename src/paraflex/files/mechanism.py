@@ -25,6 +25,7 @@ from paraflex.mechanism import (
     Assembly,
     AxisJoint,
     EndEffector,
+    Gear,
     Geometry,
     Joint,
     JointFriction,
@@ -77,6 +78,7 @@ def read_mechanism(table: ModelTable) -> Mechanism:
         dampers=tuple(TorsionalDamper(name, **dict(entry)) for name, entry in table.damper.items()),
         frictions=tuple(JointFriction(name, **dict(entry)) for name, entry in table.friction.items()),
         linear_springs=tuple(_linear_spring(name, entry) for name, entry in table.linear_spring.items()),
+        gears=tuple(Gear(name, *entry.joints, entry.ratio, entry.phase) for name, entry in table.gear.items()),
         loads=tuple(_load(name, load) for name, load in table.load.items()),
         gravity=(table.gravity[0], table.gravity[1]),
         end_effector=None

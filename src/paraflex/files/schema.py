@@ -147,6 +147,7 @@ class RigidTable(_Table):
 
 
 TwoPoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
+TwoJoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
 
 
 class JointTable(_Table):
@@ -276,6 +277,20 @@ class LinearSpringTable(_Table):
     stiffness: Number = Field(description="the stiffness in N/m")
     length: Number = Field(default=0.0, description="the free length in m")
     damping: Number = Field(default=0.0, description="the damping in N s/m")
+
+
+class GearTable(_Table):
+    """The coordinate of a second joint in a constant ratio to that of a first."""
+
+    joints: TwoJoints = Field(description='["first joint", "second joint"]')
+    ratio: Number = Field(
+        description="of the second joint's angle to the first's: negative where wheels mesh outside; m/rad for a rack"
+    )
+    phase: Number | None = Field(
+        default=None,
+        description="coordinate of the second joint where that of the first is zero in rad or m; as the first assembly "
+        "stands by default",
+    )
 
 
 class ForceTable(_Table):
@@ -452,6 +467,7 @@ class ModelTable(_Table):
     damper: dict[str, DamperTable] = {}
     friction: dict[str, FrictionTable] = {}
     linear_spring: dict[str, LinearSpringTable] = {}
+    gear: dict[str, GearTable] = {}
     load: dict[str, Annotated[ForceTable | TorqueTable, Field(discriminator="type")]] = {}
     gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
     end_effector: EndEffectorTable | None = None

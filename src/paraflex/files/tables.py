@@ -104,6 +104,9 @@ def _forces(mechanism: Mechanism) -> dict[str, Any]:
         "linear_spring": {
             one.name: {"points": [one.a, one.b]} | _fields(one, "name", "a", "b") for one in mechanism.linear_springs
         },
+        "gear": {
+            gear.name: {"joints": gear.joints, "ratio": gear.ratio, "phase": gear.phase} for gear in mechanism.gears
+        },
         "load": {
             one.name: {"type": "force" if isinstance(one, PointForce) else "torque"} | _fields(one, "name")
             for one in mechanism.loads

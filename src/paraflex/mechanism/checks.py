@@ -135,7 +135,8 @@ def check_gears(mechanism: Members) -> None:
                 "a gear needs two different joints", field=f"{field}.joints", value=gear.first_joint,
                 remedy="name the two whose angles or travels belong together",
             )  # fmt: skip
-        finite([gear.ratio, gear.phase or 0.0], field)
+        finite([gear.ratio], f"{field}.ratio")
+        finite([gear.phase or 0.0], f"{field}.phase")
         if gear.ratio == 0.0:
             remedy = "leave the gear out; what is to hold a joint is a [prescribed] motion or a weld"
             raise InputError("a gear's ratio must not be zero", field=f"{field}.ratio", value=gear.ratio, remedy=remedy)

@@ -34,7 +34,7 @@ def mechanism_html(mechanism: Mechanism) -> str:
 
 def freedoms(mechanism: Mechanism) -> int:
     """Degrees of freedom of the rigid mechanism as Grübler counts them: redundant constraints are not seen."""
-    rows = sum(_ROWS[type(joint)] for joint in mechanism.joints) + len(mechanism.prescribed)
+    rows = sum(_ROWS[type(joint)] for joint in mechanism.joints) + len(mechanism.prescribed) + len(mechanism.gears)
     return 3 * len(mechanism.bodies) - rows
 
 
@@ -45,6 +45,7 @@ def _counts(mechanism: Mechanism) -> list[tuple[str, Any]]:
         "springs": len(mechanism.springs) + len(mechanism.linear_springs),
         "dampers": len(mechanism.dampers),
         "friction laws": len(mechanism.frictions),
+        "gears": len(mechanism.gears),
         "loads": len(mechanism.loads),
         "prescribed angles": len(mechanism.prescribed),
     }
