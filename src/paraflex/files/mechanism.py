@@ -11,6 +11,7 @@ from paraflex.files.laws import quantities, read_law
 from paraflex.files.schema import (
     AssemblyTable,
     ForceTable,
+    GearTable,
     JointTable,
     LinearSpringTable,
     ModelTable,
@@ -78,7 +79,7 @@ def read_mechanism(table: ModelTable) -> Mechanism:
         dampers=tuple(TorsionalDamper(name, **dict(entry)) for name, entry in table.damper.items()),
         frictions=tuple(JointFriction(name, **dict(entry)) for name, entry in table.friction.items()),
         linear_springs=tuple(_linear_spring(name, entry) for name, entry in table.linear_spring.items()),
-        gears=tuple(Gear(name, *entry.joints, entry.ratio, entry.phase) for name, entry in table.gear.items()),
+        gears=tuple(_gear(name, entry) for name, entry in table.gear.items()),
         loads=tuple(_load(name, load) for name, load in table.load.items()),
         gravity=(table.gravity[0], table.gravity[1]),
         end_effector=None
@@ -139,6 +140,11 @@ def _assembly(name: str, entry: AssemblyTable) -> Assembly:
 def _linear_spring(name: str, entry: LinearSpringTable) -> LinearSpring:
     a, b = (PointRef.parse(point, f"linear_spring.{name}.points") for point in entry.points)
     return LinearSpring(name, a, b, entry.stiffness, entry.length, entry.damping)
+
+
+def _gear(name: str, entry: GearTable) -> Gear:
+    first, second = entry.joints
+    return Gear(name, first, second, entry.ratio, entry.phase)
 
 
 def _load(name: str, load: ForceTable | TorqueTable) -> Load:
