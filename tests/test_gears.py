@@ -36,6 +36,11 @@ from paraflex.mechanism import (
     WeldJoint,
 )
 from paraflex.motion import simulate_motion
+from paraflex.plots.marks import moving_marks
+from paraflex.plots.scene import scene
+from paraflex.plots.svg import sketch
+from paraflex.results import motion_dataset
+from paraflex.results.drawing import assembled_data
 from paraflex.results.record import record
 
 ref = PointRef.parse
@@ -425,3 +430,36 @@ fields = ["parameters.l1"]
     for k, (place, value) in enumerate(places):
         difference = (metrics(place, value + h) - metrics(place, value - h)) / (2.0 * h)
         np.testing.assert_allclose(found[:, k], difference, rtol=2e-5)
+
+
+# --- Drawings -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "radii"),
+    [(planetary, (0.04, 0.03)), (lambda: train(-2.0), (0.2, 0.1)), (lambda: train(2.0), None), (rack, None)],
+)
+def test_wheels_that_mesh_outside_have_pitch_circles(make, radii):
+    mechanism = make()
+    (found,) = assembled_data(mechanism)["gear_radius"].values
+    np.testing.assert_allclose(found, (np.nan, np.nan) if radii is None else radii)
+    lines = [part for part in sketch(mechanism).split("<polyline")[1:] if 'class="gear"' in part]
+    assert [len(line.split('points="')[1].split('"')[0].split()) > 2 for line in lines] == [radii is not None] * (
+        1 if radii is None else 2
+    )
+    assert all("stroke-dasharray" in line for line in lines)
+
+
+def test_pitch_circles_touch_and_move_with_their_wheels():
+    data = motion_dataset(simulate_motion(planetary(), 0.5, torques={"drive": 0.3}, samples=11))
+    shown = scene(data, np.linspace(0.0, 0.5, 3))
+    sun, planet = (mark.places for mark in moving_marks(shown, shown.limits) if mark.look == "gear")
+    np.testing.assert_allclose(np.ptp(sun, axis=1), 0.08, rtol=1e-6)
+    np.testing.assert_allclose(np.ptp(planet, axis=1), 0.06, rtol=1e-6)
+    middle = planet[:, :-1].mean(axis=1)
+    np.testing.assert_allclose(np.linalg.norm(middle, axis=1), 0.07, rtol=1e-5)
+    assert np.linalg.norm(middle[-1] - middle[0]) > 0.01
+    for places in (sun, planet):
+        low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+        assert np.all(low >= [shown.limits.left, shown.limits.bottom])
+        assert np.all(high <= [shown.limits.right, shown.limits.top])

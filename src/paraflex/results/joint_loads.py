@@ -1,8 +1,8 @@
 """What the bodies of a joint do to one another: all of it, whatever in the joint does it.
 
 Constraints have Phi of body b less that of body a and stand on the left of the equations, M q'' + ... + Phi_q^T lambda:
--lambda acts on body b. So do the multipliers of prescribed motions, springs, dampers and friction; a motor's torque or
-force acts on b as it is.
+-lambda acts on body b. So do the multipliers of prescribed motions, springs, dampers, friction and gears, of these
+the weights of their joints times these; a motor's torque or force acts on b as it is.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class JointLoads(NamedTuple):
 
 
 def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> JointLoads:
-    """Forces and moments in joints by name: of what holds the joint, of its motors, springs, dampers and friction.
+    """Forces and moments in joints by name: of what holds the joint, of motors, springs, dampers, friction and gears.
 
     The second body does the opposite to the first at the same place. Springs and dampers between points (linear
     springs) are not in a joint and do not count.
