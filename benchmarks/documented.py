@@ -90,11 +90,11 @@ PICTURES = {
 
 def draw(kind: str, figures: dict[str, Any]) -> None:
     """Bring the picture on the page up to date."""
-    from paraflex.plots import save_search_figures
+    from paraflex.plots import save_figures
 
     written, shown = PICTURES[kind]
     with tempfile.TemporaryDirectory() as folder:
-        save_search_figures({"kind": kind} | figures, folder)
+        save_figures({"kind": kind} | figures, folder)
         shutil.copyfile(Path(folder) / f"{written}.png", DOCS / "images" / f"{shown}.png")
 
 
@@ -187,7 +187,9 @@ def indices() -> dict[str, Any]:
         chosen = {"metrics": ["tracking_rms", "peak_torque_max"], "samples": 128, "seed": 1}
         result = sobol_indices(EXAMPLES / "optimisation.toml", folder, **chosen)
         draw("indices", result.to_dict())
-        rows = {each.metric: {row["parameter"]: dict(row) for row in each.rows()} for each in result.indices}
+        rows: dict[str, dict[str, Any]] = {}
+        for row in result.to_dict()["indices"]:
+            rows.setdefault(row["metric"], {})[row["parameter"]] = row
         return {"runs": result.sweep.total, "seconds": time.perf_counter() - began, **rows}
 
 

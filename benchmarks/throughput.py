@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from common import command_line, write_json
 
+from paraflex.campaign import Workers
 from paraflex.compilation import compile_kernels
 from paraflex.dynamics.points import point_motion
 from paraflex.errors import IntegrationError
@@ -132,8 +133,7 @@ def runs_a_second(engine: str, workers: int, modes: list[str], designs: int, set
         sweep(
             load_sweep(file),
             Path(name) / "out",
-            engine=engine,
-            workers=workers,
+            workers=Workers(engine, workers),
             on_progress=lambda _: moments.append(time.perf_counter()),
         )
     return (designs - workers) * len(modes) / (moments[-1] - moments[workers - 1])

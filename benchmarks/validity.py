@@ -216,8 +216,8 @@ def free(name: str) -> Iterator[dict[str, Any]]:
         assert model.study.duration is not None
         try:
             return simulate_motion(
-                mechanism, model.study.duration, samples=model.study.samples, assembly=model.study.assembly,
-                start=start, torques=model.study.torques, options=OPTIONS, warning=False,
+                mechanism, model.study.duration, samples=model.study.samples, torques=model.study.torques,
+                start=start or model.study.assembly, options=OPTIONS,
             )  # fmt: skip
         except IntegrationError as error:
             return error.partial

@@ -144,7 +144,7 @@ def test_a_run_that_goes_on_still_stops_at_its_events():
     for beyond in (1e-7, 0.2):
         limit = JointLimit("O", low=np.arccos(COSINE) - beyond)
         options = IntegrationOptions(events=(limit,))
-        run = simulate_motion(lever("warn").rigid(), 1.0, samples=21, options=options, warning=False)
+        run = simulate_motion(lever("warn").rigid(), 1.0, samples=21, options=options)
         assert run.solution.event == "joint O"
         assert run.solution.t[-1] == pytest.approx(LEAVES + beyond / -SPEED, abs=1e-8)
         assert len(run.solution.findings) == 1

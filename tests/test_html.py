@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import paraflex as pf
 from made_up import STUDY, made_up, write_study
@@ -33,7 +34,7 @@ from paraflex.studies import (
     verify,
 )
 from paraflex.studies.html import identification_html, indices_html
-from paraflex.studies.optimisation import IdentificationResult, IndicesResult, Reached, SobolIndices, Target
+from paraflex.studies.optimisation import IdentificationResult, IndicesResult, Reached, Target
 from paraflex.studies.sweeps import SweepResult
 
 _EMPTY = {"circle", "path", "rect", "br", "polygon", "polyline"}
@@ -252,9 +253,12 @@ def test_an_identification_and_indices(tmp_path: Path) -> None:
     shown = read(identification_html(found))
     assert row(shown, "x")[:3] == ["x", "1", "1.5"]
     assert row(shown, "tracking_rms") == ["tracking_rms", "square", "++", "2", "1", "2.1"]
-    numbers = np.array([0.25]), np.array([0.01]), np.array([0.5]), np.array([0.02])
-    index = SobolIndices("square", "++", "tracking_rms", ("x",), *numbers, 1.0, 0.1, 64, 0)
-    result = IndicesResult(SweepResult("saltelli", tmp_path, 1, {"complete": 1}), (index,))
+    shares = {"first": 0.25, "first_confidence": 0.01, "total": 0.5, "total_confidence": 0.02}
+    data = {name: (("index", "parameter"), [[share]]) for name, share in shares.items()}
+    data |= {"samples": ("index", [64]), "dropped": ("index", [0])}
+    of = {"metric": ("index", ["tracking_rms"]), "path": ("index", ["square"]), "mode": ("index", ["++"])}
+    indices = xr.Dataset(data, of | {"parameter": ["x"]})
+    result = IndicesResult(SweepResult("saltelli", tmp_path, 1, {"complete": 1}), indices)
     assert row(read(indices_html(result)), "tracking_rms")[3:] == ["x", "0.25", "0.01", "0.5", "0.02"]
 
 

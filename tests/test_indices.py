@@ -55,23 +55,23 @@ def test_indices_of_ishigami(tmp_path, seed):
     run = made_up(tracking_rms=ishigami, total_mass=lambda mode, a, b, c: 3.0)
     given = {"metrics": ["tracking_rms", "total_mass"], "samples": 1024, "seed": seed}
     result = sobol_indices(file, tmp_path / "out", run=run, **given)
-    varying, constant = result.indices
+    varying, constant = (result.data.isel(index=k) for k in (0, 1))
     first, total = known_ishigami()
-    assert varying.first == pytest.approx(first, abs=0.05)
-    assert varying.total == pytest.approx(total, abs=0.05)
+    assert varying.first.values == pytest.approx(first, abs=0.05)
+    assert varying.total.values == pytest.approx(total, abs=0.05)
     # What is left is within the intervals told, or hardly out of them.
     assert (np.abs(varying.first - first) < 1.5 * varying.first_confidence).all()
     assert (np.abs(varying.total - total) < 1.5 * varying.total_confidence).all()
     assert (varying.total_confidence < 0.15).all()
-    assert varying.mean == pytest.approx(3.5, abs=0.1)
+    assert varying["mean"].item() == pytest.approx(3.5, abs=0.1)
     assert varying.samples == 1024
     assert len(run.designs) == 1024 * 5
     assert np.isnan(constant.first).all()
     table = pd.read_parquet(result.table)
     assert list(table["parameter"]) == ["a", "b", "c"] * 2
-    assert table["first"][:3].tolist() == varying.first.tolist()
+    assert table["first"][:3].tolist() == varying.first.values.tolist()
     told = json.loads((tmp_path / "out" / "indices.json").read_text())["indices"]
-    assert told[0]["total"] == varying.total[0]
+    assert told[0]["total"] == varying.total[0].item()
     assert told[3]["total"] is None
     # The same seed says the same, from the runs that are there.
     again = sobol_indices(file, tmp_path / "out", run=pytest.fail, **given)
@@ -79,7 +79,7 @@ def test_indices_of_ishigami(tmp_path, seed):
     figure = sobol_bars(result.to_dict())
     assert len(figure.axes) == 1
     lengths = [patch.get_width() for patch in figure.axes[0].patches]
-    assert lengths == pytest.approx([*varying.first, *varying.total])
+    assert lengths == pytest.approx([*varying.first.values, *varying.total.values])
 
 
 def test_indices_of_a_sum_follow_the_ranges(tmp_path):
@@ -89,9 +89,9 @@ def test_indices_of_a_sum_follow_the_ranges(tmp_path):
     result = sobol_indices(
         write_study(tmp_path, text), tmp_path / "out", metrics=["tracking_rms"], samples=256, run=run
     )
-    (found,) = result.indices
-    assert found.first == pytest.approx([0.5, 0.5], abs=0.02)
-    assert found.total == pytest.approx([0.5, 0.5], abs=0.02)
+    found = result.data.squeeze("index")
+    assert found.first.values == pytest.approx([0.5, 0.5], abs=0.02)
+    assert found.total.values == pytest.approx([0.5, 0.5], abs=0.02)
 
 
 def test_base_samples_with_a_failure_are_left_out(tmp_path):
@@ -103,10 +103,10 @@ def test_base_samples_with_a_failure_are_left_out(tmp_path):
     file = write_study(tmp_path, STUDY)
     given = {"metrics": ["tracking_rms"], "samples": 128}
     result = sobol_indices(file, tmp_path / "out", run=made_up(tracking_rms=sometimes), **given)
-    (found,) = result.indices
+    found = result.data.squeeze("index")
     assert found.dropped + found.samples == 128
     assert 0 < found.dropped < 30
-    assert found.first == pytest.approx([1.0, 0.0], abs=0.15)
+    assert found.first.values == pytest.approx([1.0, 0.0], abs=0.15)
     with pytest.raises(InputError, match=r"only 0 of 128 base samples are complete in \+\+\+\+"):
         sobol_indices(file, tmp_path / "none", run=made_up(tracking_rms=lambda *_: float("nan")), **given)
 
@@ -120,9 +120,9 @@ def test_an_unfinished_sweep_has_no_indices(tmp_path):
     run = made_up(tracking_rms=lambda mode, x, y: x)
     given = {"metrics": ["tracking_rms"], "samples": 16}
     stopped = sobol_indices(file, tmp_path / "out", run=run, on_progress=stop, **given)
-    assert stopped.indices == ()
+    assert stopped.data.sizes["index"] == 0
     assert not stopped.table.exists()
-    assert len(sobol_indices(file, tmp_path / "out", run=run, **given).indices) == 1
+    assert len(sobol_indices(file, tmp_path / "out", run=run, **given).data["index"]) == 1
 
 
 @pytest.mark.parametrize(

@@ -148,7 +148,7 @@ def test_a_run_that_fails_names_one_time_at_which_it_did(tmp_path):
         ({"samples": 1}, "samples: too few samples"),
         ({"torques": {"drvie": 1.0}}, r"torques: unknown motor \(got 'drvie'\); did you mean \"drive\""),
         ({"torques": {"drive": np.inf}}, "torques.drive: not a finite number"),
-        ({"assembly": "folded"}, "assembly: unknown assembly"),
+        ({"start": "folded"}, "assembly: unknown assembly"),
     ],
 )
 def test_what_makes_no_sense_is_named(changes, says):

@@ -12,6 +12,7 @@ import pytest
 
 import paraflex as pf
 from paraflex.actuation import feed_forward
+from paraflex.campaign import Workers
 from paraflex.checks import check_planned
 from paraflex.designs.derivatives import changes, gradient
 from paraflex.dynamics import State, build_system
@@ -45,8 +46,9 @@ PENDULUM = library_text("pendulum")
 
 
 def designs(metrics):
-    runs = np.array(["", ""])
-    return DesignTable({"arm": np.array([1.0, 2.0])}, metrics, {}, runs, runs, np.array([True, True]))
+    number, text = np.arange(2), np.array(["", ""])
+    status = np.array(["complete", "complete"])
+    return DesignTable({"arm": np.array([1.0, 2.0])}, metrics, {}, number, number, text, text, status, text)
 
 
 @pytest.fixture
@@ -104,7 +106,7 @@ def test_derivatives_where_there_are_none(differentiated, monkeypatch):
 def test_packages_that_are_missing(study, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     refused(
-        lambda: sweep(study, tmp_path / "out", engine="dask"),
+        lambda: sweep(study, tmp_path / "out", workers=Workers("dask")),
         "--engine", "Dask is not installed", "pip install 'paraflex[cluster]'",
     )  # fmt: skip
     monkeypatch.setitem(sys.modules, "sksundae", None)

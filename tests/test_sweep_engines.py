@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from journals import rows_in
+from paraflex.campaign import Workers
 from paraflex.errors import InputError
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps import LostCluster, Outcome, run_task
@@ -78,11 +79,11 @@ def test_threads(study, table, tmp_path, workers):
 
 
 def test_processes(study, table, tmp_path):
-    assert sweep(study, tmp_path / "out", engine="processes", workers=2).table.read_bytes() == table
+    assert sweep(study, tmp_path / "out", workers=Workers("processes", 2)).table.read_bytes() == table
 
 
 def test_a_task_that_kills_its_process_is_a_row(study, tmp_path):
-    result = sweep(study, tmp_path / "out", engine="processes", workers=2, run=deadly)
+    result = sweep(study, tmp_path / "out", workers=Workers("processes", 2), run=deadly)
     assert result.counts == {"complete": 22, "failed": 2}
     data = pd.read_parquet(result.table).set_index("run")
     assert "workers died of it" in data.loc[4, "reason"]
@@ -103,7 +104,11 @@ def test_dask_with_a_worker_killed_in_the_middle(study, table, tmp_path):
                 os.kill(first[0], signal.SIGKILL)
 
         result = sweep(
-            study, tmp_path / "out", engine="dask", cluster=cluster.scheduler_address, run=slow, on_progress=kill_one
+            study,
+            tmp_path / "out",
+            workers=Workers("dask", cluster=cluster.scheduler_address),
+            run=slow,
+            on_progress=kill_one,
         )
         pids = set(distributed.Client(cluster, set_as_default=False).run(os.getpid).values())
     assert killed
@@ -127,7 +132,7 @@ def test_a_cluster_that_goes_away_leaves_what_is_written(study, table, tmp_path)
             processes[0].kill()
 
         with pytest.raises(LostCluster, match="run the same command again"):
-            sweep(study, tmp_path / "out", engine="dask", cluster=address, on_progress=kill_scheduler)
+            sweep(study, tmp_path / "out", workers=Workers("dask", cluster=address), on_progress=kill_scheduler)
     finally:
         for process in processes:
             process.kill()
@@ -148,16 +153,16 @@ def test_an_unreachable_cluster(study, tmp_path, monkeypatch):
 
     monkeypatch.setattr(engines, "_REACHED_WITHIN", 1.0)
     with pytest.raises(InputError, match=r"--cluster: cannot be reached .*127.0.0.1:9.*; start it with dask scheduler"):
-        sweep(study, tmp_path / "out", engine="dask", cluster="tcp://127.0.0.1:9")
+        sweep(study, tmp_path / "out", workers=Workers("dask", cluster="tcp://127.0.0.1:9"))
 
 
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        ({"engine": "dusk"}, "--engine: unknown engine"),
+        ({"workers": Workers("dusk")}, "--engine: unknown engine"),
         ({"workers": 0}, "--workers: must be positive"),
-        ({"cluster": "tcp://a:1"}, "--cluster: only the engine dask takes a cluster"),
-        ({"engine": "dask", "cluster": "tcp://a:1", "workers": 2}, "--workers: the cluster has workers of its own"),
+        ({"workers": Workers(cluster="tcp://a:1")}, "--cluster: only the engine dask takes a cluster"),
+        ({"workers": Workers("dask", 2, "tcp://a:1")}, "--workers: the cluster has workers of its own"),
         ({"limit": 0}, "--limit: must be positive"),
     ],
 )

@@ -12,9 +12,9 @@ from paraflex.designs.reopen import open_study, run_again
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
 from paraflex.files import library_file
-from paraflex.plots.designs import DesignTable, in_conflict, undominated
+from paraflex.plots.designs import DesignTable, in_conflict, read_designs, undominated
 from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows, fronts
-from paraflex.report.designs import Studied, read_studied, reasons
+from paraflex.report.designs import reasons
 from paraflex.report.film import frames_of
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
@@ -106,14 +106,14 @@ def made_up(rows, seed=0, modes=("a", "b")):
     x, y = rng.uniform(0.1, 1.0, (2, rows))
     complete = rng.uniform(size=rows) > 0.1
     metrics = {"tracking_rms": np.where(complete, x + 0.1 * y, np.nan), "total_mass": np.where(complete, y / x, np.nan)}
-    table = DesignTable(
-        parameters={"x": x, "y": y}, metrics=metrics, units={"tracking_rms": "m", "total_mass": "kg"},
-        path=np.full(rows, "p"), mode=np.array([modes[k % len(modes)] for k in range(rows)]), complete=complete,
-    )  # fmt: skip
-    status = np.where(complete, "complete", "failed")
     reason = np.where(complete, "", [f"the run has not ended after {k} steps, at t = 0.1 s" for k in range(rows)])
     number = np.arange(rows)
-    return Studied(table, number, number // len(modes), status, reason)
+    return DesignTable(
+        parameters={"x": x, "y": y}, metrics=metrics, units={"tracking_rms": "m", "total_mass": "kg"},
+        run=number, design=number // len(modes),
+        path=np.full(rows, "p"), mode=np.array([modes[k % len(modes)] for k in range(rows)]),
+        status=np.where(complete, "complete", "failed"), reason=reason,
+    )  # fmt: skip
 
 
 def column(page, identity):
@@ -184,7 +184,7 @@ def test_failures_are_counted_and_grouped(finished, report, html):
     assert "lump.end.mass" in html
     told_reasons = reasons(made_up(500))
     assert len(told_reasons) == 1
-    assert told_reasons[0][2] == int((~made_up(500).table.complete).sum())
+    assert told_reasons[0][2] == int((~made_up(500).complete).sum())
 
 
 def test_names_are_escaped_and_parameters_told(html):
@@ -207,12 +207,12 @@ def test_the_best_are_chosen_by_each_metric_and_from_the_front():
     studied = made_up(60)
     picked = best_runs(studied)
     rows = [one.row for one in picked]
-    values = {name: np.where(studied.table.complete, v, np.inf) for name, v in studied.table.metrics.items()}
+    values = {name: np.where(studied.complete, v, np.inf) for name, v in studied.metrics.items()}
     assert rows[0] == np.argmin(values["tracking_rms"])
     assert np.argmin(values["total_mass"]) in rows
     assert len(rows) == len(set(rows)) <= MOST_RUNS
     for mode in ("a", "b"):
-        own = np.where(studied.table.mode == mode, values["tracking_rms"], np.inf)
+        own = np.where(studied.mode == mode, values["tracking_rms"], np.inf)
         assert np.argmin(own) in rows
     front = undominated(values["tracking_rms"], values["total_mass"])
     assert any("front" in reason and one.row in front for one in picked for reason in one.why)
@@ -224,9 +224,9 @@ def test_of_many_runs_a_part_is_drawn_and_the_best_and_the_fronts_stay():
     rows = drawn_rows(studied, best)
     assert rows.size == np.unique(rows).size == 5000
     assert set(best) <= set(rows.tolist())
-    for front in fronts(studied, *in_conflict(studied.table, studied.judged)):
+    for front in fronts(studied, *in_conflict(studied, studied.judged)):
         assert set(front.tolist()) <= set(rows.tolist())
-    assert studied.table.complete[rows].all()
+    assert studied.complete[rows].all()
     account = StudyAccount("sweep", "many", "made up", 100_000, {})
     html = html_of(sweep_page(studied, best_runs(studied), account))
     assert len(html) < 500_000
@@ -235,13 +235,12 @@ def test_of_many_runs_a_part_is_drawn_and_the_best_and_the_fronts_stay():
 
 def test_of_few_runs_all_are_drawn_but_those_that_failed():
     studied = made_up(300)
-    np.testing.assert_array_equal(drawn_rows(studied, []), np.flatnonzero(studied.table.complete))
+    np.testing.assert_array_equal(drawn_rows(studied, []), np.flatnonzero(studied.complete))
 
 
 def test_a_study_without_a_complete_run_has_a_report():
     studied = made_up(6)
-    none = np.zeros(6, dtype=bool)
-    studied = replace(studied, table=replace(studied.table, complete=none), status=np.full(6, "failed"))
+    studied = replace(studied, status=np.full(6, "failed"))
     html = html_of(sweep_page(studied, best_runs(studied), StudyAccount("sweep", "none", "made up", 6, {})))
     assert told(html)["survey"] == []
     assert "Runs that are not complete" in html
@@ -361,6 +360,6 @@ def test_rows_of_parts_stand_in_order_of_runs(finished, tmp_path):
     for k, rows in enumerate((table.slice(8), table.slice(0, 8))):
         files.append(tmp_path / f"part-{k}.parquet")
         pq.write_table(rows, files[-1])
-    studied = read_studied(files)
+    studied = read_designs(files)
     np.testing.assert_array_equal(studied.run, data["run"])
-    np.testing.assert_array_equal(studied.table.metrics["tracking_rms"], data["tracking_rms"])
+    np.testing.assert_array_equal(studied.metrics["tracking_rms"], data["tracking_rms"])

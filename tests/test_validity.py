@@ -76,7 +76,7 @@ def pulled(frame, geometry=Geometry.LINEAR, force=(-20.0, 0.0), body=lambda stri
     )
     system = build_system(mechanism)
     start = static_equilibrium(system, consistent_state(system, mechanism.assembly(None)))
-    return simulate_motion(mechanism, 1e-3, samples=3, start=start, warning=False)
+    return simulate_motion(mechanism, 1e-3, samples=3, start=start)
 
 
 @pytest.mark.parametrize(("frame", "fixity"), [(CANTILEVER, 0.25), (PINNED, 1.0)])
@@ -196,14 +196,14 @@ def test_a_beam_too_steep_for_any_theory_is_still_an_error_and_tells_how_far_it_
     model = pf.load("spin_up")
     mechanism = bench.variant(model.mechanism, Geometry.LINEAR, CANTILEVER)
     with pytest.raises(IntegrationError, match="beam bends to a slope of") as caught:
-        simulate_motion(mechanism, 12.0, samples=121, assembly="start")
+        simulate_motion(mechanism, 12.0, samples=121, start="start")
     assert indicators(caught.value.partial.validity)["axial force"].value > 1.0
 
 
 def test_bars_of_assumed_modes_are_linear_in_any_mechanism():
     model = pf.load("slider_crank_flexible")
     mechanism = model.mechanism.with_geometry("second-order")
-    run = simulate_motion(mechanism, 5e-3, samples=11, assembly="stretched")
+    run = simulate_motion(mechanism, 5e-3, samples=11, start="stretched")
     found = indicators(run.validity)
     assert set(found) == {"axial force", "slope"}
     assert 'type = "beam"' in found["slope"].remedy
@@ -215,7 +215,7 @@ def test_a_bar_that_does_not_stretch_tells_its_axial_force_by_its_joints():
     model = pf.load("slider_crank_flexible")
     rod = model.mechanism.body("rod")
     mechanism = model.mechanism.with_bodies([replace(rod, axial=())])
-    runs = [simulate_motion(each, 5e-3, samples=51, assembly="stretched") for each in (model.mechanism, mechanism)]
+    runs = [simulate_motion(each, 5e-3, samples=51, start="stretched") for each in (model.mechanism, mechanism)]
     stretching, stiff = (indicators(run.validity)["axial force"].value for run in runs)
     # The mean of the stretch is that of both ends; the joint at the crank carries the rod's own inertia as well.
     assert stiff == pytest.approx(stretching, rel=0.6)
@@ -259,7 +259,7 @@ def test_a_run_without_a_path_says_it_too():
     model = pf.load("pendulum")
     mechanism = bench.variant(model.mechanism, Geometry.LINEAR, CANTILEVER)
     with pytest.warns(ValidityWarning, match="beam's axial force reaches .* of its buckling load"):
-        run = simulate_motion(mechanism, 0.6, samples=61, assembly="level")
+        run = simulate_motion(mechanism, 0.6, samples=61, start="level")
     figures = motion_summary(motion_dataset(run))
     assert figures["validity"]["verdict"] == run.validity.verdict
 

@@ -13,6 +13,7 @@ from paraflex.cache_folder import ensure_cache_folder
 
 if TYPE_CHECKING:
     from paraflex import plots
+    from paraflex.campaign import Workers
     from paraflex.checks import check
     from paraflex.errors import (
         InputError,
@@ -64,6 +65,7 @@ _HOME = {
     "SingularDistance": "integrators",
     "StiffnessWarning": "errors",
     "ValidityWarning": "errors",
+    "Workers": "campaign",
     "chain_of_segments": "mechanism",
     "check": "checks",
     "four_bars_in_a_row": "mechanism",
@@ -110,6 +112,7 @@ __all__ = [
     "SingularDistance",
     "StiffnessWarning",
     "ValidityWarning",
+    "Workers",
     "chain_of_segments",
     "check",
     "four_bars_in_a_row",

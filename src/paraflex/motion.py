@@ -65,13 +65,11 @@ def simulate_motion(
     duration: float,
     *,
     samples: int = 701,
-    assembly: str | None = None,
     torques: Mapping[str, float] | None = None,
-    start: State | Start | None = None,
+    start: State | Start | str | None = None,
     method: str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
-    warning: bool = True,
 ) -> MotionRun:
     """Integrate a mechanism under what acts on it.
 
@@ -83,20 +81,21 @@ def simulate_motion(
         [s]
     samples : int
         Times at which results are kept, evenly spaced, both ends among them.
-    assembly : str, optional
-        Where it starts, at rest and undeformed; the first by default.
     torques : mapping of str to float, optional
         Constant torque of each motor by name [N m]; zero for the others.
-    start : State or Start, optional
-        In place of the assembly: see `dynamics.consistent_state` and `mechanism.Start`.
+    start : State, Start or str, optional
+        Where it starts: the name of an assembly, at rest and undeformed; a `mechanism.Start` near the first assembly
+        (near another, see `dynamics.start_state`); or a `dynamics.consistent_state`. The first assembly by default.
     method : str, optional
         Of integration: that of the options by default; see `paraflex.METHODS`.
     options : IntegrationOptions, optional
     on_progress : callable, optional
         Called with the time reached [s].
-    warning : bool
-        Whether a run beyond what its model can describe issues a `ValidityWarning`, and one of implausible results a
-        `ResultWarning`; its `validity` and `doubts` hold them either way.
+
+    Warns
+    -----
+    ValidityWarning, ResultWarning
+        The run is beyond what its model can describe, or its results are implausible; `validity` and `doubts` say why.
 
     Raises
     ------
@@ -120,7 +119,7 @@ def simulate_motion(
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: float((torques or {}).get(name, 0.0)) for name in names}
     system = build_system(mechanism)
-    state = start if isinstance(start, State) else _state(system, start, assembly)
+    state = start if isinstance(start, State) else _state(system, start)
     times = np.linspace(state.time, state.time + duration, samples)
     end = float(times[-1])
     signals, knots = pack_signals(mechanism, constant_signals(list(values.values()), end), end)
@@ -132,9 +131,8 @@ def simulate_motion(
         error.partial = _run(system, times, values, with_blame(error, mechanism).partial)
         raise
     run = _run(system, times, values, solution)
-    if warning:
-        warn(run.validity)
-        warn_of(run.doubts, ResultWarning)
+    warn(run.validity)
+    warn_of(run.doubts, ResultWarning)
     return run
 
 
@@ -142,9 +140,9 @@ def _run(system: System, times: Array, torques: Mapping[str, float], solution: S
     return MotionRun(system, solution.t if solution.event else times, torques, solution)
 
 
-def _state(system: System, start: Start | None, name: str | None) -> State:
+def _state(system: System, start: Start | str | None) -> State:
     """The state that a start describes, or an assembly at rest."""
     mechanism = system.mechanism
-    if start is None:
-        return consistent_state(system, mechanism.assembly(name))
-    return start_state(system, start, mechanism.assembly(name) if name or mechanism.assemblies else None)
+    if isinstance(start, Start):
+        return start_state(system, start, mechanism.assemblies[0] if mechanism.assemblies else None)
+    return consistent_state(system, mechanism.assembly(start))

@@ -77,6 +77,11 @@ class Workers(CheckedFields):
     number: int | None = None
     cluster: str | None = None
 
+    @classmethod
+    def of(cls, given: Workers | int | None) -> Workers:
+        """Workers as they are given; of a number so many threads."""
+        return given if isinstance(given, Workers) else cls(number=given)
+
     def open(self) -> Engine:
         """The workers, started; see `open_engine` for the errors."""
         return open_engine(self.engine, self.number, self.cluster)

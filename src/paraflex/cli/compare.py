@@ -56,9 +56,9 @@ def compare_command(request: CompareRequest) -> int:
         comparison = study.run(folder, on_progress=report)
     figures = comparison.to_dict()
     if comparison.measurements:
-        from paraflex.plots import save_work_precision
+        from paraflex.plots import save_figures
 
-        save_work_precision(figures, folder / "figures")
+        save_figures(figures, folder / "figures")
     if request.json:
         print(json.dumps(figures, indent=2))
     else:

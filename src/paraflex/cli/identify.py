@@ -5,12 +5,12 @@ from __future__ import annotations
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.search import parameter_table, search_command
 from paraflex.cli.tables import plain_console, plain_table
-from paraflex.studies import IdentificationResult, identify, load_identification
+from paraflex.studies import IdentificationResult, load_identification
 
 
 def identify_command(request: SearchRequest) -> int:
     """Do what is left of an identification; the exit code."""
-    return search_command(request, load_identification(request.study), identify, _report, "residual")
+    return search_command(request, load_identification(request.study), _report, "residual")
 
 
 def _report(result: IdentificationResult) -> None:

@@ -9,8 +9,8 @@ from paraflex.cli.commands.studies import IndicesRequest
 from paraflex.cli.request import COMPLETE, INTERRUPTED
 from paraflex.cli.tables import number, plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
-from paraflex.plots import save_search_figures
-from paraflex.studies import IndicesResult, load_indices, sobol_indices
+from paraflex.plots import save_figures
+from paraflex.studies import IndicesResult, load_indices
 
 
 def indices_command(request: IndicesRequest) -> int:
@@ -20,14 +20,12 @@ def indices_command(request: IndicesRequest) -> int:
     compile_kernels_for(study.sweep.model().mechanism, console.print)
     with bars(console, "{task.completed}/{task.total}") as progress:
         bar = progress.add_task(study.sweep.name, total=study.sweep.runs)
-        result = sobol_indices(
-            study, request.folder, on_progress=lambda at: progress.update(bar, completed=at.done),
-            **request.workers.given,
-        )  # fmt: skip
+        report = lambda at: progress.update(bar, completed=at.done)  # noqa: E731
+        result = study.run(request.folder, workers=request.workers.chosen, on_progress=report)
     if not result.complete:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED
-    save_search_figures(result.to_dict(), request.folder / "figures")
+    save_figures(result.to_dict(), request.folder / "figures")
     verdict = study.sweep.setting.verdict()
     warn_of(console if request.json else plain_console(), verdict)
     if request.json:
@@ -42,15 +40,15 @@ def _report(result: IndicesResult) -> None:
     title = "Sobol indices and half the width of their intervals of 95 %"
     keys = ("first", "first_confidence", "total", "total_confidence")
     rows = (
-        [each.metric, each.path, each.mode, row["parameter"], *(number(row[key], ".3f") for key in keys)]
-        for each in result.indices
-        for row in each.rows()
+        [row["metric"], row["path"], row["mode"], row["parameter"], *(number(row[key], ".3f") for key in keys)]
+        for row in result.to_dict()["indices"]
     )
     heads = ("first", "±", "total", "±")
     console = plain_console()
     console.print(plain_table("metric", "path", "mode", "parameter", numbers=heads, rows=rows, title=title))
-    for each in result.indices:
-        if each.dropped:
-            share = f"{each.dropped} of {each.dropped + each.samples} base samples"
-            where = f"{each.metric}, {each.path}, {each.mode}"
+    indices = result.indices
+    for k, dropped in enumerate(indices["dropped"].values):
+        if dropped:
+            share = f"{dropped} of {dropped + indices['samples'].values[k]} base samples"
+            where = ", ".join(str(indices[name].values[k]) for name in ("metric", "path", "mode"))
             console.print(f"{where}: {share} left out: not all their runs are complete", soft_wrap=True)

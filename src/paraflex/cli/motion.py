@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+import warnings
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -31,7 +32,7 @@ from paraflex.cli.tables import FINISHED, plain_console, validity, warn_of_doubt
 from paraflex.cli.writing import write_run
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
-from paraflex.errors import AssemblyError, InputError, IntegrationError
+from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning, ValidityWarning
 from paraflex.files import Model, StudyDefaults
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
@@ -104,17 +105,19 @@ def _simulate(
         progress.update(bar, completed=reached)
 
     try:
-        with begun_late(progress):
+        with begun_late(progress), warnings.catch_warnings():
+            start = start_of(model, mechanism, study.assembly, balanced=balanced) or study.assembly
+            # The table and the summary say what the run doubts.
+            warnings.simplefilter("ignore", ValidityWarning)
+            warnings.simplefilter("ignore", ResultWarning)
             return simulate_motion(
                 mechanism,
                 study.duration,
                 samples=study.samples,
-                assembly=study.assembly,
                 torques=study.torques,
-                start=start_of(model, mechanism, study.assembly, balanced=balanced),
+                start=start,
                 options=options,
                 on_progress=report,
-                warning=False,
             )
     except IntegrationError as error:
         return error.partial

@@ -5,12 +5,12 @@ from __future__ import annotations
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.search import parameter_table, search_command
 from paraflex.cli.tables import plain_console, plain_table
-from paraflex.studies import OptimisationResult, load_optimisation, optimise
+from paraflex.studies import OptimisationResult, load_optimisation
 
 
 def optimise_command(request: SearchRequest) -> int:
     """Do what is left of an optimisation; the exit code."""
-    return search_command(request, load_optimisation(request.study), optimise, _report, "objective")
+    return search_command(request, load_optimisation(request.study), _report, "objective")
 
 
 def _report(result: OptimisationResult) -> None:

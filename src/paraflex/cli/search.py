@@ -16,23 +16,21 @@ from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
 from paraflex.cli.tables import plain_console, plain_table, warn_of
 from paraflex.compilation import compile_kernels_for
-from paraflex.plots import save_search_figures
+from paraflex.plots import save_figures
 from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
 
 
-def search_command(
-    request: SearchRequest, study: DesignStudy, look: Callable[..., R], report: Callable[[R], None], what: str
-) -> int:
+def search_command(request: SearchRequest, study: DesignStudy[R], report: Callable[[R], None], what: str) -> int:
     """Do what is left of a search, write its figures and say what it found; the exit code."""
     console = plain_console(stderr=True)
     compile_kernels_for(study.base.model().mechanism, console.print)
-    result = _with_bar(console, study, request, look, what)
+    result = _with_bar(console, study, request, what)
     if result.interrupted and not result.values:
         console.print("interrupted before the first design was done")
         return INTERRUPTED
-    save_search_figures(result.to_dict(), request.folder / "figures")
+    save_figures(result.to_dict(), request.folder / "figures")
     verdict = study.base.setting.verdict()
     warn_of(console if request.json else plain_console(), verdict)
     if request.json:
@@ -57,7 +55,7 @@ def parameter_table(result: R, **columns: dict[str, str]) -> Table:
     return table
 
 
-def _with_bar(console: Console, study: DesignStudy, request: SearchRequest, look: Callable[..., R], what: str) -> R:
+def _with_bar(console: Console, study: DesignStudy[R], request: SearchRequest, what: str) -> R:
     with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[best]}") as progress:
         bar = progress.add_task(study.name, total=study.search.evaluations, best="")
 
@@ -65,7 +63,7 @@ def _with_bar(console: Console, study: DesignStudy, request: SearchRequest, look
             best = "" if at.best is None else f"{what} {at.best:.4g}"
             progress.update(bar, completed=at.done, best=best)
 
-        return look(study, request.folder, on_progress=tell, **request.workers.given)
+        return study.run(request.folder, workers=request.workers.chosen, on_progress=tell)
 
 
 def _say_end(console: Console, result: OptimisationResult | IdentificationResult, folder: Path) -> None:

@@ -15,7 +15,7 @@ from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import COMPLETE
 from paraflex.cli.tables import number, plain_console, plain_table, print_titled, warn_of_doubts
 from paraflex.errors import InputError
-from paraflex.plots import save_elasticities
+from paraflex.plots import save_figures
 from paraflex.studies import Sensitivities, load_sensitivities
 from paraflex.studies.sensitivities.study import FIGURES, LINES, TABLE
 
@@ -32,7 +32,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     # Told of the first path when the folder is seen to be this study's.
     found = study.run(folder, on_progress=lambda at: None if at.done else say_replaced(folder, "sensitivity"))
     figures = found.to_dict()
-    save_elasticities(figures, folder / FIGURES)
+    save_figures(figures, folder / FIGURES)
     console = plain_console()
     warn_of_doubts(plain_console(stderr=True) if request.json else console, figures)
     if request.json:

@@ -15,7 +15,7 @@ from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
 from paraflex.cli.tables import plain_console, warn_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits
-from paraflex.studies import SweepResult, load_sweep, sweep
+from paraflex.studies import SweepResult, load_sweep
 from paraflex.studies.sweeps import SweepStudy
 
 REPORT = "report.html"
@@ -52,7 +52,7 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
             progress.start_task(bar)
             progress.update(bar, completed=at.done, pace=f"{at.rate:.1f} runs/s{left}")
 
-        return sweep(study, folder, limit=request.limit, on_progress=report, **request.workers.given)
+        return study.run(folder, workers=request.workers.chosen, on_progress=report, limit=request.limit)
 
 
 def _write_report(console: Console, folder: Path) -> bool:

@@ -97,12 +97,12 @@ def _models(request: VerifyRequest) -> list[str]:
 
 
 def _write(verification: Verification, figures: dict, folder: Path, *, report: bool) -> None:
-    from paraflex.plots import save_agreement_figures
+    from paraflex.plots import save_figures
 
     verification.save(folder)
     data = verification.data
     assert data is not None
-    save_agreement_figures(data, folder / "figures")
+    save_figures(data, folder / "figures")
     if report:
         from paraflex.report import save_page, verification_page
 

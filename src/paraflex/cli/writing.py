@@ -7,19 +7,18 @@ from typing import Any
 
 import xarray as xr
 
-from paraflex.results import kind_of, save_results
+from paraflex.results import save_results
 from paraflex.writing import write_json
 
 
 def write_run(data: xr.Dataset, figures: dict[str, Any], folder: Path, *, report: bool) -> None:
     """Write results, their summary, figures, and the report if it is wanted."""
-    from paraflex.plots import save_figures, save_overview
+    from paraflex.plots import save_figures
 
     folder.mkdir(parents=True, exist_ok=True)
     save_results(data, folder / "results.nc")
     write_json(folder / "summary.json", figures)
-    draw = save_overview if kind_of(data) == "motion" else save_figures
-    draw(data, folder / "figures")
+    save_figures(data, folder / "figures")
     if report:
         from paraflex.cli.report import page_of
         from paraflex.report import save_page

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.campaign import (
-    THREADS,
     TRAJECTORIES,
     Engine,
     Journal,
@@ -241,20 +240,17 @@ def sweep(
     study: SweepStudy | str | Path,
     folder: str | Path,
     *,
-    engine: str | Engine = THREADS,
-    workers: int | None = None,
-    cluster: str | None = None,
+    workers: Workers | int | None = None,
     limit: int | None = None,
     on_progress: OnProgress | None = None,
     run: RunTask = run_task,
 ) -> SweepResult:
     """Do the runs of a study, or of its file, that a folder has no rows of yet.
 
-    `study.run(folder)` in one call: see there, and `Workers` for engine, workers and cluster.
+    `study.run(folder)` in one call: see there and `Workers`.
     """
     study = study if isinstance(study, SweepStudy) else load_sweep(study)
-    chosen = Workers(engine, workers, cluster)
-    return study.run(folder, workers=chosen, on_progress=on_progress, limit=limit, run=run)
+    return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, limit=limit, run=run)
 
 
 class _Session:

@@ -29,10 +29,8 @@ def raparm_i(
     l2: float = 0.250,
     section: Section = Section.rectangle(width=0.030, thickness=0.005),
     material: Material = Material(youngs_modulus=70e9, density=2700.0),
-    joint_mass: float = 0.130,
-    joint_inertia: float = 2.0e-5,
-    end_mass: float = 0.225,
-    end_inertia: float = 2.5e-5,
+    joint: tuple[float, float] = (0.130, 2.0e-5),
+    end: tuple[float, float] = (0.225, 2.5e-5),
 ) -> Mechanism:
     """Build RAParM-I as the paper models it; the defaults are the reference set, identified from the paper's results.
 
@@ -52,17 +50,14 @@ def raparm_i(
         Links 4, 8 (B_i C) [m].
     section, material
         Of all eight links.
-    joint_mass, joint_inertia : float
+    joint : (mass, moment of inertia)
         Lumped at both ends of every link and at F_i of links 4, 8, except at C [kg, kg m^2].
-    end_mass, end_inertia : float
+    end : (mass, moment of inertia)
         Lumped at the C end of links 4 and 8, each [kg, kg m^2].
     """
 
     def link(number: int, points: dict[str, float], elements: int | tuple[int, ...]) -> FlexibleBeam:
-        lumps = tuple(
-            LumpedMass(p, end_mass, end_inertia) if p == "C" else LumpedMass(p, joint_mass, joint_inertia)
-            for p in points
-        )
+        lumps = tuple(LumpedMass(p, *(end if p == "C" else joint)) for p in points)
         length = max(points.values())
         return FlexibleBeam(
             f"link{number}", length, section, material, points, elements, lumps,

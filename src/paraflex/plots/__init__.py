@@ -38,14 +38,7 @@ if TYPE_CHECKING:
     from paraflex.plots.parallel import parallel_coordinates
     from paraflex.plots.phase import link_phases, phase_diagrams
     from paraflex.plots.responses import pareto_front, response_curves
-    from paraflex.plots.save import (
-        save_agreement_figures,
-        save_elasticities,
-        save_figures,
-        save_overview,
-        save_search_figures,
-        save_work_precision,
-    )
+    from paraflex.plots.save import save_figures
     from paraflex.plots.spectra import numerical_damping
     from paraflex.plots.time_series import (
         end_effector_motion,
@@ -84,12 +77,7 @@ __all__ = [
     "phase_diagrams",
     "point_paths",
     "response_curves",
-    "save_agreement_figures",
-    "save_elasticities",
     "save_figures",
-    "save_overview",
-    "save_search_figures",
-    "save_work_precision",
     "sobol_bars",
     "targets_reached",
     "tip_deflections",
@@ -99,7 +87,7 @@ __all__ = [
 ]
 
 
-_HOMES = homes() | {name: "save" for name in __all__ if name.startswith("save_")}
+_HOMES = homes() | {"save_figures": "save"}
 
 
 def __getattr__(name: str) -> Any:

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 # Not what a design is chosen for.
 _OF_THE_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
+_OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
 _FIRST, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
 # A metric that changes by less, as a share of its size, is the same for all designs.
 _SAME = 1e-9
@@ -34,25 +35,32 @@ class DesignTable:
         By name; NaN where a run has none.
     units : mapping of str to str
         Of metrics.
-    path, mode : (runs,) array of str
-    complete : (runs,) array of bool
+    run, design : (runs,) array of int
+        Numbers of the run and of its design.
+    path, mode, status, reason : (runs,) array of str
     """
 
     parameters: Mapping[str, Array]
     metrics: Mapping[str, Array]
     units: Mapping[str, str]
+    run: NDArray[np.int64]
+    design: NDArray[np.int64]
     path: NDArray[np.str_]
     mode: NDArray[np.str_]
-    complete: NDArray[np.bool_]
+    status: NDArray[np.str_]
+    reason: NDArray[np.str_]
 
-    def only(self, rows: NDArray[np.bool_]) -> DesignTable:
+    @property
+    def complete(self) -> NDArray[np.bool_]:
+        """Which runs are."""
+        return self.status == "complete"
+
+    def only(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> DesignTable:
         """Some of the runs."""
         columns = (self.parameters, self.metrics)
         parameters, metrics = ({name: values[rows] for name, values in column.items()} for column in columns)
-        return replace(
-            self, parameters=parameters, metrics=metrics, path=self.path[rows], mode=self.mode[rows],
-            complete=self.complete[rows],
-        )  # fmt: skip
+        rest = {name: getattr(self, name)[rows] for name in _OF_A_RUN}
+        return replace(self, parameters=parameters, metrics=metrics, **rest)
 
     def in_modes(self, modes: Sequence[str]) -> DesignTable:
         """Runs in some actuation modes."""
@@ -86,6 +94,25 @@ class DesignTable:
         return chosen
 
     @property
+    def judged(self) -> list[str]:
+        """The metrics that designs are chosen by; none where none varies."""
+        if not self.complete.any():
+            return []
+        try:
+            return self.judged_by(None, len(self.metrics))
+        except InputError:
+            return [name for name, values in self.metrics.items() if np.isfinite(values).any()][:1]
+
+    def values(self, row: int) -> tuple[float, ...]:
+        """The numbers of a row's design, in the order of the parameters."""
+        return tuple(float(values[row]) for values in self.parameters.values())
+
+    def label(self, row: int) -> str:
+        """What a run is called: its design's number, its mode, and its path where there are several."""
+        several = len(set(self.path.tolist())) > 1
+        return f"#{self.design[row]} {self.mode[row]}" + (f" {self.path[row]}" if several else "")
+
+    @property
     def varied(self) -> list[str]:
         """Parameters that differ among the runs; all of them where none does."""
         spread = [name for name, values in self.parameters.items() if np.unique(values).size > 1]
@@ -106,7 +133,7 @@ class DesignTable:
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
-    """The table of a study, from the files that `tables_of` its folder names."""
+    """The table of a study in order of its runs, from the files that `tables_of` its folder names."""
     import pyarrow as pa
 
     try:
@@ -125,14 +152,17 @@ def read_designs(files: Sequence[Path]) -> DesignTable:
     judged = [name for name in names[last:] if name not in _LAST and not name.startswith("slope.")]
     columns = {name: table[name].to_numpy().astype(float) for name in (*names[first:last], *judged)}
     units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
-    return DesignTable(
+    texts = {name: np.array(table[name].to_pylist(), dtype=str) for name in ("path", "mode", "status", "reason")}
+    designs = DesignTable(
         parameters={name: columns[name] for name in names[first:last]},
         metrics={name: columns[name] for name in judged},
         units={name: units[name] for name in judged},
-        path=np.array(table["path"].to_pylist(), dtype=str),
-        mode=np.array(table["mode"].to_pylist(), dtype=str),
-        complete=np.array(table["status"].to_pylist(), dtype=str) == "complete",
+        run=table["run"].to_numpy(),
+        design=table["design"].to_numpy(),
+        **texts,
     )
+    order = np.argsort(designs.run, kind="stable")
+    return designs if np.array_equal(order, np.arange(order.size)) else designs.only(order)
 
 
 def in_conflict(table: DesignTable, judged: Sequence[str]) -> list[str]:

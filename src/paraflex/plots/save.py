@@ -13,9 +13,9 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.layout import column_width
 from paraflex.plots.planned import PlannedFigure, drawings, figures_of
-from paraflex.plots.sources import Source
+from paraflex.plots.sources import Source, kind_of_numbers
 from paraflex.plots.style import journal_style
-from paraflex.results.kinds import check_kind
+from paraflex.results.kinds import kind_of
 from paraflex.writing import whole_file
 
 # Files that do not depend on when they were written.
@@ -24,15 +24,17 @@ FORMATS = tuple(_METADATA)
 
 
 @checked_arguments()
-def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) -> list[Path]:
-    """Write figures 11 to 18 of a run along a path, named like `fig11_desired_path.png`.
+def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mode: str | None = None) -> list[Path]:
+    """Write the figures that the command which makes such results writes beside them, as PNG (200 dpi) and SVG.
 
-    As all `save_...` functions, as PNG (200 dpi) and SVG.
+    Of a run along a path figures 11 to 18, named like `fig11_desired_path.png`; of a verification figures 22 and 23 of
+    every mode and the distances of all models; of others see `paraflex plot --list`. There are none where nothing can
+    be shown: of a search in which no design ran, of metrics that do not vary.
 
     Parameters
     ----------
-    data : xarray.Dataset
-        From `paraflex.results`.
+    results : xarray.Dataset or mapping
+        From `paraflex.results`, or a study's result in plain numbers: its `to_dict()`.
     folder : str or Path
         Made if it is not there; files of the same names are written over.
     mode : str, optional
@@ -47,45 +49,24 @@ def save_figures(data: xr.Dataset, folder: str | Path, mode: str | None = None) 
     Raises
     ------
     InputError
-        No such mode.
+        No such mode, or numbers of no result.
     OutputError
         The folder cannot be written.
     """
-    return _save_written("tracking", data, folder, mode)
-
-
-@checked_arguments()
-def save_agreement_figures(data: xr.Dataset, folder: str | Path) -> list[Path]:
-    """Write figures 22 and 23 of every mode, and the distances of all models, of `studies.Verification.dataset`."""
-    return _save_written("verification", data, folder)
-
-
-@checked_arguments()
-def save_overview(data: xr.Dataset, folder: str | Path) -> list[Path]:
-    """Write the overview of a run without a path."""
-    return _save_written("motion", data, folder)
-
-
-@checked_arguments()
-def save_work_precision(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
-    """Write the figure of a comparison of methods; none where no run got to its end."""
-    return _save_written("methods", figures, folder)
-
-
-@checked_arguments()
-def save_search_figures(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
-    """Write the figures of an optimisation, an identification or of Sobol indices.
-
-    There are none of a search in which no design ran, nor of metrics that do not vary.
-    """
-    kind = "indices" if "indices" in figures else "identification" if "targets" in figures else "optimisation"
-    return _save_written(kind, figures, folder)
-
-
-@checked_arguments()
-def save_elasticities(figures: Mapping[str, Any], folder: str | Path) -> list[Path]:
-    """Write a figure of elasticities for each run of a sensitivity study."""
-    return _save_written("sensitivity", figures, folder)
+    folder = Path(folder)
+    kind = kind_of(results) if isinstance(results, xr.Dataset) else kind_of_numbers(results)
+    if not kind:
+        raise InputError("not the numbers of a result", field="results", remedy="give what its to_dict() returns")
+    source = Source(kind, results, folder)
+    written: list[Path] = []
+    for figure in figures_of(source):
+        if not figure.written_as:
+            continue
+        for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
+            one_of_many = figure.takes in ("models", "run")
+            stem = f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as
+            written += _write(drawing.draw(), [folder / f"{_file_name(stem)}.{suffix}" for suffix in ("png", "svg")])
+    return written
 
 
 def write_figures(
@@ -134,23 +115,6 @@ def write_figures(
         with column_width(style):
             figure = drawing.draw()
         written += _write(figure, files[drawing.stem], dpi)
-    return written
-
-
-def _save_written(kind: str, data: Any, folder: str | Path, mode: str | None = None) -> list[Path]:
-    """The figures that the command which makes results of a kind writes beside them."""
-    if isinstance(data, xr.Dataset):
-        check_kind(data, kind)
-    folder = Path(folder)
-    source = Source(kind, data, folder)
-    written: list[Path] = []
-    for figure in figures_of(source):
-        if not figure.written_as:
-            continue
-        for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
-            one_of_many = figure.takes in ("models", "run")
-            stem = f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as
-            written += _write(drawing.draw(), [folder / f"{_file_name(stem)}.{suffix}" for suffix in ("png", "svg")])
     return written
 
 

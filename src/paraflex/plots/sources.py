@@ -90,13 +90,18 @@ def _json(file: Path) -> Source:
         found = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError("damaged: not JSON to its end", field=str(file), remedy="make these results again") from error
-    for kind, is_it in _JSON.items():
-        if is_it(found):
-            searched = kind in ("optimisation", "identification", "indices")
-            return Source(kind, found, file.parent, _designs(file.parent) if searched else None)
+    kind = kind_of_numbers(found)
+    if kind:
+        searched = kind in ("optimisation", "identification", "indices")
+        return Source(kind, found, file.parent, _designs(file.parent) if searched else None)
     beside = [name for name in _FILES if (file.parent / name).is_file() and name != file.name]
     remedy = f"name {beside[0]} beside it" if beside else _OURS
     raise InputError("no figures are drawn from this file", field=str(file), remedy=remedy)
+
+
+def kind_of_numbers(found: Any) -> str:
+    """What kind of results plain numbers are; empty where of none that figures are drawn of."""
+    return next((kind for kind, is_it in _JSON.items() if is_it(found)), "")
 
 
 def _designs(folder: Path) -> DesignTable | None:

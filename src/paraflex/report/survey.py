@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.plots.designs import in_conflict
+from paraflex.plots.designs import DesignTable, in_conflict
 from paraflex.report.curves import look
-from paraflex.report.designs import Studied
 from paraflex.report.page import Chart, Curve, DesignColumn, Designs, Look, Panel, Picker
 from paraflex.report.text import count
 
@@ -26,7 +25,7 @@ class Step(NamedTuple):
 
 
 def survey(
-    studied: Studied, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], history: Sequence[Step]
+    designs: DesignTable, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], history: Sequence[Step]
 ) -> list[Panel]:
     """What all designs do."""
     parameters = [k for k, column in enumerate(drawn) if column.parameter]
@@ -38,7 +37,7 @@ def survey(
     if parameters and metrics:
         charts += _responses(parameters, metrics)
     if len(metrics) > 1:
-        pair = [place[name] for name in in_conflict(studied.table, studied.judged)]
+        pair = [place[name] for name in in_conflict(designs, designs.judged)]
         first, second = pair if len(pair) == 2 else metrics[:2]
         charts.append(Chart(
             "front", "Pareto front", "metric", x="metric", over_time=False, drawer="front",
@@ -55,7 +54,7 @@ def survey(
             pickers=[Picker("coloured by", metrics)],
             note="A line a run. Drag along an axis to keep the runs that pass there; drag names to reorder.",
         ))  # fmt: skip
-    return [Panel(_drawn(studied, rows), charts)] if charts else []
+    return [Panel(_drawn(designs, rows), charts)] if charts else []
 
 
 def _responses(parameters: Sequence[int], metrics: Sequence[int]) -> list[Chart]:
@@ -71,8 +70,8 @@ def _responses(parameters: Sequence[int], metrics: Sequence[int]) -> list[Chart]
     ]  # fmt: skip
 
 
-def _drawn(studied: Studied, rows: NDArray[np.intp]) -> str:
-    complete = int(np.count_nonzero(studied.table.complete))
+def _drawn(designs: DesignTable, rows: NDArray[np.intp]) -> str:
+    complete = int(np.count_nonzero(designs.complete))
     if rows.size == complete:
         return f"All designs: {count(complete)} runs"
     return (
@@ -97,11 +96,10 @@ def _history(steps: Sequence[Step]) -> Chart:
 
 
 def drawn_designs(
-    studied: Studied, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], shown: Mapping[int, int]
+    designs: DesignTable, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], shown: Mapping[int, int]
 ) -> Designs:
     """Drawn rows as the page's charts take them; `shown` tells which of the page's runs a row is."""
-    table = studied.table
-    pairs = list(dict.fromkeys(zip(table.path.tolist(), table.mode.tolist(), strict=True)))
+    pairs = list(dict.fromkeys(zip(designs.path.tolist(), designs.mode.tolist(), strict=True)))
     several_paths, several_modes = (len({pair[k] for pair in pairs}) > 1 for k in (0, 1))
     names = [", ".join([mode] * several_modes + [path] * several_paths) or mode for path, mode in pairs]
     known = {pair: k for k, pair in enumerate(pairs)}
@@ -109,7 +107,7 @@ def drawn_designs(
         columns=drawn,
         telling=", ".join(["mode"] * several_modes + ["path"] * several_paths) or "mode",
         series=[(name, look(k)) for k, name in enumerate(names)],
-        member=[known[str(table.path[row]), str(table.mode[row])] for row in rows],
-        number=studied.design[rows],
+        member=[known[str(designs.path[row]), str(designs.mode[row])] for row in rows],
+        number=designs.design[rows],
         shown=[shown.get(int(row), -1) for row in rows],
     )

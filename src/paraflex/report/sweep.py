@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.plots.designs import DesignTable
 from paraflex.report.choice import Picked, drawn_rows
 from paraflex.report.curves import (
     ERRORS,
@@ -23,7 +25,7 @@ from paraflex.report.curves import (
     thinned,
     torque_chart,
 )
-from paraflex.report.designs import Studied, columns, metric_name, reasons, shown_unit
+from paraflex.report.designs import columns, metric_name, reasons, shown_unit
 from paraflex.report.film import animation
 from paraflex.report.page import Page, Panel
 from paraflex.report.survey import LOWER, Step, drawn_designs, survey
@@ -88,24 +90,24 @@ class StudyAccount:
     notes: Sequence[str] = ()
 
 
-def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount) -> Page:
+def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAccount) -> Page:
     """The report of a study.
 
     Parameters
     ----------
-    studied : Studied
-        From `designs.read_studied`.
+    designs : DesignTable
+        From `plots.designs.read_designs`.
     picked : sequence of Picked
         From `designs.best_runs`: the table of best designs.
     account : StudyAccount
     """
     shown, others = _of_one_kind({row: account.runs[row] for row, _ in picked if row in account.runs})
-    labels = [studied.label(row) for row in shown]
+    labels = [designs.label(row) for row in shown]
     data = side_by_side(list(shown.values()), labels) if shown else None
-    rows = drawn_rows(studied, [one.row for one in picked])
+    rows = drawn_rows(designs, [one.row for one in picked])
     units = {name: one.unit for name, one in account.parameters.items()}
     logarithmic = [name for name, one in account.parameters.items() if one.spread == "log"]
-    drawn = columns(studied, rows, units, logarithmic)
+    drawn = columns(designs, rows, units, logarithmic)
     few = None if data is None else thinned(data)
     missing = dict(account.failed) | dict.fromkeys(
         others, "it has other bodies, joints, motors or springs than the first"
@@ -113,20 +115,20 @@ def sweep_page(studied: Studied, picked: Sequence[Picked], account: StudyAccount
     return Page(
         title=account.name,
         kind=account.kind,
-        subtitle=_subtitle(studied, account),
+        subtitle=_subtitle(designs, account),
         facts=account.facts,
-        figures=_tiles(studied, account),
-        survey=survey(studied, rows, drawn, account.history) if rows.size else [],
-        designs=drawn_designs(studied, rows, drawn, {row: k for k, row in enumerate(shown)}) if rows.size else None,
-        tables=[("Best designs", _best_table(studied, picked, list(shown), units))] if picked else [],
-        more=[("What was varied", _parameter_table(account)), *_trouble(studied)],
+        figures=_tiles(designs, account),
+        survey=survey(designs, rows, drawn, account.history) if rows.size else [],
+        designs=drawn_designs(designs, rows, drawn, {row: k for k, row in enumerate(shown)}) if rows.size else None,
+        tables=[("Best designs", _best_table(designs, picked, list(shown), units))] if picked else [],
+        more=[("What was varied", _parameter_table(account)), *_trouble(designs)],
         panels=[] if few is None else _panels(few, labels),
         time=[] if few is None else few["time"].values,
         runs=labels,
         selecting="design",
         film=None if data is None else animation(data),
         no_film=_NO_RUN,
-        notes=[*account.notes, *_unfinished(studied, account), *_not_shown(studied, missing)],
+        notes=[*account.notes, *_unfinished(designs, account), *_not_shown(designs, missing)],
     )
 
 
@@ -192,45 +194,45 @@ def _station_bodies(run: xr.Dataset) -> NDArray[np.str_]:
     return run["station_body"].values if "station_body" in run else np.zeros(0, dtype=str)
 
 
-def _subtitle(studied: Studied, account: StudyAccount) -> str:
-    designs = len(np.unique(studied.design))
-    modes = list(dict.fromkeys(studied.table.mode.tolist()))
-    paths = list(dict.fromkeys(studied.table.path.tolist()))
-    parts = [account.mechanism, f"{count(designs)} designs" if designs != 1 else "one design"]
+def _subtitle(designs: DesignTable, account: StudyAccount) -> str:
+    number_of_designs = np.unique(designs.design).size
+    modes = list(dict.fromkeys(designs.mode.tolist()))
+    paths = list(dict.fromkeys(designs.path.tolist()))
+    parts = [account.mechanism, f"{count(number_of_designs)} designs" if number_of_designs != 1 else "one design"]
     if modes:
         parts.append(f"modes {', '.join(modes)}" if len(modes) > 1 else f"mode {modes[0]}")
         parts.append(f"paths {', '.join(paths)}" if len(paths) > 1 else f"path “{paths[0]}”")
     return ", ".join(parts)
 
 
-def _tiles(studied: Studied, account: StudyAccount) -> list[tuple[str, str, str]]:
-    counts = studied.counts
+def _tiles(designs: DesignTable, account: StudyAccount) -> list[tuple[str, str, str]]:
+    counts = Counter(designs.status.tolist())
     done = sum(counts.values())
     rest = [f"{count(number)} {status}" for status, number in sorted(counts.items()) if status != "complete"]
     of = f"of {count(account.total)} runs" if account.total is not None else f"of {count(done)} runs"
     tiles = [("complete", f"{count(counts.get('complete', 0))}", ", ".join([of, *rest]))]
-    for name in studied.judged[:3]:
-        values = studied.table.metrics[name]
-        known = np.flatnonzero(studied.table.complete & np.isfinite(values))
+    for name in designs.judged[:3]:
+        values = designs.metrics[name]
+        known = np.flatnonzero(designs.complete & np.isfinite(values))
         if known.size:
             row = int(known[np.argmin(values[known])])
-            unit, factor = shown_unit(studied.table.units.get(name, ""), values[known])
+            unit, factor = shown_unit(designs.units.get(name, ""), values[known])
             value = f"{number(values[row], factor)} {unit}".rstrip()
-            tiles.append((metric_name(name), value, f"least, of {studied.label(row)}"))
+            tiles.append((metric_name(name), value, f"least, of {designs.label(row)}"))
     return tiles
 
 
-def _best_table(studied: Studied, picked: Sequence[Picked], shown: Sequence[int], units: Mapping[str, str]) -> str:
+def _best_table(designs: DesignTable, picked: Sequence[Picked], shown: Sequence[int], units: Mapping[str, str]) -> str:
     """The best designs: their numbers, metrics, and what they are best in."""
-    named = [*((name, True) for name in studied.table.varied), *((name, False) for name in studied.judged)]
+    named = [*((name, True) for name in designs.varied), *((name, False) for name in designs.judged)]
     heads, cells, keys = [("design", "")], {}, {}
-    names = {row: studied.label(row) for row, _ in picked}
+    names = {row: designs.label(row) for row, _ in picked}
     for row, why in picked:
-        cells[row], keys[row] = ["; ".join(why)], [int(studied.design[row]), None]
+        cells[row], keys[row] = ["; ".join(why)], [int(designs.design[row]), None]
     heads.append(("best in", ""))
     for name, parameter in named[:_MOST_COLUMNS]:
-        values = (studied.table.parameters if parameter else studied.table.metrics)[name]
-        unit, factor = shown_unit((units if parameter else studied.table.units).get(name, ""), values)
+        values = (designs.parameters if parameter else designs.metrics)[name]
+        unit, factor = shown_unit((units if parameter else designs.units).get(name, ""), values)
         heads.append((name.replace("_", " ") if parameter else metric_name(name), f"[{unit}]" if unit else ""))
         for row, _ in picked:
             cells[row].append(number(values[row], factor))
@@ -254,9 +256,9 @@ def _parameter_table(account: StudyAccount) -> str:
     return table(heads, rows, caption="What was varied")
 
 
-def _trouble(studied: Studied) -> list[tuple[str, str]]:
+def _trouble(designs: DesignTable) -> list[tuple[str, str]]:
     """Why runs are not complete, alike ones together."""
-    found = reasons(studied)
+    found = reasons(designs)
     if not found:
         return []
     rows = [(status or NOTHING, [count(number), reason]) for status, reason, number in found]
@@ -264,15 +266,15 @@ def _trouble(studied: Studied) -> list[tuple[str, str]]:
     return [("Runs that are not complete", f'<div class="long">{table(heads, rows, caption="Reasons")}</div>')]
 
 
-def _unfinished(studied: Studied, account: StudyAccount) -> list[str]:
-    done = studied.run.size
+def _unfinished(designs: DesignTable, account: StudyAccount) -> list[str]:
+    done = designs.run.size
     if account.total is None or done >= account.total:
         return []
     return [f"The study is not finished: this is of the {count(done)} of {count(account.total)} runs that are done."]
 
 
-def _not_shown(studied: Studied, missing: Mapping[int, str]) -> list[str]:
-    return [f"{studied.label(row)} is not shown in motion: {reason}" for row, reason in missing.items()]
+def _not_shown(designs: DesignTable, missing: Mapping[int, str]) -> list[str]:
+    return [f"{designs.label(row)} is not shown in motion: {reason}" for row, reason in missing.items()]
 
 
 def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:

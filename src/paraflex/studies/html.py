@@ -114,11 +114,8 @@ def identification_html(result: IdentificationResult) -> str:
 @view.register(IndicesResult)
 def indices_html(result: IndicesResult) -> str:
     """First-order and total indices of every parameter, a row each."""
-    rows = [
-        (each.metric, each.path, each.mode, row["parameter"], row["first"], row["first_confidence"], row["total"],
-         row["total_confidence"])
-        for each in result.indices for row in each.rows()
-    ]  # fmt: skip
+    names = ("metric", "path", "mode", "parameter", "first", "first_confidence", "total", "total_confidence")
+    rows = [tuple(row[name] for name in names) for row in result.to_dict()["indices"]]
     heads = ("metric", "path", "mode", "parameter", "first order", "±", "total", "±")
     shown = table(heads, rows[:_MOST], "with half the widths of the intervals of 95 %")
     return page(f"Sobol indices: {_state(result.sweep.complete, result.sweep.interrupted)}", shown, _more(len(rows)))

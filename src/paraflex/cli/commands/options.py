@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
 from paraflex.errors import InputError
+
+if TYPE_CHECKING:
+    from paraflex.campaign import Workers
 
 # What a command runs of which no model is named.
 DEFAULT_MODEL = "raparm_i"
@@ -103,10 +106,12 @@ class WorkersChoice:
     ] = None
 
     @property
-    def given(self) -> dict[str, Any]:
-        """As functions of studies take it; a cluster is Dask's."""
+    def chosen(self) -> Workers:
+        """As studies take it; a cluster is Dask's."""
+        from paraflex.campaign import Workers  # imported when a study is run, and not for the help
+
         engine = "dask" if self.cluster is not None and self.engine == "threads" else self.engine
-        return {"engine": engine, "workers": self.workers, "cluster": self.cluster}
+        return Workers(engine, self.workers, self.cluster)
 
 
 def study_folder(study: str, output: str | None) -> Path:

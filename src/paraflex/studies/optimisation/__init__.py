@@ -11,7 +11,6 @@ from paraflex.studies.optimisation.identify import (
 from paraflex.studies.optimisation.indices import (
     IndicesResult,
     IndicesStudy,
-    SobolIndices,
     load_indices,
     sobol_indices,
 )
@@ -38,7 +37,6 @@ __all__ = [
     "Reached",
     "Search",
     "SearchResult",
-    "SobolIndices",
     "Target",
     "identify",
     "load_identification",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.campaign import THREADS, Engine, OnProgress, Progress, Study, Workers, kept_in
+from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.errors import InputError, suggestion
 from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
@@ -78,7 +78,7 @@ class IdentificationResult(SearchResult):
 
 @given_as("an identification", "what load_identification returns")
 @dataclass(frozen=True)
-class IdentificationStudy(DesignStudy, Study[IdentificationResult]):
+class IdentificationStudy(DesignStudy[IdentificationResult]):
     """A search for the parameters that reproduce targets, by least squares within bounds; see `DesignStudy`.
 
     Attributes
@@ -137,18 +137,16 @@ def identify(
     study: IdentificationStudy | str | Path,
     folder: str | Path,
     *,
-    engine: str | Engine = THREADS,
-    workers: int | None = None,
-    cluster: str | None = None,
+    workers: Workers | int | None = None,
     on_progress: OnProgress | None = None,
     run: RunTask | None = None,
 ) -> IdentificationResult:
     """Look for the parameters that reproduce the targets of a study, or of its file.
 
-    `study.run(folder)` in one call: see there, and `Workers` for engine, workers and cluster.
+    `study.run(folder)` in one call: see there and `Workers`.
     """
     study = study if isinstance(study, IdentificationStudy) else load_identification(study)
-    return study.run(folder, workers=Workers(engine, workers, cluster), on_progress=on_progress, run=run)
+    return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
 
 
 def _target(entry: TargetTable, number: int, base: SweepStudy) -> Target:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.campaign import THREADS, Engine, OnProgress, Study, Workers
+from paraflex.campaign import OnProgress, Study, Workers
 from paraflex.designs.run import COMPLETE, run_task
 from paraflex.designs.samples import RANDOM
 from paraflex.designs.schema import SamplingTable, study_table
@@ -24,58 +25,11 @@ from paraflex.writing import GO_ON, whole_file, write_json
 
 Array = NDArray[np.float64]
 TABLE = "indices.parquet"
+# What SALib calls the shares, and a row of the table.
+_SHARES = {"first": "S1", "first_confidence": "S1_conf", "total": "ST", "total_confidence": "ST_conf"}
+_ROW = ("path", "mode", "metric", "parameter", *_SHARES, "samples", "dropped")
 # Base samples unless asked otherwise, and the fewest of which anything can be said.
 _SAMPLES, _FEWEST = 128, 8
-
-
-@dataclass(frozen=True)
-class SobolIndices:
-    """Indices of one metric along one path in one mode.
-
-    Attributes
-    ----------
-    path, mode, metric : str
-    parameters : tuple of str
-    first, total : (parameters,) array
-        Shares of the variance; none of a metric that does not vary.
-    first_confidence, total_confidence : (parameters,) array
-        Half the width of their intervals of 95 %, from resampling.
-    mean, deviation : float
-        Of the metric over the ranges, in its unit.
-    samples, dropped : int
-        Base samples that count, and those left out for a run of them that is not complete.
-    """
-
-    path: str
-    mode: str
-    metric: str
-    parameters: tuple[str, ...]
-    first: Array
-    first_confidence: Array
-    total: Array
-    total_confidence: Array
-    mean: float
-    deviation: float
-    samples: int
-    dropped: int
-
-    def rows(self) -> list[dict[str, Any]]:
-        """One a parameter, in plain values."""
-        return [
-            {
-                "path": self.path,
-                "mode": self.mode,
-                "metric": self.metric,
-                "parameter": name,
-                "first": finite_or_none(self.first[k]),
-                "first_confidence": finite_or_none(self.first_confidence[k]),
-                "total": finite_or_none(self.total[k]),
-                "total_confidence": finite_or_none(self.total_confidence[k]),
-                "samples": self.samples,
-                "dropped": self.dropped,
-            }
-            for k, name in enumerate(self.parameters)
-        ]
 
 
 @dataclass(frozen=True)
@@ -84,12 +38,16 @@ class IndicesResult(SweptResult):
 
     Attributes
     ----------
-    indices : tuple of SobolIndices
-        None before all runs are done.
+    indices : xarray.Dataset
+        `first` and `total` (index, parameter): shares of the variance, NaN of a metric that does not vary;
+        `first_confidence`, `total_confidence`: half the width of their intervals of 95 %, from resampling. `mean` and
+        `deviation` (index,) of the metric over the ranges, in its unit; `samples` and `dropped`: base samples that
+        count, and those left out for a run of them that is not complete. Coordinates `metric`, `path`, `mode` say what
+        an index is of. There are none before all runs are done.
     """
 
     values_file = "indices.json"
-    indices: tuple[SobolIndices, ...]
+    indices: xr.Dataset
 
     @property
     def table(self) -> Path:
@@ -98,23 +56,14 @@ class IndicesResult(SweptResult):
 
     @property
     def data(self) -> xr.Dataset:
-        """Indices and their confidence, (index, parameter); what each is of, (index,)."""
-        every, one = ("index", "parameter"), ("index",)
-        of_all = {
-            name: (every, np.array([getattr(each, name) for each in self.indices]))
-            for name in ("first", "first_confidence", "total", "total_confidence")
-        }
-        of_one = {
-            name: (one, [getattr(each, name) for each in self.indices])
-            for name in ("metric", "path", "mode", "mean", "deviation", "samples", "dropped")
-        }
-        data = xr.Dataset(of_all | of_one, {"parameter": list(self.indices[0].parameters) if self.indices else []})
-        return data.set_coords(["metric", "path", "mode"])
+        """The indices."""
+        return self.indices
 
     def to_dict(self) -> dict[str, Any]:
-        """In plain values."""
-        rows = [row for each in self.indices for row in each.rows()]
-        return {"kind": "indices", "name": self.sweep.name, "indices": rows}
+        """In plain values: a row an index and parameter."""
+        table = self.indices.to_dataframe(dim_order=["index", "parameter"]).reset_index().reindex(columns=list(_ROW))
+        plain = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
+        return {"kind": "indices", "name": self.sweep.name, "indices": plain}
 
 
 @dataclass(frozen=True)
@@ -158,7 +107,7 @@ class IndicesStudy(Study[IndicesResult]):
         import pyarrow.parquet as pq
 
         done = self.sweep.run(folder, workers=workers, on_progress=on_progress, run=run)
-        result = IndicesResult(done, tuple(_indices(self, done.table)) if done.complete else ())
+        result = IndicesResult(done, _dataset(self, _indices(self, done.table) if done.complete else []))
         if done.complete:
             write_json(result.folder / result.values_file, result.to_dict(), remedy=GO_ON)
             with whole_file(result.table, remedy=GO_ON) as unfinished:
@@ -207,23 +156,21 @@ def sobol_indices(
     study: IndicesStudy | str | Path,
     folder: str | Path,
     *,
-    engine: str | Engine = THREADS,
-    workers: int | None = None,
-    cluster: str | None = None,
+    workers: Workers | int | None = None,
     on_progress: OnProgress | None = None,
     run: RunTask = run_task,
     **read: Any,
 ) -> IndicesResult:
     """First-order and total Sobol indices of metrics, from Saltelli's samples run as a sweep.
 
-    `study.run(folder)` in one call: see there, and `Workers` for engine, workers and cluster. Of a file `metrics`,
+    `study.run(folder)` in one call: see there and `Workers`. Of a file `metrics`,
     `samples` and `seed` may be given as to `load_indices`.
     """
     study = study if isinstance(study, IndicesStudy) else load_indices(study, **read)
-    return study.run(folder, workers=Workers(engine, workers, cluster), on_progress=on_progress, run=run)
+    return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
 
 
-def _indices(study: IndicesStudy, table: Path) -> list[SobolIndices]:
+def _indices(study: IndicesStudy, table: Path) -> list[dict[str, Any]]:
     import pyarrow.parquet as pq
 
     setting = study.sweep.setting
@@ -243,29 +190,38 @@ def _indices(study: IndicesStudy, table: Path) -> list[SobolIndices]:
 
 def _analysed(
     study: IndicesStudy, names: tuple[str, str, str], values: Array, usable: NDArray[np.bool_]
-) -> SobolIndices:
+) -> dict[str, Any]:
     """Indices from the base samples all of whose runs are usable."""
-    parameters = study.sweep.setting.names
     kept = usable.reshape(study.samples, -1).all(axis=1)
-    if np.count_nonzero(kept) < _FEWEST:
+    count = int(np.count_nonzero(kept))
+    if count < _FEWEST:
         raise InputError(
-            f"only {np.count_nonzero(kept)} of {study.samples} base samples are complete in {names[1]}", field="vary",
+            f"only {count} of {study.samples} base samples are complete in {names[1]}", field="vary",
             remedy="narrow the ranges: reasons stand in the table",
         )  # fmt: skip
     values = values.reshape(study.samples, -1)[kept].ravel()
     mean, deviation = float(np.mean(values)), float(np.std(values))
-    if deviation <= 1e-12 * abs(mean):
-        none = np.full(len(parameters), np.nan)
-        found = {"S1": none, "S1_conf": none, "ST": none, "ST_conf": none}
-    else:
-        found = _salib_analyse(parameters, values, study.seed)
-    return SobolIndices(
-        *names, parameters,
-        first=np.asarray(found["S1"]), first_confidence=np.asarray(found["S1_conf"]),
-        total=np.asarray(found["ST"]), total_confidence=np.asarray(found["ST_conf"]),
-        mean=mean, deviation=deviation,
-        samples=int(np.count_nonzero(kept)), dropped=int(np.count_nonzero(~kept)),
-    )  # fmt: skip
+    varies = deviation > 1e-12 * abs(mean)
+    found = _salib_analyse(study.sweep.setting.names, values, study.seed) if varies else {}
+    none = np.full(len(study.sweep.setting.names), np.nan)
+    shares = {name: np.asarray(found.get(key, none)) for name, key in _SHARES.items()}
+    rest = {"mean": mean, "deviation": deviation, "samples": count, "dropped": study.samples - count}
+    return dict(zip(("path", "mode", "metric"), names, strict=True)) | shares | rest
+
+
+def _dataset(study: IndicesStudy, found: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+    names = study.sweep.setting.names
+    shares = {
+        name: (("index", "parameter"), np.array([each[name] for each in found]).reshape(-1, len(names)))
+        for name in _SHARES
+    }
+    rest = {name: ("index", [each[name] for each in found]) for name in ("mean", "deviation", "samples", "dropped")}
+    of = {name: ("index", [each[name] for each in found]) for name in ("metric", "path", "mode")}
+    return xr.Dataset(shares | rest, of | {"parameter": list(names)})
+
+
+def _plain(value: Any) -> Any:
+    return finite_or_none(value) if isinstance(value, float) else value
 
 
 def _columns(names: list[str], base: SweepStudy) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.campaign import THREADS, Engine, OnProgress, Progress, Study, Workers, kept_in
+from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
@@ -56,7 +56,7 @@ class OptimisationResult(SearchResult):
 
 @given_as("an optimisation", "what load_optimisation returns")
 @dataclass(frozen=True)
-class OptimisationStudy(DesignStudy, Study[OptimisationResult]):
+class OptimisationStudy(DesignStudy[OptimisationResult]):
     """A search for the design whose objective is least; see `DesignStudy`.
 
     Attributes
@@ -134,18 +134,16 @@ def optimise(
     study: OptimisationStudy | str | Path,
     folder: str | Path,
     *,
-    engine: str | Engine = THREADS,
-    workers: int | None = None,
-    cluster: str | None = None,
+    workers: Workers | int | None = None,
     on_progress: OnProgress | None = None,
     run: RunTask | None = None,
 ) -> OptimisationResult:
     """Look for the design of a study, or of its file, whose objective is least.
 
-    `study.run(folder)` in one call: see there, and `Workers` for engine, workers and cluster.
+    `study.run(folder)` in one call: see there and `Workers`.
     """
     study = study if isinstance(study, OptimisationStudy) else load_optimisation(study)
-    return study.run(folder, workers=Workers(engine, workers, cluster), on_progress=on_progress, run=run)
+    return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
 
 
 def _objective(table: ObjectiveTable) -> Objective:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -11,6 +11,7 @@ from typing import Any, ClassVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.campaign.study import R_co, Study
 from paraflex.designs.measure import check_metric, metric_of
 from paraflex.designs.overlay import Place, number_at
 from paraflex.designs.samples import RANDOM, Varied
@@ -66,7 +67,7 @@ class Search:
 
 
 @dataclass(frozen=True)
-class DesignStudy(ABC):
+class DesignStudy(Study[R_co]):
     """A mechanism, the parameters that are free within bounds, and how they are looked for.
 
     Attributes

@@ -21,9 +21,9 @@ from paraflex.designs.run import Abandoned
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError, ParaflexError
 from paraflex.files import model_from
+from paraflex.plots.designs import DesignTable, read_designs
 from paraflex.report import Page
 from paraflex.report.choice import MOST_RUNS, Picked, best_runs
-from paraflex.report.designs import Studied, read_studied
 from paraflex.report.survey import Step
 from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
 from paraflex.results.doubts import doubt_lines
@@ -53,39 +53,38 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
     """
     study = open_study(folder)
     files = tables_of(study.folder)
-    studied = read_studied(files) if files else None
-    if studied is None or not studied.run.size:
+    designs = read_designs(files) if files else None
+    if designs is None or not designs.run.size:
         raise InputError("no run is done yet", field=str(folder), remedy="run the study first")
     found = _found(study.folder / _FOUND)
-    picked = best_runs(studied)
+    picked = best_runs(designs)
     if found:
-        picked = _searched(studied, found, picked)
+        picked = _searched(designs, found, picked)
     if on_progress is not None and picked:
         on_progress(f"simulating {len(picked)} of the best designs again, to be seen in motion")
-    runs, failed, differ = _again(study, studied, picked)
+    runs, failed, differ = _again(study, designs, picked)
     account = StudyAccount(
         kind=str(found.get("kind", "sweep")),
         name=study.name,
         mechanism=study.setting.source,
         total=study.runs,
-        parameters=_parameters(study, studied),
+        parameters=_parameters(study, designs),
         facts=_facts(study, found),
         runs=runs,
         failed=failed,
         history=[Step(n, np.nan if value is None else value, bool(holds)) for n, value, holds in _history(found)],
-        notes=_notes(study, studied, differ),
+        notes=_notes(study, designs, differ),
     )
-    return sweep_page(studied, picked, account)
+    return sweep_page(designs, picked, account)
 
 
 def _again(
-    study: StudyFolder, studied: Studied, picked: Sequence[Picked]
+    study: StudyFolder, designs: DesignTable, picked: Sequence[Picked]
 ) -> tuple[dict[int, xr.Dataset], dict[int, str], list[int]]:
     """The picked runs, why some cannot be made, and which come out otherwise than their rows say."""
     if not picked:
         return {}, {}, []
     compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism)
-    table = studied.table
 
     stop = threading.Event()
 
@@ -96,13 +95,13 @@ def _again(
     def again(row: int) -> tuple[xr.Dataset, bool] | str:
         if stop.is_set():
             raise Abandoned
-        values, path, mode = studied.values(row), str(table.path[row]), str(table.mode[row])
+        values, path, mode = designs.values(row), str(designs.path[row]), str(designs.mode[row])
         try:
             data, metrics = run_again(study.setting, values, path, mode, watch)
         except ParaflexError as error:
             return " ".join(str(error).split())
-        told = {name: table.metrics[name][row] for name in metrics if name in table.metrics}
-        return data, all(np.isclose(metrics[name], told[name], rtol=_SAME, equal_nan=True) for name in told)
+        rows = {name: designs.metrics[name][row] for name in metrics if name in designs.metrics}
+        return data, all(np.isclose(metrics[name], rows[name], rtol=_SAME, equal_nan=True) for name in rows)
 
     rows = [one.row for one in picked]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -118,10 +117,10 @@ def _again(
     return runs, failed, differ
 
 
-def _parameters(study: StudyFolder, studied: Studied) -> dict[str, VariedParameter]:
+def _parameters(study: StudyFolder, designs: DesignTable) -> dict[str, VariedParameter]:
     out = {}
     for name, places in zip(study.setting.names, study.setting.places, strict=True):
-        values = studied.table.parameters[name]
+        values = designs.parameters[name]
         low, high, spread = study.ranges.get(name, (float(values.min()), float(values.max()), study.sampling))
         units = {unit_of(place) for place in places}
         fields = tuple(".".join(map(str, place)) for place in places)
@@ -142,17 +141,17 @@ def _facts(study: StudyFolder, found: Mapping[str, Any]) -> list[tuple[str, str]
     return facts + [(name, study.versions[name]) for name in ("paraflex", "numba", "numpy") if name in study.versions]
 
 
-def _notes(study: StudyFolder, studied: Studied, differ: Sequence[int]) -> list[str]:
+def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> list[str]:
     notes = []
-    if not studied.table.complete.any():
+    if not designs.complete.any():
         notes.append("No run is complete: there is nothing to draw. The reasons stand below.")
     notes += doubt_lines(study.setting.verdict())
-    beyond = int(np.sum(studied.table.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
+    beyond = int(np.sum(designs.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
     if beyond:
         notes.append(f"{beyond_limits(beyond)}.")
     if differ:
         why = "" if study.same_versions else " The versions of the packages are not those of the study."
-        names = ", ".join(studied.label(row) for row in differ)
+        names = ", ".join(designs.label(row) for row in differ)
         notes.append(f"Simulated again, these runs come out otherwise than the table says: {names}.{why}")
     return notes
 
@@ -174,16 +173,16 @@ def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool
     return [tuple(step) for step in steps if len(step) == 3]
 
 
-def _searched(studied: Studied, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:
+def _searched(designs: DesignTable, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:
     """The runs of the design that a search found and of its start, and some of the best by single metrics."""
     out: dict[int, list[str]] = {}
     for key, why in (("values", "what was sought"), ("start", "the start")):
         design = found.get(key) or {}
-        if set(design) != set(studied.table.parameters) or not design:
+        if set(design) != set(designs.parameters) or not design:
             continue
-        alike = studied.table.complete.copy()
+        alike = designs.complete.copy()
         for name, value in design.items():
-            alike &= studied.table.parameters[name] == value
+            alike &= designs.parameters[name] == value
         for row in np.flatnonzero(alike)[:3]:
             out.setdefault(int(row), []).append(why)
     for row, why in picked:
