@@ -1,6 +1,7 @@
 """What the page on extending says is done in a copy of the package, and gives what the page says."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -9,6 +10,8 @@ from pathlib import Path
 import paraflex
 from pages import apply_diff, blocks_of, check_output
 
+# The first line of a definition by name, or the line between two additions.
+DEFINED = re.compile(r" (?:class |def |\w+(?:: .*)? = ).*[([{:]$|@@$")
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 
 
@@ -20,6 +23,8 @@ def test_a_mechanism_a_scheme_a_metric_a_family_of_studies_and_a_joint_are_added
         file = package / block.title if block.title else None
         if block.language == "diff":
             assert file is not None
+            # Neighbours would go astray with the next name that is added.
+            assert all(DEFINED.match(line) for line in block.text.splitlines() if line[0] != "+")
             apply_diff(file, block.text)
         elif file is not None:
             assert not file.exists()
@@ -28,7 +33,7 @@ def test_a_mechanism_a_scheme_a_metric_a_family_of_studies_and_a_joint_are_added
             check_output(block.text, printed)
         else:
             printed, ran = run(block, tmp_path), ran + 1
-    assert ran == 6
+    assert ran == 9
 
 
 def run(block, folder):

@@ -307,8 +307,8 @@ def test_a_phase_given_moves_the_assembly():
     [
         (Gear("mesh", "A", "C", 2.0), "gear.mesh.joints: unknown joint .got 'C'."),
         (Gear("mesh", "A", "A", 2.0), "gear.mesh.joints: a gear needs two different joints"),
-        (Gear("mesh", "A", "B", 0.0), "gear.mesh.ratio: a gear's ratio must not be zero"),
-        (Gear("mesh", "A", "B", np.inf), "gear.mesh.ratio: not a finite number"),
+        (Gear("mesh", "A", "B", 0.0), "gear.mesh.ratio: must be a finite number other than zero .got 0.0"),
+        (Gear("mesh", "A", "B", np.inf), "gear.mesh.ratio: must be a finite number other than zero .got inf"),
         (Gear("mesh", "A", "B", 1.0, np.nan), "gear.mesh.phase: not a finite number"),
         (Gear("me.sh", "A", "B", 1.0), "gear: not usable as a name"),
     ],

@@ -310,7 +310,7 @@ def test_a_model_file_may_have_all_of_them(tmp_path):
         ('point = "link4.C"', 'point = "link4.D"', "load.push.point: unknown point (got 'link4.D')"),
         ('point = "link4.C"', 'point = "ground.A1"', "load.push.point: the ground does not move"),
         ('"link4.C"]', '"link9.C"]', "linear_spring.rope.points: unknown body (got 'link9')"),
-        ('"link4.C"]', '"ground.A2"]', "linear_spring.rope.points: a spring needs two different bodies"),
+        ('"link4.C"]', '"ground.A2"]', "linear_spring.rope.points: a spring between points needs two different bodies"),
         ("stiffness = 50.0", "stiffness = -50.0", "linear_spring.rope.stiffness: must not be negative"),
         ("force = [1.0, 2.0]", "force = [1.0]", "load.push"),
         ('type = "torque"', 'type = "moment"', "load.twist"),

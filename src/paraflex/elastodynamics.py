@@ -34,7 +34,7 @@ from paraflex.integrators.linear_structure import Block, Response, march
 from paraflex.integrators.newmark import NewmarkNumbers
 from paraflex.kernel.bodies import motion_forces, system_energy
 from paraflex.kernel.packed import make_scratch
-from paraflex.mechanism import ActuationMode, Geometry
+from paraflex.mechanism import ActuationMode, Geometry, grouped
 from paraflex.simulate import TrackingRun, TrackingTask
 
 # A sample spacing may be this much longer than a whole number of steps: rounding of the division.
@@ -144,18 +144,15 @@ def simulate_ked(
 
 def _check(task: TrackingTask, step: float, spectral_radius: float) -> None:
     mechanism = task.mechanism
-    groups = {
-        "spring": mechanism.springs,
-        "linear spring": mechanism.linear_springs,
-        "damper": mechanism.dampers,
-        "friction law": mechanism.frictions,
-        "damped beam": [body for body in mechanism.bodies if getattr(body, "damping", None) is not None],
-    }
-    for kind, members in groups.items():
+    beyond = {(group.table, group.words): members for group, members in grouped(mechanism) if group.resists}
+    beyond["damped beam", "damped beams"] = tuple(
+        body for body in mechanism.bodies if getattr(body, "damping", None) is not None
+    )
+    for (field, words), members in beyond.items():
         for member in members:
             raise InputError(
-                f"kineto-elastodynamics does not account for {kind}s",
-                field=kind,
+                f"kineto-elastodynamics does not account for {words}",
+                field=field,
                 value=member.name,
                 remedy="leave it out; of finite segments use the task they were cut from",
             )

@@ -12,7 +12,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.state import point_position
 from paraflex.findings import Finding
-from paraflex.mechanism import AxisJoint, Mechanism
+from paraflex.mechanism import Mechanism
 from paraflex.mechanism.joints import GROUND, PointRef
 from paraflex.validity.numbers import mechanism_size
 
@@ -31,7 +31,7 @@ def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
     known = [*ground, *(PointRef(body.name, name) for body in mechanism.bodies for name in body.points)]
     direct = {frozenset((one.a.body, one.b.body)) for one in mechanism.joints}
     # An assembly by angles leaves their travels open.
-    sliding = {end.body for joint in mechanism.joints if isinstance(joint, AxisJoint) for end in (joint.a, joint.b)}
+    sliding = {end.body for joint in mechanism.joints if joint.slides for end in (joint.a, joint.b)}
     sliding.discard(GROUND)
     reported: set[PointRef] = set()
     size = mechanism_size(mechanism)
@@ -54,10 +54,7 @@ def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
 
 def _unused(mechanism: Mechanism) -> list[PointRef]:
     """Points of bodies that no joint, spring, load, lump or end-effector names."""
-    used = {point for one in (*mechanism.joints, *mechanism.linear_springs) for point in (one.a, one.b)}
-    used |= {load.point for load in mechanism.loads}
-    if mechanism.end_effector is not None:
-        used.add(mechanism.end_effector.point)
+    used = mechanism.points_used
     named = [PointRef(body.name, name) for body in mechanism.bodies for name in body.points]
     return [point for point in named if point not in used]
 

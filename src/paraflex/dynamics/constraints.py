@@ -11,15 +11,10 @@ import scipy
 
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
 from paraflex.mechanism import (
-    AxisJoint,
     Gear,
     Joint,
     Mechanism,
-    PointJoint,
     PointRef,
-    PrismaticJoint,
-    SlidingJoint,
-    WeldJoint,
 )
 
 
@@ -91,33 +86,31 @@ class Constraint:
 def _joint_constraints(joint: Joint) -> list[Constraint]:
     """What a joint holds."""
     name, a, b = joint.name, joint.a, joint.b
-    parts = []
-    if isinstance(joint, PointJoint):
-        parts.append(Constraint(name, (Term(name, POINT, a, b),), (f"{name} x", f"{name} y")))
-    if isinstance(joint, AxisJoint):
-        normal, carrier = joint.direction + 0.5 * np.pi, "track" if isinstance(joint, SlidingJoint) else "material"
-        term = Term(name, AXIS, a, b, direction=normal, carrier=carrier)
-        parts.append(Constraint(name, (term,), (f"{name} normal",)))
-    if isinstance(joint, PrismaticJoint | WeldJoint):
-        parts.append(Constraint(name, (Term(name, ANGLE, a, b),), (f"{name} angle",), rest=joint.angle))
-    return parts
+    normal, carrier = joint.direction + 0.5 * np.pi, "track" if joint.follows_beam else "material"
+    axis = Term(name, AXIS, a, b, direction=normal, carrier=carrier)
+    parts = {
+        "points": Constraint(name, (Term(name, POINT, a, b),), (f"{name} x", f"{name} y")),
+        "axis": Constraint(name, (axis,), (f"{name} normal",)),
+        "angle": Constraint(name, (Term(name, ANGLE, a, b),), (f"{name} angle",), rest=joint.angle),
+    }
+    return [parts[held] for held in joint.holds]
 
 
-def axis_of(joint: AxisJoint) -> dict[str, Any]:
+def axis_of(joint: Joint) -> dict[str, Any]:
     """Direction and carrier of the axis that a joint's travel is measured on."""
-    return {"direction": joint.direction, "carrier": "frame" if isinstance(joint, SlidingJoint) else "material"}
+    return {"direction": joint.direction, "carrier": "frame" if joint.follows_beam else "material"}
 
 
 def _coordinate(joint: Joint, weight: float = 1.0) -> Term:
     """A joint's coordinate times a weight."""
-    if isinstance(joint, AxisJoint):
+    if joint.slides:
         return Term(joint.name, AXIS, joint.a, joint.b, weight, **axis_of(joint))
     return Term(joint.name, ANGLE, joint.a, joint.b, weight)
 
 
 def _what(joint: Joint) -> str:
     """What a joint's coordinate is."""
-    return "travel" if isinstance(joint, AxisJoint) else "angle"
+    return "travel" if joint.slides else "angle"
 
 
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
@@ -152,6 +145,11 @@ def _gear_constraint(mechanism: Mechanism, gear: Gear) -> Constraint:
     assert gear.phase is not None
     terms = (_coordinate(second), _coordinate(first, -gear.ratio))
     return Constraint(gear.name, terms, (f"{gear.name} {_what(second)}",), rest=gear.phase)
+
+
+def constraint_count(mechanism: Mechanism) -> int:
+    """How many constraints joints, prescribed motions and gears are, redundant ones included."""
+    return sum(len(one.labels) for one in _constraints(mechanism) if one.row == CONSTRAINT)
 
 
 def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:

@@ -35,14 +35,11 @@ from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
 from paraflex.fem.eigen import eigenpairs
 from paraflex.mechanism import (
     GROUND,
-    AxisJoint,
     Damping,
     Joint,
     Mechanism,
     PointRef,
-    PrismaticJoint,
     RigidBody,
-    WeldJoint,
     stiffness_proportional,
 )
 
@@ -140,16 +137,15 @@ def _conditions(
             if here.body != name or GROUND not in mechanism.reached(there.body, past=name):
                 continue
             marker = make_marker(mechanism, bodies, index, here)
-            if isinstance(joint, PrismaticJoint | WeldJoint) or (
-                joint.name in driven and not isinstance(joint, AxisJoint)
-            ):
+            turns_with, along_itself = "angle" in joint.holds, _along_itself(joint, here)
+            if turns_with or (joint.name in driven and not joint.slides):
                 yield _slope(marker)
-            if not isinstance(joint, AxisJoint) or (joint.name in driven and not _along_itself(joint, here)):
+            if "points" in joint.holds or (joint.slides and joint.name in driven and not along_itself):
                 pinned.append(marker)
-            elif isinstance(joint, PrismaticJoint):
+            elif joint.slides and turns_with:
                 angle = joint.direction if here is joint.a else joint.direction - joint.angle
                 yield np.array([-np.sin(angle), np.cos(angle)]) @ _place(marker)
-            elif not _along_itself(joint, here):
+            elif joint.slides and not along_itself:
                 across.append(marker)
     pinned.sort(key=lambda marker: np.real(marker.x0).tolist())
     if pinned:
@@ -163,7 +159,7 @@ def _conditions(
 
 def _along_itself(joint: Joint, here: PointRef) -> bool:
     """Whether a joint slides along the body of this point."""
-    return isinstance(joint, AxisJoint) and not isinstance(joint, PrismaticJoint) and here is joint.a
+    return joint.slides and "angle" not in joint.holds and here is joint.a
 
 
 def _place(marker: Marker) -> NDArray:

@@ -9,7 +9,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
 from paraflex.dynamics.system import System
-from paraflex.mechanism import AxisJoint, PointRef, SlidingJoint
+from paraflex.mechanism import Joint, PointRef
 
 
 class JointCoordinate(NamedTuple):
@@ -27,7 +27,7 @@ def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None
     """
     joint = system.mechanism.joint(name)
     v = np.zeros_like(q) if v is None else v
-    if not isinstance(joint, AxisJoint):
+    if not joint.slides:
         value_a, rows_a = _angle(system, joint.a, q)
         value_b, rows_b = _angle(system, joint.b, q)
         rows = rows_b - rows_a
@@ -49,13 +49,13 @@ def place_along_beam(system: System, name: str, q: Array) -> Array:
     return joint_coordinate(system, name, q).value + system.marker(joint.a).x0[0]
 
 
-def axis_marker(system: System, joint: AxisJoint) -> Marker:
+def axis_marker(system: System, joint: Joint) -> Marker:
     """What carries a joint's axis: the material at point a, of a sliding joint the body's frame there."""
     marker = system.marker(joint.a)
-    return marker.on_frame if isinstance(joint, SlidingJoint) else marker
+    return marker.on_frame if joint.follows_beam else marker
 
 
-def axis_angle(system: System, joint: AxisJoint, q: Array) -> Array:
+def axis_angle(system: System, joint: Joint, q: Array) -> Array:
     """Angle (k,) of a joint's axis in the ground frame [rad]."""
     return _marker_angle(system, axis_marker(system, joint), q)[0] + joint.direction
 

@@ -31,7 +31,6 @@ from paraflex.kernel.packed import (
 from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
 from paraflex.mechanism import (
-    AxisJoint,
     Joint,
     Load,
     Mechanism,
@@ -194,7 +193,7 @@ class _Packer:
         return len(self.axes) - 1
 
     def add_motor(self, joint: Joint, signal: int) -> None:
-        if isinstance(joint, AxisJoint):
+        if joint.slides:
             self.add_axis(joint.a, joint.b, signal=signal, **axis_of(joint))
             return
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):

@@ -16,12 +16,11 @@ from paraflex.dynamics.coordinates import BodyCoordinates
 from paraflex.dynamics.system import System
 from paraflex.mechanism import (
     AppliedTorque,
-    AxisJoint,
     Mechanism,
     PointRef,
-    PrismaticJoint,
     RigidBody,
-    WeldJoint,
+    grouped,
+    joints_named,
 )
 
 # A smaller part of a turn is not worth a word.
@@ -76,23 +75,18 @@ def _missed(body: BodyCoordinates, system: System, point: PointRef) -> float:
 
 def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
     """Points of bodies at which joints or loads bring in moments, and what does so."""
-    groups = {
-        "prescribed motion": mechanism.prescribed,
-        "motor": mechanism.motors,
-        "spring": mechanism.springs,
-        "damper": mechanism.dampers,
-        "friction": mechanism.frictions,
-    }
-    pins = [
-        (f"the {kind} {one.name}", mechanism.joint(one.joint)) for kind, members in groups.items() for one in members
-    ]
     causes = [
-        (f"the {'weld' if isinstance(joint, WeldJoint) else 'rail'} {joint.name}", joint)
+        (f"the {'rail' if joint.slides else joint.kind} {joint.name}", joint)
         for joint in mechanism.joints
-        if isinstance(joint, WeldJoint | PrismaticJoint)
+        if "angle" in joint.holds
     ]
-    pins += [(f"the gear {gear.name}", mechanism.joint(name)) for gear in mechanism.gears for name in gear.joints]
-    causes += [(cause, joint) for cause, joint in pins if not isinstance(joint, AxisJoint)]
+    causes += [
+        (f"the {group.word} {one.name}", joint)
+        for group, members in grouped(mechanism)
+        for one in members
+        for _, name in joints_named(one)
+        if not (joint := mechanism.joint(name)).slides
+    ]
     for cause, joint in causes:
         for point in (joint.a, joint.b):
             if not point.on_ground:

@@ -28,7 +28,7 @@ from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import Signals
-from paraflex.mechanism import GROUND, Assembly, PointJoint, PointRef
+from paraflex.mechanism import GROUND, Assembly, PointRef
 from paraflex.mechanism.poses import approximate_poses
 
 # Where Newton's iteration fails, a damped one goes downhill to the smallest gap: how it begins and ends.
@@ -87,7 +87,7 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
     # first of the mechanism comes first: a gap is left where the last joints close the loops.
     joints: dict[str, list[tuple[bool, int]]] = {body.name: [] for body in system.bodies} | {GROUND: []}
     for number, joint in enumerate(system.mechanism.joints):
-        entry = (not isinstance(joint, PointJoint), number)
+        entry = ("points" not in joint.holds, number)
         joints[joint.a.body].append(entry)
         joints[joint.b.body].append(entry)
     if not joints[GROUND] and not placed:

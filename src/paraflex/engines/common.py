@@ -10,7 +10,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError
-from paraflex.mechanism import FlexibleBeam, Mechanism, RevoluteJoint, given_shapes
+from paraflex.mechanism import FlexibleBeam, Mechanism, given_shapes, grouped
 from paraflex.simulate import TrackingTask
 
 # Names of the engines as users and Python's packages know them, and in print.
@@ -41,15 +41,14 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam)]
     beyond = {
         "a flexible body of given shapes": [f"body.{body}" for body in given_shapes(mechanism.bodies)],
-        "a prescribed angle": [f"prescribed.{one.name}" for one in mechanism.prescribed],
         "a joint that is not revolute": [
-            f"joint.{joint.name}" for joint in mechanism.joints if not isinstance(joint, RevoluteJoint)
+            f"joint.{joint.name}" for joint in mechanism.joints if joint.holds != ("points",)
         ],
-        "a damper": [f"damper.{one.name}" for one in mechanism.dampers],
-        "dry friction": [f"friction.{one.name}" for one in mechanism.frictions],
         "structural damping": [f"body.{beam.name}.damping" for beam in beams if beam.damping is not None],
-        "a spring between points": [f"linear_spring.{one.name}" for one in mechanism.linear_springs],
-        "a load": [f"load.{one.name}" for one in mechanism.loads],
+    } | {
+        f"a {group.word}": [f"{group.table}.{one.name}" for one in members]
+        for group, members in grouped(mechanism)
+        if not group.engines
     }
     for what, fields in beyond.items():
         if fields:

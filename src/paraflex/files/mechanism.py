@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import MISSING, fields
+from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.files.bodies import read_body
@@ -10,50 +11,29 @@ from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import quantities, read_law
 from paraflex.files.schema import (
     AssemblyTable,
-    ForceTable,
-    GearTable,
     JointTable,
-    LinearSpringTable,
     ModelTable,
     PathTable,
     PrescribedTable,
-    TorqueTable,
 )
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
+    JOINT_KINDS,
     ActuationMode,
-    AppliedTorque,
     Assembly,
-    AxisJoint,
     EndEffector,
-    Gear,
     Geometry,
+    Group,
     Joint,
-    JointFriction,
-    LinearSpring,
-    Load,
     Mechanism,
     Motor,
-    PointForce,
     PointRef,
     PrescribedAngle,
-    PrismaticJoint,
     RevoluteJoint,
-    SlidingJoint,
-    SlotJoint,
-    TorsionalDamper,
-    TorsionalSpring,
-    WeldJoint,
+    groups_of,
 )
 
-# What joints and paths are called in files.
-JOINTS = {
-    "revolute": RevoluteJoint,
-    "prismatic": PrismaticJoint,
-    "slot": SlotJoint,
-    "sliding": SlidingJoint,
-    "weld": WeldJoint,
-}
+# What paths are called in files.
 PATHS = {"polygon": Polygon, "line": Line, "circle": Circle, "points": PointPath}
 
 
@@ -75,12 +55,11 @@ def read_mechanism(table: ModelTable) -> Mechanism:
         joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
         motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
         prescribed=_prescribed(table),
-        springs=tuple(TorsionalSpring(name, **dict(entry)) for name, entry in table.spring.items()),
-        dampers=tuple(TorsionalDamper(name, **dict(entry)) for name, entry in table.damper.items()),
-        frictions=tuple(JointFriction(name, **dict(entry)) for name, entry in table.friction.items()),
-        linear_springs=tuple(_linear_spring(name, entry) for name, entry in table.linear_spring.items()),
-        gears=tuple(_gear(name, entry) for name, entry in table.gear.items()),
-        loads=tuple(_load(name, load) for name, load in table.load.items()),
+        **{
+            field: tuple(_member(group, name, dict(entry)) for name, entry in getattr(table, group.table).items())
+            for field, group in groups_of(Mechanism).items()
+            if group.kinds
+        },
         gravity=(table.gravity[0], table.gravity[1]),
         end_effector=None
         if effector is None
@@ -96,13 +75,18 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
     if isinstance(entry, list):
         return RevoluteJoint(name, a, b)
     # A field of another kind of joint would be read and not obeyed.
-    kind = JOINTS[entry.type]
-    given = {key: getattr(entry, key) for key in ("direction", "angle", "at_end") if key in entry.model_fields_set}
+    kind = JOINT_KINDS[entry.type]
+    given = {key: getattr(entry, key) for key in entry.model_fields_set - {"type", "points"}}
+    own = {each.name: each for each in fields(kind)[3:]}
     for key, value in given.items():
-        if key not in {field.name for field in fields(kind)}:
+        if key not in own:
             raise InputError(
                 f"a {entry.type} joint has no {key}", field=f"joint.{name}.{key}", value=value, remedy="leave it out"
             )
+    for key, each in own.items():
+        if each.default is MISSING and key not in given:
+            remedy = f"give {each.metadata.get('description', 'it')}"
+            raise InputError("is missing", field=f"joint.{name}.{key}", remedy=remedy)
     return kind(name, a, b, **given)
 
 
@@ -121,10 +105,9 @@ def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
 
 def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointTable | None) -> None:
     """A joint that turns has an angle, one that slides a displacement."""
-    slides = isinstance(joint, JointTable) and issubclass(JOINTS[joint.type], AxisJoint)
-    wrong, right = ("angle", "displacement") if slides else ("displacement", "angle")
+    kind = joint.type if isinstance(joint, JointTable) else "revolute"
+    wrong, right = ("angle", "displacement") if JOINT_KINDS[kind].slides else ("displacement", "angle")
     if joint is not None and wrong in quantities(entry):
-        kind = joint.type if isinstance(joint, JointTable) else "revolute"
         raise InputError(
             f"a {kind} joint has no {wrong}", field=f"prescribed.{name}.{wrong}", value=entry.joint,
             remedy=f"give its {right}",
@@ -137,21 +120,12 @@ def _assembly(name: str, entry: AssemblyTable) -> Assembly:
     return Assembly(name, entry.angles, points)
 
 
-def _linear_spring(name: str, entry: LinearSpringTable) -> LinearSpring:
-    a, b = (PointRef.parse(point, f"linear_spring.{name}.points") for point in entry.points)
-    return LinearSpring(name, a, b, entry.stiffness, entry.length, entry.damping)
-
-
-def _gear(name: str, entry: GearTable) -> Gear:
-    first, second = entry.joints
-    return Gear(name, first, second, entry.ratio, entry.phase)
-
-
-def _load(name: str, load: ForceTable | TorqueTable) -> Load:
-    point = PointRef.parse(load.point, f"load.{name}.point")
-    if isinstance(load, TorqueTable):
-        return AppliedTorque(name, point, load.torque)
-    return PointForce(name, point, (load.force[0], load.force[1]))
+def _member(group: Group, name: str, said: dict[str, Any]) -> Any:
+    """A member of a group from its table."""
+    kinds = {getattr(kind, "kind", None): kind for kind in group.kinds}
+    kind = kinds[said.pop("type")] if "type" in said else group.kinds[0]
+    points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in said.pop("points", ())]
+    return kind(name, *points, *said.pop("joints", ()), **said)
 
 
 def read_path(table: PathTable) -> Path:

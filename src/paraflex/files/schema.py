@@ -7,12 +7,29 @@ checked once, in `mechanism.checks` and by the paths themselves.
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Any, Literal
+from collections.abc import Sequence
+from dataclasses import MISSING, fields
+from enum import Enum
+from functools import reduce
+from operator import or_
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    create_model,
+)
 from pydantic_core import PydanticCustomError
 
 from paraflex.files.expressions import ExpressionError, check_in_time, evaluate
+from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
+from paraflex.mechanism.quantities import joint_pair
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -64,6 +81,69 @@ Rows = Annotated[list[Pair], BeforeValidator(lambda value: value, json_schema_in
 
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+TwoPoints = TwoJoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
+Yes = Annotated[bool, Field(strict=True)]
+# How files write what a field of a member is.
+_WRITTEN: dict[Any, Any] = {
+    float: Number, int: Count, str: Text, bool: Yes, PointRef: Text, tuple[float, float]: Pair, NoneType: NoneType,
+}  # fmt: skip
+
+
+def _written(hint: Any) -> Any:
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return Literal[tuple(member.value for member in hint)]
+    if get_origin(hint) is tuple and get_args(hint)[1:] == (...,):
+        return list[_written(get_args(hint)[0])]
+    if isinstance(hint, UnionType):
+        return reduce(or_, map(_written, get_args(hint)))
+    return _WRITTEN[hint]
+
+
+def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
+    """Fields of the table of a member from those of its class, needed or not; two points or joints stand together."""
+    hints, found = get_type_hints(member), {}
+    together = ["name"]
+    if hints.get("a") is PointRef:
+        found["points"] = (TwoPoints, Field(description='["body.point", "body.point"]'))
+        together += ["a", "b"]
+    if joints := joint_pair(member):
+        found["joints"] = (TwoJoints, Field(description='["first joint", "second joint"]'))
+        together += joints
+    for each in fields(member):
+        if each.name not in together:
+            missing = ... if needed else None
+            default = missing if each.default is MISSING else getattr(each.default, "value", each.default)
+            description = each.metadata.get("description", f"its {each.name}")
+            found[each.name] = (_written(hints[each.name]), Field(default, description=description))
+    return found
+
+
+def _choice(words: Sequence[str], known: Sequence[str]) -> Any:
+    """The field `type` that is one of some words, of all that are known."""
+    quoted = [f'"{word}"' for word in known]
+    return Literal[tuple(words)], Field(description=f"{', '.join(quoted[:-1])} or {quoted[-1]}")
+
+
+def _member_table(members: Sequence[Any]) -> Any:
+    """The table of a member that is of one of some classes."""
+    tables = []
+    for one in members:
+        said = _fields_of(one)
+        if len(members) > 1:
+            said = {"type": _choice([one.kind], [each.kind for each in members])} | said
+        about = one.__doc__.partition("\n\n")[0]
+        tables.append(create_model(f"{one.__name__}Table", __base__=_Table, __doc__=about, **said))
+    return tables[0] if len(tables) == 1 else Annotated[reduce(or_, tables), Field(discriminator="type")]
+
+
+def _joint_table() -> Any:
+    """The table of a joint of any kind, with the fields of all: what one needs others do not have."""
+    found = {"type": _choice(list(JOINT_KINDS), list(JOINT_KINDS))}
+    for kind in JOINT_KINDS.values():
+        found = found | {name: one for name, one in _fields_of(kind, needed=False).items() if name not in found}
+    return create_model("JointTable", __base__=_Table, __doc__="A joint of any kind between two points.", **found)
 
 
 class SectionTable(_Table):
@@ -133,7 +213,7 @@ class BeamTable(_Table):
     )
     modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
     damping: DampingTable | None = Field(default=None, description="a damping table")
-    flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid beam")
+    flexible: Yes = Field(default=True, description="false for a rigid beam")
 
 
 class RigidTable(_Table):
@@ -146,24 +226,15 @@ class RigidTable(_Table):
     points: dict[str, Pair] = Field(default={}, description="[x, y] of each named point in the body frame in m")
 
 
-TwoPoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
-TwoJoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
+if TYPE_CHECKING:
 
+    class JointTable(_Table):
+        """What all joints have."""
 
-class JointTable(_Table):
-    """A joint of any kind between two points."""
-
-    type: Literal["revolute", "prismatic", "slot", "sliding", "weld"] = Field(
-        description='"revolute", "prismatic", "slot", "sliding" or "weld"'
-    )
-    points: TwoPoints = Field(description='["body.point", "body.point"]')
-    direction: Number = Field(default=0.0, description="the angle of its axis against the first body in rad")
-    angle: Number = Field(default=0.0, description="the angle of the second body against the first in rad")
-    at_end: Literal["error", "stop", "warn", "ignore"] = Field(
-        default="error",
-        description='where a sliding point comes to the end of its beam: "error", "stop", "warn" or "ignore"',
-    )
-
+        type: str
+        points: list[str]
+else:
+    JointTable = _joint_table()
 
 # A revolute joint may be written as its two points alone. Tags are such that errors do not show them.
 JointEntry = Annotated[
@@ -187,7 +258,7 @@ class AssumedModesTable(_Table):
     lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
     modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
     damping: DampingTable | None = Field(default=None, description="a damping table")
-    flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid bar")
+    flexible: Yes = Field(default=True, description="false for a rigid bar")
 
 
 class ModalPointTable(_Table):
@@ -215,7 +286,7 @@ class ModalTable(_Table):
     points: dict[str, ModalPointTable] = Field(default={}, description="position, shape and slope of each named point")
     modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
     damping: DampingTable | None = Field(default=None, description="a damping table")
-    flexible: Annotated[bool, Field(strict=True)] = Field(default=True, description="false for a rigid body")
+    flexible: Yes = Field(default=True, description="false for a rigid body")
 
 
 class PieceTable(_Table):
@@ -245,68 +316,6 @@ class PrescribedTable(_Table):
     table: Rows | None = Field(
         default=None, description="a list of [t, value] in s and rad or m, or the name of a file with two such columns"
     )
-
-
-class SpringTable(_Table):
-    """A torsional spring at a joint."""
-
-    joint: Text = Field(description="the name of a joint")
-    stiffness: Number = Field(description="the stiffness in N m/rad")
-    rest: Number = Field(default=0.0, description="the joint's angle at which the spring is free in rad")
-
-
-class FrictionTable(_Table):
-    """Dry friction at a joint, regularised: -limit tanh(rate / speed)."""
-
-    joint: Text = Field(description="the name of a joint")
-    limit: Number = Field(description="the friction torque in N m, or force in N")
-    speed: Number = Field(description="the speed below which it acts as a damper in rad/s or m/s")
-
-
-class DamperTable(_Table):
-    """A torsional damper at a joint."""
-
-    joint: Text = Field(description="the name of a joint")
-    coefficient: Number = Field(description="the coefficient in N m s/rad")
-
-
-class LinearSpringTable(_Table):
-    """A spring and damper between two points."""
-
-    points: TwoPoints = Field(description='["body.point", "body.point"]')
-    stiffness: Number = Field(description="the stiffness in N/m")
-    length: Number = Field(default=0.0, description="the free length in m")
-    damping: Number = Field(default=0.0, description="the damping in N s/m")
-
-
-class GearTable(_Table):
-    """The coordinate of a second joint in a constant ratio to that of a first."""
-
-    joints: TwoJoints = Field(description='["first joint", "second joint"]')
-    ratio: Number = Field(
-        description="of the second joint's angle to the first's: negative where wheels mesh outside; m/rad for a rack"
-    )
-    phase: Number | None = Field(
-        default=None,
-        description="coordinate of the second joint where that of the first is zero in rad or m; as the first assembly "
-        "stands by default",
-    )
-
-
-class ForceTable(_Table):
-    """A constant force."""
-
-    type: Literal["force"] = Field(description='"force" or "torque"')
-    point: Text = Field(description='"body.point"')
-    force: Pair = Field(description="[x, y] in the ground frame in N")
-
-
-class TorqueTable(_Table):
-    """A constant torque."""
-
-    type: Literal["torque"] = Field(description='"force" or "torque"')
-    point: Text = Field(description='"body.point"')
-    torque: Number = Field(description="the torque in N m")
 
 
 class AssemblyTable(BaseModel):
@@ -373,7 +382,7 @@ class PolygonTable(_Table):
     type: Literal["polygon"]
     corners: list[Pair] = Field(description="a list of [x, y] in m")
     max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
-    closed: Annotated[bool, Field(strict=True)] = Field(default=True, description="whether the path returns to start")
+    closed: Yes = Field(default=True, description="whether the path returns to start")
 
 
 class LineTable(_Table):
@@ -434,9 +443,7 @@ class StudyDefaultsTable(_Table):
     )
 
 
-class ModelTable(_Table):
-    """A model file."""
-
+class _Parts(_Table):
     name: Text = Field(description="a name for the mechanism")
     description: Text = Field(default="", description="a sentence or two")
     geometry: Literal["linear", "second-order"] = Field(
@@ -463,19 +470,24 @@ class ModelTable(_Table):
     )
     motor: dict[str, Text] = Field(default={}, description="the joint of each motor")
     prescribed: dict[str, PrescribedTable] = {}
-    spring: dict[str, SpringTable] = {}
-    damper: dict[str, DamperTable] = {}
-    friction: dict[str, FrictionTable] = {}
-    linear_spring: dict[str, LinearSpringTable] = {}
-    gear: dict[str, GearTable] = {}
-    load: dict[str, Annotated[ForceTable | TorqueTable, Field(discriminator="type")]] = {}
+
+
+_GROUPS: dict[str, Any] = {
+    one.table: (dict[str, _member_table(one.kinds)], {}) for one in groups_of(Mechanism).values() if one.kinds
+}
+_WithGroups = create_model("_WithGroups", __base__=_Parts, **_GROUPS)
+
+
+class ModelTable(_WithGroups):
+    """A model file."""
+
     gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
     end_effector: EndEffectorTable | None = None
     assembly: dict[str, AssemblyTable] = Field(
         default={}, description="approximate angles of all bodies in rad for each assembly, or places of points in m"
     )
     mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
-    path: dict[str, PathTable] = {}
+    path: dict[str, PathTable] = Field(default={})
     start: StartTable | None = None
     study: StudyDefaultsTable = StudyDefaultsTable()
 

@@ -11,29 +11,28 @@ from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.files.laws import law_parameters, law_table
-from paraflex.files.mechanism import JOINTS, PATHS
+from paraflex.files.mechanism import PATHS
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path
 from paraflex.mechanism import (
     Assembly,
     AssumedModesBeam,
-    AxisJoint,
     Body,
     FlexibleBeam,
     Joint,
     Mechanism,
     ModalBody,
-    PointForce,
     PointRef,
     Polynomial,
     PrescribedAngle,
-    RevoluteJoint,
     RigidBody,
     Section,
     ShapeFunction,
     Sine,
     Start,
+    grouped,
 )
+from paraflex.mechanism.quantities import joint_pair
 
 _BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
 # What all beams of a file may have in common at its top, and what they have where it says nothing.
@@ -99,19 +98,18 @@ def model_tables(
 
 def _forces(mechanism: Mechanism) -> dict[str, Any]:
     """Springs, dampers, friction and loads."""
-    at_joints = {"spring": mechanism.springs, "damper": mechanism.dampers, "friction": mechanism.frictions}
-    return {kind: {one.name: _fields(one, "name") for one in members} for kind, members in at_joints.items()} | {
-        "linear_spring": {
-            one.name: {"points": [one.a, one.b]} | _fields(one, "name", "a", "b") for one in mechanism.linear_springs
-        },
-        "gear": {
-            gear.name: {"joints": gear.joints, "ratio": gear.ratio, "phase": gear.phase} for gear in mechanism.gears
-        },
-        "load": {
-            one.name: {"type": "force" if isinstance(one, PointForce) else "torque"} | _fields(one, "name")
-            for one in mechanism.loads
-        },
+    return {
+        group.table: {one.name: ({"type": one.kind} if len(group.kinds) > 1 else {}) | _member(one) for one in members}
+        for group, members in grouped(mechanism)
+        if group.kinds
     }
+
+
+def _member(member: Any) -> dict[str, Any]:
+    """The fields of a member; its points a and b together, and so two joints."""
+    together = {"points": ["a", "b"] if hasattr(member, "a") else [], "joints": joint_pair(member)}
+    pairs = {key: [getattr(member, name) for name in names] for key, names in together.items() if names}
+    return pairs | _fields(member, "name", *(name for names in together.values() for name in names))
 
 
 def _fields(given: Any, *left_out: str) -> dict[str, Any]:
@@ -259,17 +257,12 @@ def _functions(functions: Sequence[ShapeFunction], field: str, direction: str) -
 
 
 def _joint(joint: Joint) -> Any:
-    points = [joint.a, joint.b]
-    if isinstance(joint, RevoluteJoint):
-        return points
-    kind = next(name for name, kind in JOINTS.items() if isinstance(joint, kind))
-    return {"type": kind, "points": points} | _fields(joint, "name", "a", "b")
+    return [joint.a, joint.b] if joint.kind == "revolute" else {"type": joint.kind, **_member(joint)}
 
 
 def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, Any]:
-    slides = isinstance(mechanism.joint(prescribed.joint), AxisJoint)
     try:
-        law = law_table(prescribed.law, "displacement" if slides else "angle")
+        law = law_table(prescribed.law, "displacement" if mechanism.slides(prescribed.joint) else "angle")
     except InputError as error:
         raise error.within(f"prescribed.{prescribed.name}") from None
     return {"joint": prescribed.joint} | law

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError, suggestion
-from paraflex.mechanism import AtEnd, FlexibleBeam, Mechanism, RigidBody, SlidingJoint, WeldJoint
+from paraflex.mechanism import AtEnd, FlexibleBeam, Mechanism, RigidBody
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:
     """Ends of the beams that joints slide along, of those that do not ignore them."""
     found = []
     for joint in mechanism.joints:
-        if isinstance(joint, SlidingJoint) and joint.at_end is not AtEnd.IGNORE:
+        if joint.at_end is not AtEnd.IGNORE:
             beam = mechanism.body(joint.a.body)
             assert isinstance(beam, FlexibleBeam)
             found.append(BeamEnd(joint.name, beam.name, beam.length, joint.at_end))
@@ -144,10 +144,7 @@ def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:
     for event in events:
         if isinstance(event, JointLimit):
             _known("joint", event.joint, [joint.name for joint in mechanism.joints])
-            if isinstance(mechanism.joint(event.joint), WeldJoint):
-                raise InputError(
-                    "a weld does not move", field="events", value=event.joint, remedy="name a joint that does"
-                )
+            mechanism.joint(event.joint).check_moves("events")
         elif isinstance(event, DeflectionLimit):
             _known("body", event.body, [body.name for body in mechanism.bodies])
             body = mechanism.body(event.body)

@@ -16,14 +16,14 @@ from paraflex.mechanism.bodies import (
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping, stiffness_proportional
 from paraflex.mechanism.gears import Gear
+from paraflex.mechanism.groups import Group, grouped, groups_of
 from paraflex.mechanism.joints import (
     GROUND,
+    JOINT_KINDS,
     AngleLaw,
     AtEnd,
-    AxisJoint,
     Joint,
     Motor,
-    PointJoint,
     PointRef,
     PrescribedAngle,
     PrismaticJoint,
@@ -32,6 +32,7 @@ from paraflex.mechanism.joints import (
     SlidingJoint,
     SlotJoint,
     WeldJoint,
+    points_named,
 )
 from paraflex.mechanism.laws import ConstantSpeed, PiecewiseLaw, TabulatedLaw
 from paraflex.mechanism.loads import (
@@ -48,6 +49,7 @@ from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import ActuationMode, Assembly, EndEffector, Geometry
 from paraflex.mechanism.modal import ModalBody, ModalPoint
 from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
+from paraflex.mechanism.quantities import joints_named
 from paraflex.mechanism.raparm import raparm_i
 from paraflex.mechanism.rows import chain_of_segments, four_bars_in_a_row
 from paraflex.mechanism.segments import (
@@ -64,6 +66,7 @@ from paraflex.mechanism.start import BodyValues, Deflection, Start, check_start
 __all__ = [
     "FIRST_END",
     "GROUND",
+    "JOINT_KINDS",
     "LAST_END",
     "ActuationMode",
     "AngleLaw",
@@ -71,7 +74,6 @@ __all__ = [
     "Assembly",
     "AssumedModesBeam",
     "AtEnd",
-    "AxisJoint",
     "Body",
     "BodyValues",
     "ConstantSpeed",
@@ -82,6 +84,7 @@ __all__ = [
     "FlexibleBeam",
     "Gear",
     "Geometry",
+    "Group",
     "Joint",
     "JointFriction",
     "LinearSpring",
@@ -96,7 +99,6 @@ __all__ = [
     "Motor",
     "PiecewiseLaw",
     "PointForce",
-    "PointJoint",
     "PointRef",
     "Polynomial",
     "Pose",
@@ -125,12 +127,16 @@ __all__ = [
     "finite_segments",
     "four_bars_in_a_row",
     "given_shapes",
+    "grouped",
+    "groups_of",
     "is_hinge",
+    "joints_named",
     "loops",
     "mode_of_motors",
     "mode_of_signs",
     "parse_mode",
     "placed_poses",
+    "points_named",
     "proportional_segments",
     "raparm_i",
     "stiffness_proportional",

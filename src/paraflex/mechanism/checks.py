@@ -7,11 +7,11 @@ from collections import Counter
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism.bodies import FlexibleBeam
 from paraflex.mechanism.body_checks import check_body
-from paraflex.mechanism.joints import GROUND, PointRef, SlidingJoint, WeldJoint
-from paraflex.mechanism.loads import PointForce
+from paraflex.mechanism.groups import grouped
+from paraflex.mechanism.joints import GROUND, PointRef, points_named
 from paraflex.mechanism.members import Members
 from paraflex.mechanism.poses import approximate_poses
-from paraflex.mechanism.quantities import finite, known, not_negative, positive
+from paraflex.mechanism.quantities import check_numbers, finite, joints_named, known
 
 
 def check_mechanism(mechanism: Members) -> None:
@@ -37,28 +37,14 @@ def check_mechanism(mechanism: Members) -> None:
 
 def check_names(mechanism: Members) -> None:
     """Every body, joint, motor, assembly and mode has a name of its own, and "ground" is taken."""
-    groups = {
-        "body": mechanism.bodies,
-        "joint": mechanism.joints,
-        "motor": mechanism.motors,
-        "prescribed": mechanism.prescribed,
-        "spring": mechanism.springs,
-        "damper": mechanism.dampers,
-        "friction": mechanism.frictions,
-        "gear": mechanism.gears,
-        "linear_spring": mechanism.linear_springs,
-        "load": mechanism.loads,
-        "assembly": mechanism.assemblies,
-        "mode": mechanism.modes,
-    }
-    for kind, members in groups.items():
+    for group, members in grouped(mechanism):
         counts = Counter(member.name for member in members)
         for name, count in counts.items():
             if count > 1:
-                raise InputError("duplicate name", field=kind, value=name, remedy="rename one of them")
+                raise InputError("duplicate name", field=group.table, value=name, remedy="rename one of them")
             if not name or "." in name or name == GROUND:
                 raise InputError(
-                    "not usable as a name", field=kind, value=name, remedy=f'avoid dots, blanks and "{GROUND}"'
+                    "not usable as a name", field=group.table, value=name, remedy=f'avoid dots, blanks and "{GROUND}"'
                 )
     if not mechanism.bodies:
         raise InputError("a mechanism needs at least one body", field="body", remedy="add a beam or a rigid body")
@@ -75,44 +61,26 @@ def check_joints(mechanism: Members) -> None:
     for joint in mechanism.joints:
         field = f"joint.{joint.name}"
         _two_bodies(mechanism, joint.a, joint.b, field, "a joint", "one side must lie on another body or on the ground")
-        if isinstance(joint, SlidingJoint):
+        if joint.follows_beam:
             body = None if joint.a.on_ground else mechanism.body(joint.a.body)
             if not isinstance(body, FlexibleBeam):
                 raise InputError(
-                    "a sliding joint needs a beam to slide on",
+                    f"a {joint.kind} joint needs a beam to slide on",
                     field=field,
                     value=str(joint.a),
                     remedy='name a point of a beam first; on other bodies use a "slot"',
                 )
-        finite([getattr(joint, "direction", 0.0)], f"{field}.direction")
-        finite([getattr(joint, "angle", 0.0)], f"{field}.angle")
+        check_numbers(joint, field)
 
 
 def check_members_at_joints(mechanism: Members) -> None:
     """Motors, prescribed motions, springs, dampers and friction are at joints that move; modes name motors."""
     joints = {joint.name: joint for joint in mechanism.joints}
-    groups = {
-        "motor": mechanism.motors,
-        "prescribed": mechanism.prescribed,
-        "spring": mechanism.springs,
-        "damper": mechanism.dampers,
-        "friction": mechanism.frictions,
-    }
-    for kind, members in groups.items():
+    for group, members in grouped(mechanism):
         for member in members:
-            field = f"{kind}.{member.name}.joint"
-            known(member.joint, joints, field, "joint")
-            if isinstance(joints[member.joint], WeldJoint):
-                raise InputError("a weld does not move", field=field, value=member.joint, remedy="name another joint")
-    for spring in mechanism.springs:
-        field = f"spring.{spring.name}"
-        positive(spring.stiffness, f"{field}.stiffness", "N m/rad, or N/m")
-        finite([spring.rest], f"{field}.rest")
-    for damper in mechanism.dampers:
-        positive(damper.coefficient, f"damper.{damper.name}.coefficient", "N m s/rad, or N s/m")
-    for friction in mechanism.frictions:
-        positive(friction.limit, f"friction.{friction.name}.limit", "N m, or N")
-        positive(friction.speed, f"friction.{friction.name}.speed", "rad/s, or m/s")
+            for name, joint in joints_named(member):
+                known(joint, joints, field := f"{group.table}.{member.name}.{name}", "joint")
+                joints[joint].check_moves(field)
     motors = [motor.name for motor in mechanism.motors]
     for mode in mechanism.modes:
         for name in mode.motors:
@@ -120,26 +88,13 @@ def check_members_at_joints(mechanism: Members) -> None:
 
 
 def check_gears(mechanism: Members) -> None:
-    """Gears join two different joints that move, in a finite ratio."""
-    joints = {joint.name: joint for joint in mechanism.joints}
+    """Gears relate two different joints."""
     for gear in mechanism.gears:
-        field = f"gear.{gear.name}"
-        for name in gear.joints:
-            known(name, joints, f"{field}.joints", "joint")
-            if isinstance(joints[name], WeldJoint):
-                raise InputError(
-                    "a weld does not move", field=f"{field}.joints", value=name, remedy="name another joint"
-                )
         if gear.first_joint == gear.second_joint:
             raise InputError(
-                "a gear needs two different joints", field=f"{field}.joints", value=gear.first_joint,
+                "a gear needs two different joints", field=f"gear.{gear.name}.joints", value=gear.first_joint,
                 remedy="name the two whose angles or travels belong together",
             )  # fmt: skip
-        finite([gear.ratio], f"{field}.ratio")
-        finite([gear.phase or 0.0], f"{field}.phase")
-        if gear.ratio == 0.0:
-            remedy = "leave the gear out; what is to hold a joint is a [prescribed] motion or a weld"
-            raise InputError("a gear's ratio must not be zero", field=f"{field}.ratio", value=gear.ratio, remedy=remedy)
 
 
 def check_assemblies(mechanism: Members) -> None:
@@ -181,23 +136,19 @@ def check_task(mechanism: Members) -> None:
 
 
 def check_loads(mechanism: Members) -> None:
-    """Loads are finite and act on bodies; so is gravity."""
+    """What acts is finite and acts on bodies; so does gravity."""
     finite(mechanism.gravity, "gravity")
-    for spring in mechanism.linear_springs:
-        field = f"linear_spring.{spring.name}"
-        remedy = "one end must be on another body or on the ground"
-        _two_bodies(mechanism, spring.a, spring.b, f"{field}.points", "a spring", remedy)
-        not_negative(spring.stiffness, f"{field}.stiffness", "N/m")
-        not_negative(spring.length, f"{field}.length", "m")
-        not_negative(spring.damping, f"{field}.damping", "N s/m")
-    for load in mechanism.loads:
-        field = f"load.{load.name}"
-        _known_point(mechanism, load.point, f"{field}.point")
-        _on_body(load.point, f"{field}.point", "the ground does not move")
-        if isinstance(load, PointForce):
-            finite(load.force, f"{field}.force")
-        else:
-            finite([load.torque], f"{field}.torque")
+    for group, members in grouped(mechanism):
+        for member in members if group.kinds else ():
+            field, points = f"{group.table}.{member.name}", points_named(member)
+            if "a" in points:
+                remedy = "one end must be on another body or on the ground"
+                _two_bodies(mechanism, member.a, member.b, f"{field}.points", f"a {group.word}", remedy)
+            for name, point in points.items():
+                if name not in ("a", "b"):
+                    _known_point(mechanism, point, f"{field}.{name}")
+                    _on_body(point, f"{field}.{name}", "the ground does not move")
+            check_numbers(member, field)
 
 
 def _two_bodies(mechanism: Members, a: PointRef, b: PointRef, field: str, what: str, remedy: str) -> None:

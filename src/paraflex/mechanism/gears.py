@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from paraflex.arguments import CheckedFields
+from paraflex.mechanism.quantities import AT_JOINT, finite, not_zero, said
 
 
 @dataclass(frozen=True)
@@ -31,10 +32,23 @@ class Gear(CheckedFields):
     _table = "gear"
 
     name: str
-    first_joint: str
-    second_joint: str
-    ratio: float
-    phase: float | None = None
+    first_joint: str = field(metadata=AT_JOINT)
+    second_joint: str = field(metadata=AT_JOINT)
+    ratio: float = field(
+        metadata=said(
+            "of the second joint's angle to the first's, negative where wheels mesh outside; of a rack its pinion's radius",
+            not_zero,
+            "second by first: an angle by an angle, or a travel by an angle in m/rad",
+        )
+    )
+    phase: float | None = field(
+        default=None,
+        metadata=said(
+            "the coordinate of the second joint where that of the first is zero in rad, or m; as the first assembly "
+            "stands by default",
+            finite,
+        ),
+    )
 
     @property
     def joints(self) -> tuple[str, str]:

@@ -9,13 +9,14 @@ grows.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from enum import Enum
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.arrays import Array
-from paraflex.errors import InputError, as_enum
+from paraflex.errors import InputError
+from paraflex.mechanism.quantities import AT_JOINT, finite, said
 
 GROUND = "ground"
 
@@ -63,74 +64,6 @@ class PointRef(CheckedFields):
         return f"{self.body}.{self.point}"
 
 
-@dataclass(frozen=True)
-class RevoluteJoint(CheckedFields):
-    """Two points held together: p_b - p_a = 0.
-
-    The joint's angle is that of body b relative to body a (or to the ground), each turned by the slope of its
-    beam at the joint.
-    """
-
-    _table = "joint"
-
-    name: str
-    a: PointRef
-    b: PointRef
-
-
-@dataclass(frozen=True)
-class PrismaticJoint(CheckedFields):
-    """Body b slides along an axis that body a carries, and does not turn against it.
-
-    The axis goes through point a, at `direction` against body a's x axis there (against the ground's, on the ground);
-    on a beam it turns with the slope at a. The joint's coordinate is its travel: how far point b is along the axis [m].
-
-    Attributes
-    ----------
-    name : str
-    a, b : PointRef
-    direction : float
-        Of the axis against body a [rad].
-    angle : float
-        Of body b against body a, constant [rad]; slopes of beams included.
-    """
-
-    _table = "joint"
-
-    name: str
-    a: PointRef
-    b: PointRef
-    direction: float = 0.0
-    angle: float = 0.0
-
-
-@dataclass(frozen=True)
-class SlotJoint(CheckedFields):
-    """A pin in a slot: point b stays on an axis through point a of body a, and body b turns freely.
-
-    The axis is that of a `PrismaticJoint`, and so is the joint's coordinate.
-    """
-
-    _table = "joint"
-
-    name: str
-    a: PointRef
-    b: PointRef
-    direction: float = 0.0
-
-
-@dataclass(frozen=True)
-class WeldJoint(CheckedFields):
-    """Two points held together, and body b at a constant angle [rad] against body a, slopes of beams included."""
-
-    _table = "joint"
-
-    name: str
-    a: PointRef
-    b: PointRef
-    angle: float = 0.0
-
-
 class AtEnd(Enum):
     """What a run does where a point that slides along a beam comes to the beam's end.
 
@@ -150,8 +83,131 @@ class AtEnd(Enum):
     IGNORE = "ignore"
 
 
+# Kinds of joints by their names in files.
+JOINT_KINDS: dict[str, type[Joint]] = {}
+_SYMBOLS = {("points",): "pin", ("points", "angle"): "weld", ("axis", "angle"): "slider", ("axis",): "slot"}
+
+
+class _Directions:
+    """What joints without such a field have for it."""
+
+    direction: float = 0.0
+    angle: float = 0.0
+    at_end: AtEnd = AtEnd.IGNORE
+
+
+@given_as("a joint", "a joint of any kind, say RevoluteJoint")
 @dataclass(frozen=True)
-class SlidingJoint(CheckedFields):
+class Joint(CheckedFields, _Directions):
+    """A joint between point a of one body and point b of another: the base of all kinds.
+
+    A subclass is a kind, `class SlotJoint(Joint, kind="slot", holds=("axis",))`: files, equations, drawings and checks
+    know it by that. Its own fields, `direction`, `angle` and others, say in their metadata what files say of them.
+
+    Attributes
+    ----------
+    name : str
+    a, b : PointRef
+    kind : str
+        The name in files.
+    holds : tuple of str
+        "points", which it holds together (two constraints); an "axis" through point a, at `direction` against body a,
+        that it keeps point b on (one); the "angle" of body b against body a, kept at `angle` (one).
+    follows_beam : bool
+        Whether its axis is the centre line of a's beam, bent as it is; else it turns with the material at a.
+    symbol : str
+        How it is drawn: a name of `plots.marks.SYMBOLS`, by default that of a joint which holds the same.
+    slides, moves : bool
+        Whether its coordinate is a travel along its axis [m], else the angle of b against a [rad]; whether that is
+        free.
+    """
+
+    _table = "joint"
+
+    name: str
+    a: PointRef
+    b: PointRef
+    kind: ClassVar[str]
+    holds: ClassVar[tuple[str, ...]]
+    follows_beam: ClassVar[bool]
+    symbol: ClassVar[str]
+    slides: ClassVar[bool]
+    moves: ClassVar[bool]
+
+    def __init_subclass__(
+        cls, *, kind: str, holds: tuple[str, ...], symbol: str = "", follows_beam: bool = False
+    ) -> None:
+        super().__init_subclass__()
+        cls.kind, cls.holds, cls.follows_beam = kind, holds, follows_beam
+        cls.slides = "axis" in holds
+        cls.moves = cls.slides or "angle" not in holds
+        cls.symbol = symbol or _SYMBOLS.get(holds, kind)
+        JOINT_KINDS[kind] = cls
+
+    def check_moves(self, field: str) -> None:
+        """Check that the joint has an angle or a travel that is free.
+
+        Raises
+        ------
+        InputError
+            It has none, as a weld.
+        """
+        if not self.moves:
+            problem = f"a {self.kind} does not {'move' if 'points' in self.holds else 'turn'}"
+            raise InputError(problem, field=field, value=self.name, remedy="name another joint")
+
+
+def points_named(member: Any) -> dict[str, PointRef]:
+    """The points that a member of a mechanism is at, by its fields."""
+    return {each.name: at for each in fields(member) if isinstance(at := getattr(member, each.name), PointRef)}
+
+
+@dataclass(frozen=True)
+class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
+    """Two points held together: p_b - p_a = 0.
+
+    The joint's angle is that of body b relative to body a (or to the ground), each turned by the slope of its
+    beam at the joint.
+    """
+
+
+_DIRECTION = said("the angle of its axis against the first body in rad", finite)
+_ANGLE = said("the angle of the second body against the first in rad", finite)
+
+
+@dataclass(frozen=True)
+class PrismaticJoint(Joint, kind="prismatic", holds=("axis", "angle")):
+    """Body b slides along an axis that body a carries, and does not turn against it.
+
+    The axis goes through point a, at `direction` against body a's x axis there (against the ground's, on the ground);
+    on a beam it turns with the slope at a. The joint's coordinate is its travel: how far point b is along the axis [m].
+
+    Attributes
+    ----------
+    name : str
+    a, b : PointRef
+    direction : float
+        Of the axis against body a [rad].
+    angle : float
+        Of body b against body a, constant [rad]; slopes of beams included.
+    """
+
+    direction: float = field(default=0.0, metadata=_DIRECTION)
+    angle: float = field(default=0.0, metadata=_ANGLE)
+
+
+@dataclass(frozen=True)
+class SlotJoint(Joint, kind="slot", holds=("axis",)):
+    """A pin in a slot: point b stays on an axis through point a of body a, and body b turns freely.
+
+    The axis is that of a `PrismaticJoint`, and so is the joint's coordinate.
+    """
+
+    direction: float = field(default=0.0, metadata=_DIRECTION)
+
+
+@dataclass(frozen=True)
+class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", follows_beam=True):
     """Point b slides along the centre line of a beam, bent as it is, and body b turns freely.
 
     Point a says which beam. The joint's coordinate is how far point b is beyond point a along the x axis of the beam's
@@ -165,24 +221,17 @@ class SlidingJoint(CheckedFields):
         What a run does where point b comes to an end of the beam; a value is taken for the member.
     """
 
-    _table = "joint"
-
-    name: str
-    a: PointRef
-    b: PointRef
-    at_end: AtEnd = AtEnd.ERROR
-    direction: ClassVar[float] = 0.0  # along the beam
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "at_end", as_enum(AtEnd, self.at_end, f"joint.{self.name}.at_end"))
+    at_end: AtEnd = field(
+        default=AtEnd.ERROR,
+        metadata=said('where a sliding point comes to the end of its beam: "error", "stop", "warn" or "ignore"'),
+    )
 
 
-# Joints that hold two points together, and those with an axis that their travel is measured along.
-PointJoint = RevoluteJoint | WeldJoint
-AxisJoint = PrismaticJoint | SlotJoint | SlidingJoint
-Joint = PointJoint | AxisJoint
-given_as("a joint")(Joint)
+@dataclass(frozen=True)
+class WeldJoint(Joint, kind="weld", holds=("points", "angle")):
+    """Two points held together, and body b at a constant angle [rad] against body a, slopes of beams included."""
+
+    angle: float = field(default=0.0, metadata=_ANGLE)
 
 
 @given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")
@@ -221,7 +270,7 @@ class PrescribedAngle(CheckedFields):
     _table = "prescribed"
 
     name: str
-    joint: str
+    joint: str = field(metadata=AT_JOINT)
     law: AngleLaw
 
 
@@ -235,4 +284,4 @@ class Motor(CheckedFields):
     _table = "motor"
 
     name: str
-    joint: str
+    joint: str = field(metadata=AT_JOINT)

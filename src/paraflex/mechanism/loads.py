@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.mechanism.joints import PointRef
+from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, positive, said
 
 
 @dataclass(frozen=True)
@@ -20,9 +21,9 @@ class TorsionalSpring(CheckedFields):
     _table = "spring"
 
     name: str
-    joint: str
-    stiffness: float
-    rest: float = 0.0
+    joint: str = field(metadata=AT_JOINT)
+    stiffness: float = field(metadata=said("the stiffness in N m/rad", positive, "N m/rad, or N/m"))
+    rest: float = field(default=0.0, metadata=said("the joint's angle at which the spring is free in rad", finite))
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class TorsionalDamper(CheckedFields):
     _table = "damper"
 
     name: str
-    joint: str
-    coefficient: float
+    joint: str = field(metadata=AT_JOINT)
+    coefficient: float = field(metadata=said("the coefficient in N m s/rad", positive, "N m s/rad, or N s/m"))
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,11 @@ class JointFriction(CheckedFields):
     _table = "friction"
 
     name: str
-    joint: str
-    limit: float
-    speed: float
+    joint: str = field(metadata=AT_JOINT)
+    limit: float = field(metadata=said("the friction torque in N m, or force in N", positive, "N m, or N"))
+    speed: float = field(
+        metadata=said("the speed below which it acts as a damper in rad/s or m/s", positive, "rad/s, or m/s")
+    )
 
 
 @dataclass(frozen=True)
@@ -87,9 +90,9 @@ class LinearSpring(CheckedFields):
     name: str
     a: PointRef
     b: PointRef
-    stiffness: float
-    length: float = 0.0
-    damping: float = 0.0
+    stiffness: float = field(metadata=said("the stiffness in N/m", not_negative, "N/m"))
+    length: float = field(default=0.0, metadata=said("the free length in m", not_negative, "m"))
+    damping: float = field(default=0.0, metadata=said("the damping in N s/m", not_negative, "N s/m"))
 
 
 @dataclass(frozen=True)
@@ -97,11 +100,12 @@ class PointForce(CheckedFields):
     """A constant force [N] at a named point of a body, given in the ground frame."""
 
     _table = "load"
+    kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
 
     name: str
-    point: PointRef
-    force: tuple[float, float]
+    point: PointRef = field(metadata=said('"body.point"'))
+    force: tuple[float, float] = field(metadata=said("[x, y] in the ground frame in N", finite))
 
     @property
     def size(self) -> float:
@@ -114,11 +118,12 @@ class AppliedTorque(CheckedFields):
     """A constant torque [N m] on the material at a named point of a body."""
 
     _table = "load"
+    kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"
 
     name: str
-    point: PointRef
-    torque: float
+    point: PointRef = field(metadata=said('"body.point"'))
+    torque: float = field(metadata=said("the torque in N m", finite))
 
     @property
     def size(self) -> float:

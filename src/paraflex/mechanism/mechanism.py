@@ -26,7 +26,8 @@ class Mechanism(Members, Shown):
     ground : mapping
         Named points fixed in the ground frame [m].
     bodies : tuple of RigidBody, FlexibleBeam, AssumedModesBeam or ModalBody
-    joints : tuple of RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint or WeldJoint
+    joints : tuple of Joint
+        Of any kind: RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint, WeldJoint.
     motors : tuple of Motor
         Their order is that of the signs in a mode such as "+-+-".
     prescribed : tuple of PrescribedAngle

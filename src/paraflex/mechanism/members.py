@@ -12,8 +12,17 @@ from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism.bodies import Body
 from paraflex.mechanism.gears import Gear
-from paraflex.mechanism.joints import GROUND, AxisJoint, Joint, Motor, PointRef, PrescribedAngle
-from paraflex.mechanism.loads import JointFriction, LinearSpring, Load, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism.groups import group, grouped
+from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
+from paraflex.mechanism.loads import (
+    AppliedTorque,
+    JointFriction,
+    LinearSpring,
+    Load,
+    PointForce,
+    TorsionalDamper,
+    TorsionalSpring,
+)
 
 T = TypeVar("T")
 
@@ -103,23 +112,39 @@ class Geometry(Enum):
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Members(CheckedFields):
-    """The members of a mechanism and how they are found by name: see `Mechanism`, which they make once checked."""
+    """The members of a mechanism and how they are found by name: see `Mechanism`, which they make once checked.
+
+    A field with a `group` is a group of members: files, checks, engines and tables go through these.
+    """
 
     name: str
     ground: Mapping[str, tuple[float, float]]
-    bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...]
-    motors: tuple[Motor, ...] = ()
-    prescribed: tuple[PrescribedAngle, ...] = ()
+    bodies: tuple[Body, ...] = field(metadata=group("body", "body", plural="bodies", engines=True))
+    joints: tuple[Joint, ...] = field(metadata=group("joint", "joint", engines=True))
+    motors: tuple[Motor, ...] = field(default=(), metadata=group("motor", "motor", engines=True))
+    prescribed: tuple[PrescribedAngle, ...] = field(default=(), metadata=group("prescribed", "prescribed angle"))
     end_effector: EndEffector | None = None
-    assemblies: tuple[Assembly, ...] = ()
-    modes: tuple[ActuationMode, ...] = ()
-    springs: tuple[TorsionalSpring, ...] = ()
-    dampers: tuple[TorsionalDamper, ...] = ()
-    frictions: tuple[JointFriction, ...] = ()
-    linear_springs: tuple[LinearSpring, ...] = ()
-    loads: tuple[Load, ...] = ()
-    gears: tuple[Gear, ...] = ()
+    assemblies: tuple[Assembly, ...] = field(
+        default=(), metadata=group("assembly", "assembly", plural="assemblies", engines=True)
+    )
+    modes: tuple[ActuationMode, ...] = field(default=(), metadata=group("mode", "actuation mode", engines=True))
+    springs: tuple[TorsionalSpring, ...] = field(
+        default=(), metadata=group("spring", "spring", TorsionalSpring, engines=True, resists=True)
+    )
+    dampers: tuple[TorsionalDamper, ...] = field(
+        default=(), metadata=group("damper", "damper", TorsionalDamper, resists=True)
+    )
+    frictions: tuple[JointFriction, ...] = field(
+        default=(), metadata=group("friction", "friction law", JointFriction, resists=True)
+    )
+    linear_springs: tuple[LinearSpring, ...] = field(
+        default=(),
+        metadata=group(
+            "linear_spring", "spring between points", LinearSpring, plural="springs between points", resists=True
+        ),
+    )
+    gears: tuple[Gear, ...] = field(default=(), metadata=group("gear", "gear", Gear, engines=True))
+    loads: tuple[Load, ...] = field(default=(), metadata=group("load", "load", PointForce, AppliedTorque))
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
@@ -166,6 +191,12 @@ class Members(CheckedFields):
                 found[name].append(joint)
         return found
 
+    @property
+    def points_used(self) -> set[PointRef]:
+        """Points that a joint, a spring, a load or another member names, or the end-effector."""
+        used = {point for _, members in grouped(self) for one in members for point in points_named(one).values()}
+        return used if self.end_effector is None else used | {self.end_effector.point}
+
     def reached(self, start: str, past: str = "") -> set[str]:
         """A body or the ground, and all that joints lead to from there past another body."""
         seen, waiting = {start, past}, [start]
@@ -178,7 +209,7 @@ class Members(CheckedFields):
 
     def slides(self, joint: str) -> bool:
         """Whether a joint, by its name, has a travel and not an angle."""
-        return isinstance(self.joint(joint), AxisJoint)
+        return self.joint(joint).slides
 
     def motor_units(self) -> tuple[str, ...]:
         """What each motor's torque is counted in: N m, or N where its joint slides."""

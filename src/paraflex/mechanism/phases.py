@@ -7,7 +7,7 @@ from math import cos, sin
 
 from paraflex.errors import InputError
 from paraflex.mechanism.gears import Gear
-from paraflex.mechanism.joints import AxisJoint, Joint, PointRef
+from paraflex.mechanism.joints import Joint, PointRef
 from paraflex.mechanism.members import Members
 from paraflex.mechanism.poses import Place, Pose, approximate_poses, local_points, placed_in, placed_poses
 
@@ -55,7 +55,7 @@ def _coordinate(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> flo
         pose = poses[ref.body]
         return None if pose.position is None else placed_in(pose, local_points(mechanism.body(ref.body))[ref.point])
 
-    if not isinstance(joint, AxisJoint):
+    if not joint.slides:
         return angle(joint.b) - angle(joint.a)
     a, b, direction = place(joint.a), place(joint.b), angle(joint.a) + joint.direction
     if a is None or b is None:

@@ -9,7 +9,7 @@ from math import atan2, cos, hypot, sin
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body, RigidBody
-from paraflex.mechanism.joints import GROUND, AxisJoint, PointJoint, PointRef
+from paraflex.mechanism.joints import GROUND, PointRef
 from paraflex.mechanism.members import Assembly, Members
 from paraflex.mechanism.modal import ModalBody
 
@@ -80,12 +80,12 @@ def _from_points(
     known: dict[PointRef, Place] = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()}
     known |= points
     # Others do not tell where a point is.
-    for kinds in ((PointJoint,), (PointJoint, AxisJoint))[: 1 + sliding]:
+    for telling in ({"points"}, {"points", "axis"})[: 1 + sliding]:
         before = -1
         while before < len(known) + len(poses):
             before = len(known) + len(poses)
             for joint in mechanism.joints:
-                if isinstance(joint, kinds):
+                if telling.intersection(joint.holds):
                     for one, other in ((joint.a, joint.b), (joint.b, joint.a)):
                         if one in known:
                             known.setdefault(other, known[one])

@@ -1,9 +1,12 @@
-"""Checks of single numbers that the checks of mechanisms and bodies share."""
+"""What members of a mechanism say of their fields, and checks of single numbers that those of bodies share."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import fields
+from functools import partial
+from typing import Any, cast
 
 from paraflex.errors import InputError, suggestion
 
@@ -14,9 +17,10 @@ def known(name: str, names: Collection[str], field: str, kind: str) -> None:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 
-def finite(values: Iterable[float], field: str) -> None:
-    """Raise an `InputError` unless all values are finite."""
-    for value in values:
+def finite(values: float | Iterable[float], field: str) -> None:
+    """Raise an `InputError` unless a value, or each of several, is finite."""
+    several = isinstance(values, Iterable) and getattr(values, "ndim", 1)
+    for value in cast("Iterable[float]", values if several else (values,)):
         if not math.isfinite(value):
             raise InputError("not a finite number", field=field, value=value, remedy="give a number")
 
@@ -31,3 +35,53 @@ def not_negative(value: float, field: str, unit: str) -> None:
     """Raise an `InputError` unless a value is zero or positive and finite."""
     if not (math.isfinite(value) and value >= 0.0):
         raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")
+
+
+def not_zero(value: float, field: str, unit: str) -> None:
+    """Raise an `InputError` unless a value is finite and not zero."""
+    if not (math.isfinite(value) and value != 0.0):
+        raise InputError("must be a finite number other than zero", field=field, value=value, remedy=f"give it {unit}")
+
+
+def said(
+    description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: bool = False
+) -> dict[str, Any]:
+    """Metadata of a member's field.
+
+    Parameters
+    ----------
+    description : str
+        As model files, their schema and errors have it; a unit stands behind "in".
+    check : callable, optional
+        Of its number, unless that is None: `finite`, or with a unit to ask for `positive`, `not_negative`, `not_zero`.
+    unit : str
+    joint : bool
+        Whether it names a joint.
+    """
+    checked = partial(check, unit=unit) if check is not None and unit else check
+    return {"description": description, "check": checked, "joint": joint}
+
+
+AT_JOINT = said("the name of a joint", joint=True)
+
+
+def check_numbers(member: Any, place: str) -> None:
+    """Check the numbers of a member, each as its field says."""
+    for each in fields(member):
+        check, value = each.metadata.get("check"), getattr(member, each.name)
+        if check is not None and value is not None:
+            check(value, f"{place}.{each.name}")
+
+
+def joints_named(member: Any) -> Iterator[tuple[str, str]]:
+    """Joints that a member names, each with what files call the field."""
+    together = joint_pair(member)
+    for each in fields(member):
+        if each.metadata.get("joint"):
+            yield "joints" if together else each.name, getattr(member, each.name)
+
+
+def joint_pair(member: Any) -> list[str]:
+    """Fields of a member, or of its class, that name two joints: `joints` in files. None where it names one."""
+    named = [each.name for each in fields(member) if each.metadata.get("joint")]
+    return named if len(named) > 1 else []

@@ -6,13 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
+from typing import Any
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import SpanProperties
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.damping import stiffness_proportional
-from paraflex.mechanism.joints import Joint, PointRef, RevoluteJoint, SlidingJoint
+from paraflex.mechanism.groups import groups_of
+from paraflex.mechanism.joints import Joint, PointRef, RevoluteJoint, points_named
 from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import Assembly
@@ -106,22 +108,24 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
                 dampers.append(TorsionalDamper(hinge, hinge, lag * stiffness))
         places |= {(body.name, point): names[i] for point, i in owners.items()}
 
-    def moved(ref: PointRef) -> PointRef:
-        return replace(ref, body=places.get((ref.body, ref.point), ref.body))
+    def moved(member: Any) -> Any:
+        at = {
+            field: replace(ref, body=places.get((ref.body, ref.point), ref.body))
+            for field, ref in points_named(member).items()
+        }
+        return replace(member, **at)
 
     effector = mechanism.end_effector
+    kept = {
+        name: tuple(map(moved, getattr(mechanism, name))) for name, one in groups_of(Mechanism).items() if one.kinds
+    }
     segmented = replace(
         mechanism,
         name=f"{mechanism.name}, finite segments",
         bodies=tuple(bodies),
-        joints=(*(replace(joint, a=moved(joint.a), b=moved(joint.b)) for joint in mechanism.joints), *joints),
-        springs=(*mechanism.springs, *springs),
-        dampers=(*mechanism.dampers, *dampers),
-        linear_springs=tuple(
-            replace(spring, a=moved(spring.a), b=moved(spring.b)) for spring in mechanism.linear_springs
-        ),
-        loads=tuple(replace(load, point=moved(load.point)) for load in mechanism.loads),
-        end_effector=None if effector is None else replace(effector, point=moved(effector.point)),
+        joints=(*map(moved, mechanism.joints), *joints),
+        **kept | {"springs": (*mechanism.springs, *springs), "dampers": (*mechanism.dampers, *dampers)},
+        end_effector=None if effector is None else moved(effector),
         assemblies=tuple(_assembly(mechanism, assembly, carriers) for assembly in mechanism.assemblies),
     )
     return Segmented(segmented, carriers)
@@ -141,7 +145,7 @@ def check_segmentable(mechanism: Mechanism) -> None:
         A flexible body of given shapes cannot, nor a beam that a joint slides along: no segment reaches far enough.
     """
     for joint in mechanism.joints:
-        if isinstance(joint, SlidingJoint) and getattr(mechanism.body(joint.a.body), "flexible", False):
+        if joint.follows_beam and getattr(mechanism.body(joint.a.body), "flexible", False):
             raise InputError(
                 "a beam that a joint slides along cannot be cut into segments", field=f"joint.{joint.name}",
                 value=str(joint.a), remedy="make the beam rigid, or leave out finite segments",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +52,8 @@ class Mark(NamedTuple):
 
 def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of the ground, at one time."""
-    found = [(joint.name, ground_of(joint, limits)) for joint in shown.joints if joint.grounded]
+    held = [joint for joint in shown.joints if joint.grounded and symbol_of(joint).on_ground]
+    found = [(joint.name, ground_of(joint, limits)) for joint in held]
     found += [("", support(place, limits)) for place in shown.anchors]
     return [
         Mark(look, name, _joined(pieces)[None])
@@ -65,11 +66,9 @@ def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of gears, springs and joints."""
     out = [Mark("gear", gear.name, line) for gear in shown.gears for line in pitch_lines(gear)]
     out += [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
-    out += [Mark("block", joint.name, block(joint, limits)) for joint in shown.joints if joint.slides]
-    out += [Mark("weld", joint.name, square(joint.place, limits)) for joint in shown.joints if joint.kind == "weld"]
-    # What slides and turns, turns on a pin; what is welded to a block does neither.
-    turning = [joint for joint in shown.joints if joint.kind in ("pin", "slot", "sliding")]
-    return out + [Mark("pin", joint.name, joint.place[:, None]) for joint in turning]
+    parts = [(joint, look, shape) for joint in shown.joints for look, shape in symbol_of(joint).parts.items()]
+    out += [Mark(look, joint.name, shape(joint, limits)) for joint, look, shape in parts]
+    return sorted(out, key=lambda mark: list(LOOKS).index(mark.look))
 
 
 def pitch_lines(gear: DrawnGear) -> list[Array]:
@@ -150,10 +149,15 @@ def block(joint: DrawnJoint, limits: Limits) -> Array:
     return joint.place[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
-def square(place: Array, limits: Limits) -> Array:
+def square(joint: DrawnJoint, limits: Limits) -> Array:
     """Corners (f, 5, 2) of a weld."""
     d = 0.9 * PIN * limits.size
-    return place[:, None] + d * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+    return joint.place[:, None] + d * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+
+
+def dot(joint: DrawnJoint, _: Limits) -> Array:
+    """The place (f, 1, 2) of a pin."""
+    return joint.place[:, None]
 
 
 def zigzag(ends: Array, limits: Limits) -> Array:
@@ -166,3 +170,33 @@ def zigzag(ends: Array, limits: Limits) -> Array:
     swing = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], _TEETH // 2), [0.0, 0.0]])
     swing = 0.4 * TRIANGLE * limits.size * swing
     return a[:, None] + along[:, None] * d[:, None] + swing[:, None] * across[:, None]
+
+
+class Symbol(NamedTuple):
+    """How a joint is drawn.
+
+    Attributes
+    ----------
+    parts : mapping of str to callable
+        By their looks what makes the shapes of it.
+    on_ground : bool
+        Whether a support or a rail is drawn where the joint is on the ground.
+    """
+
+    parts: Mapping[str, Callable[[DrawnJoint, Limits], Array]]
+    on_ground: bool = True
+
+
+# By `Joint.symbol`. What slides and turns, turns on a pin; what is welded to a block does neither.
+SYMBOLS = {
+    "pin": Symbol({"pin": dot}),
+    "weld": Symbol({"weld": square}),
+    "slider": Symbol({"block": block}),
+    "slot": Symbol({"block": block, "pin": dot}),
+    "sliding": Symbol({"block": block, "pin": dot}),
+}
+
+
+def symbol_of(joint: DrawnJoint) -> Symbol:
+    """The symbol of a joint; one that has none is not drawn."""
+    return SYMBOLS.get(joint.kind, Symbol({}, on_ground=False))

@@ -6,13 +6,14 @@ import re
 from typing import Any
 
 from paraflex.display import facts, page, sentence, table, view
-from paraflex.mechanism import Mechanism, PrismaticJoint, RevoluteJoint, SlidingJoint, SlotJoint, WeldJoint, loops
+from paraflex.dynamics.constraints import constraint_count
+from paraflex.mechanism import Mechanism, grouped, loops
 from paraflex.plots.svg import sketch
 
-# Constraint rows of a joint.
-_ROWS = {RevoluteJoint: 2, WeldJoint: 3, PrismaticJoint: 2, SlotJoint: 1, SlidingJoint: 1}
 # Bodies, joints or modes listed one by one.
 _MOST = 40
+# Groups of which more is said than how many there are.
+_LISTED = ("body", "joint", "motor", "assembly", "mode")
 
 
 @view.register(Mechanism)
@@ -20,8 +21,7 @@ def mechanism_html(mechanism: Mechanism) -> str:
     """Bodies, joints, motors, freedoms and a sketch of the first assembly."""
     rows = [(body.name, _words(type(body).__name__, body), getattr(body, "length", None), ", ".join(body.points))
             for body in mechanism.bodies]  # fmt: skip
-    joints = [(joint.name, _words(type(joint).__name__.removesuffix("Joint")), f"{joint.a} – {joint.b}")
-              for joint in mechanism.joints]  # fmt: skip
+    joints = [(joint.name, joint.kind, f"{joint.a} – {joint.b}") for joint in mechanism.joints]
     return page(
         mechanism.name,
         sentence(mechanism.description),
@@ -34,21 +34,12 @@ def mechanism_html(mechanism: Mechanism) -> str:
 
 def freedoms(mechanism: Mechanism) -> int:
     """Degrees of freedom of the rigid mechanism as Grübler counts them: redundant constraints are not seen."""
-    rows = sum(_ROWS[type(joint)] for joint in mechanism.joints) + len(mechanism.prescribed) + len(mechanism.gears)
-    return 3 * len(mechanism.bodies) - rows
+    return 3 * len(mechanism.bodies) - constraint_count(mechanism)
 
 
 def _counts(mechanism: Mechanism) -> list[tuple[str, Any]]:
     units = mechanism.motor_units()
     effector = mechanism.end_effector
-    others = {
-        "springs": len(mechanism.springs) + len(mechanism.linear_springs),
-        "dampers": len(mechanism.dampers),
-        "friction laws": len(mechanism.frictions),
-        "gears": len(mechanism.gears),
-        "loads": len(mechanism.loads),
-        "prescribed angles": len(mechanism.prescribed),
-    }
     motors = [f"{motor.name} at {motor.joint} [{unit}]" for motor, unit in zip(mechanism.motors, units, strict=True)]
     return [
         ("bodies", _counted(mechanism)),
@@ -60,7 +51,11 @@ def _counts(mechanism: Mechanism) -> list[tuple[str, Any]]:
         ("actuation modes", [mode.name for mode in mechanism.modes[:_MOST]]),
         ("assemblies", [assembly.name for assembly in mechanism.assemblies]),
         ("geometry of flexible bodies", mechanism.geometry.value),
-        *((name, number) for name, number in others.items() if number),
+        *(
+            (group.words, len(members))
+            for group, members in grouped(mechanism)
+            if members and group.table not in _LISTED
+        ),
     ]
 
 

@@ -14,34 +14,19 @@ from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import (
     GROUND,
-    AxisJoint,
     Body,
     Gear,
     Joint,
     Mechanism,
     PointRef,
     Pose,
-    PrismaticJoint,
-    RevoluteJoint,
     RigidBody,
-    SlidingJoint,
-    SlotJoint,
-    WeldJoint,
     placed_poses,
 )
 from paraflex.mechanism.poses import local_points
 from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape, turned
 
 Array = NDArray[np.float64]
-
-# Joints as files name them, but a revolute one is drawn as a pin and a prismatic one as a slider.
-JOINT_KINDS = {
-    RevoluteJoint: "pin",
-    PrismaticJoint: "slider",
-    SlotJoint: "slot",
-    SlidingJoint: "sliding",
-    WeldJoint: "weld",
-}
 
 
 @dataclass(frozen=True)
@@ -107,7 +92,7 @@ def drawing(
     }
     directions = np.full((samples, len(mechanism.joints)), np.nan)
     for i, joint in enumerate(mechanism.joints):
-        if isinstance(joint, AxisJoint):
+        if joint.slides:
             directions[:, i] = _direction(joint, angle, frame)
     springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
     return Drawing(
@@ -204,7 +189,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
         "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
         "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
-        "joint_kind": ("joint", [JOINT_KINDS[type(joint)] for joint in joints]),
+        "joint_kind": ("joint", [joint.symbol for joint in joints]),
         "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
         **of_springs,
         **of_gears,
@@ -215,7 +200,7 @@ def pitch_radii(mechanism: Mechanism, gear: Gear) -> tuple[float, float]:
     """Radii of two wheels that mesh outside, about joints that one body or the ground holds apart [m]; else NaN."""
     first, second = (mechanism.joint(name) for name in gear.joints)
     carriers = {first.a.body, first.b.body} & {second.a.body, second.b.body}
-    if not (isinstance(first, RevoluteJoint) and isinstance(second, RevoluteJoint) and len(carriers) == 1):
+    if not (first.holds == second.holds == ("points",) and len(carriers) == 1):
         return np.nan, np.nan
     (carrier,) = carriers
     places = mechanism.ground if carrier == GROUND else local_points(mechanism.body(carrier))
@@ -245,7 +230,7 @@ def _base(
     held: dict[int, PointRef] = {}
     moving = []
     for joint, ref in joined:
-        if isinstance(joint, SlidingJoint) and ref is joint.a:
+        if joint.follows_beam and ref is joint.a:
             moving.append(_contact(place(joint.b), *frame(one.body)))
         else:
             held.setdefault(one.points[ref.point], ref)
@@ -269,9 +254,8 @@ def _contact(place: Array, origin: Array, angle: Array) -> Hold:
 def _direction(
     joint: Joint, angle: Callable[[PointRef], Array], frame: Callable[[str], tuple[Array, Array]]
 ) -> Array | float:
-    if isinstance(joint, SlidingJoint):
+    if joint.follows_beam:
         return frame(joint.a.body)[1]
-    assert isinstance(joint, PrismaticJoint | SlotJoint)
     return joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
 
 

@@ -18,7 +18,7 @@ from paraflex.dynamics.constraints import Term, row_order
 from paraflex.dynamics.coordinates import transverse_pieces
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.kernel.packed import ANGLE, POINT
-from paraflex.mechanism import AxisJoint, Joint
+from paraflex.mechanism import Joint
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
         i, joint = place.get(motor.joint), mechanism.joint(motor.joint)
         if i is None:
             continue
-        if isinstance(joint, AxisJoint):
+        if joint.slides:
             force[:, i] += torque[:, None] * _unit(axis_angle(system, joint, q))
         else:
             moment[:, i] += torque
@@ -83,7 +83,6 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
 def _direction(system: System, term: Term, q: Array) -> Array:
     """Derivative (k, 2) of a row along an axis by the place of point b."""
     joint = system.mechanism.joint(term.joint)
-    assert isinstance(joint, AxisJoint)
     along = axis_angle(system, joint, q)
     direction = _unit(along + term.direction - joint.direction)
     if term.carrier == "track":

@@ -11,7 +11,7 @@ from paraflex.findings import Finding
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, PointForce
 from paraflex.mechanism.bodies import Body
 from paraflex.mechanism.damping import LossFactor, ModalDamping
-from paraflex.mechanism.joints import PointRef, RevoluteJoint, WeldJoint
+from paraflex.mechanism.joints import PointRef
 
 # All forces applied over the weight of all bodies: of a machine that carries its weight, and of one in no gravity.
 LOADED, LOADED_AT_REST = 100.0, 1000.0
@@ -66,10 +66,7 @@ def _beside(mechanism: Mechanism) -> Iterator[Finding]:
     for joint in mechanism.joints:
         for point in (joint.a, joint.b):
             held.setdefault(point, []).append(joint.name)
-    springs = [point for one in mechanism.linear_springs for point in (one.a, one.b)]
-    used = {*held, *springs, *(load.point for load in mechanism.loads)}
-    if mechanism.end_effector is not None:
-        used.add(mechanism.end_effector.point)
+    used = mechanism.points_used
     for body in mechanism.bodies:
         points = [PointRef(body.name, name) for name in body.points]
         for free in (point for point in points if point not in used and point.point[-1:].isdigit()):
@@ -107,7 +104,7 @@ def _places(mechanism: Mechanism) -> dict[PointRef, PointRef]:
     """For each point of a pin or weld, one that stands for all points there."""
     place: dict[PointRef, PointRef] = {}
     for joint in mechanism.joints:
-        if isinstance(joint, RevoluteJoint | WeldJoint):
+        if "points" in joint.holds:
             one, other = place.setdefault(joint.a, joint.a), place.setdefault(joint.b, joint.b)
             place = {point: one if at == other else at for point, at in place.items()}
     return place

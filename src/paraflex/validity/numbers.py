@@ -162,9 +162,7 @@ def _gravity(gravity: Place) -> Iterator[Finding]:
 
 
 def _angles(mechanism: Mechanism) -> Iterator[Finding]:
-    given = {
-        f"joint.{j.name}.{name}": getattr(j, name, 0.0) for j in mechanism.joints for name in ("direction", "angle")
-    }
+    given = {f"joint.{j.name}.{name}": getattr(j, name) for j in mechanism.joints for name in ("direction", "angle")}
     turning = [one for one in mechanism.springs if not mechanism.slides(one.joint)]
     given |= {f"spring.{one.name}.rest": one.rest for one in turning}
     given |= {

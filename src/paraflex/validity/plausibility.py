@@ -15,7 +15,7 @@ from paraflex.dynamics.rank import joint_of_row
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import CONSTRAINT
-from paraflex.mechanism import Mechanism, PointForce
+from paraflex.mechanism import Mechanism, PointForce, grouped
 from paraflex.validity.bending import bending_of
 from paraflex.validity.blame import most_likely
 from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
@@ -216,9 +216,8 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
 
 def _resisting(mechanism: Mechanism) -> str:
     """Springs, dampers and friction, of which one may be in another unit."""
-    groups = {"spring": mechanism.springs, "damper": mechanism.dampers, "friction": mechanism.frictions}
-    groups["linear_spring"] = mechanism.linear_springs
-    named = [f"{kind}.{one.name}" for kind, members in groups.items() for one in members]
+    resisting = ((group.table, members) for group, members in grouped(mechanism) if group.resists)
+    named = [f"{table}.{one.name}" for table, members in resisting for one in members]
     return f"look at {', '.join(named)}, and their units" if named else ""
 
 

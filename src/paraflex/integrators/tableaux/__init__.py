@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from paraflex.integrators.tableaux.esdirk3 import ESDIRK3
 from paraflex.integrators.tableaux.esdirk4 import ESDIRK4
@@ -12,8 +11,12 @@ from paraflex.integrators.tableaux.tr_bdf2 import TR_BDF2
 from paraflex.integrators.tableaux.trapezoidal import TRAPEZOIDAL
 from paraflex.kernel.run_state import Tableau
 
-TABLEAUX: Mapping[str, Tableau] = MappingProxyType(
-    {"tr-bdf2": TR_BDF2, "trapezoidal": TRAPEZOIDAL, "esdirk3": ESDIRK3, "esdirk4": ESDIRK4, "esdirk5": ESDIRK5}
-)
+TABLEAUX: Mapping[str, Tableau] = {
+    "tr-bdf2": TR_BDF2,
+    "trapezoidal": TRAPEZOIDAL,
+    "esdirk3": ESDIRK3,
+    "esdirk4": ESDIRK4,
+    "esdirk5": ESDIRK5,
+}
 
 __all__ = ["ESDIRK3", "ESDIRK4", "ESDIRK5", "TABLEAUX", "TRAPEZOIDAL", "TR_BDF2"]
