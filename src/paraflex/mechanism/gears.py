@@ -15,7 +15,7 @@ class Gear(CheckedFields):
     Of two wheels with fixed centres the ratio is -r1/r2 where they mesh outside, r1/r2 where one lies within the other,
     or where a belt or a chain joins them. A joint that slides has a travel: of a pinion and its rack the ratio is the
     pinion's radius [m/rad]. Angles count turns. Like a motor a gear acts on the material at the joints, by torques
-    about them (a force along the axis where a joint slides): what teeth bear on the joints besides is not in it.
+    about them (a force along the axis where a joint slides); what teeth press on the bearings besides is not in it.
 
     Attributes
     ----------
@@ -36,7 +36,8 @@ class Gear(CheckedFields):
     second_joint: str = field(metadata=AT_JOINT)
     ratio: float = field(
         metadata=said(
-            "of the second joint's angle to the first's, negative where wheels mesh outside; of a rack its pinion's radius",
+            "of the second joint's angle to the first's, negative where wheels mesh outside; of a rack the radius of "
+            "its pinion",
             not_zero,
             "second by first: an angle by an angle, or a travel by an angle in m/rad",
         )
