@@ -52,8 +52,8 @@ def test_tables_are_tidy(data):
     tables = result_tables(data, shapes=True)
     assert list(tables) == ["time_series", "figures", "shapes"]
     series = tables["time_series"]
-    assert {column.values.size for column in series.columns} == {2 * 21}
-    assert [column.name for column in series.columns[:2]] == ["mode", "time"]
+    assert len(series) == 2 * 21
+    assert list(series.columns[:2]) == ["mode", "time"]
     second = series["mode"].values == "+--+"
     np.testing.assert_array_equal(series["time"].values[second], data["time"])
     expected = data["joint_force"].sel(mode="+--+", joint="B1", axis="y")
@@ -64,7 +64,7 @@ def test_tables_are_tidy(data):
     row = np.flatnonzero((shapes["station"].values == 40) & (shapes["mode"].values == "++++"))[7]
     assert shapes["station_body"].values[row] == data["station_body"].values[40]
     assert shapes["shape_y"].values[row] == data["shape"].values[0, 7, 40, 1]
-    assert "shape_x" not in [column.name for column in series.columns]
+    assert "shape_x" not in series
 
 
 def test_csv_has_units_in_its_head_and_gaps_where_nothing_was_reached(data, tmp_path):
@@ -133,7 +133,7 @@ def test_netcdf_is_the_dataset_itself(data, tmp_path):
 def test_a_run_without_a_path_and_one_of_the_first_schema(tmp_path):
     model = pf.load("pendulum")
     run = motion_dataset(simulate_motion(model.mechanism, 0.02, samples=3))
-    names = [column.name for column in result_tables(run)["time_series"].columns]
+    names = list(result_tables(run)["time_series"])
     assert names[:2] == ["time", "coordinate_value_beam.x"]
     assert matlab_struct(run)["coordinate_value"].shape == (3, run.sizes["coordinate"])
     files = export_results(pf.open_results(OLD), tmp_path, "csv", shapes=True)
@@ -143,7 +143,7 @@ def test_a_run_without_a_path_and_one_of_the_first_schema(tmp_path):
 def test_results_of_several_models_have_a_row_for_each(data, tmp_path):
     models = xr.concat([data, data], xr.Variable("model", ["rigid", "linear"]))
     series = result_tables(models)["time_series"]
-    assert [column.name for column in series.columns[:3]] == ["model", "mode", "time"]
+    assert list(series.columns[:3]) == ["model", "mode", "time"]
     assert series["torque_tau1"].values.size == 2 * 2 * 21
     assert matlab_struct(models)["torque"].shape == (21, 4, 2, 2)
 

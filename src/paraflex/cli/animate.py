@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
+from paraflex.cli import COMPLETE, INTERRUPTED
 from paraflex.cli.bars import bars, begun_late
 from paraflex.cli.commands.results import AnimateRequest
 from paraflex.cli.tables import plain_console
@@ -19,7 +20,6 @@ from paraflex.results import open_results
 if TYPE_CHECKING:
     from paraflex.plots.film import Film
 
-COMPLETE, INTERRUPTED = 0, 130
 # Fields of `FilmOptions` that are given as they are.
 _OPTIONS = ("magnify", "fps", "speed", "theme", "at", "model")
 

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from paraflex.cli import BAD_INPUT, INTERRUPTED, TROUBLE
 from paraflex.cli.collected import collecting
 from paraflex.cli.commands.once import Command
 from paraflex.cli.commands.requests import with_options
@@ -27,8 +28,6 @@ for _one in COMMANDS:
     app.command(_one.name, cls=Command, help=_one.help)(with_options(_one.request, _one.answer))
     if _one.name == "optimise":
         app.command("optimize", cls=Command, hidden=True, help=_one.help)(with_options(_one.request, _one.answer))
-
-BAD_INPUT, TROUBLE, INTERRUPTED = 2, 1, 130
 
 
 def _show_version(wanted: bool) -> None:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import time
+
+from rich.console import Console
 
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import CompareRequest
 from paraflex.cli.compare_tables import print_comparison
+from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
-    COMPLETE,
-    INTERRUPTED,
-    TROUBLE,
     at_fault,
     find_mode,
     find_path,
@@ -21,7 +20,6 @@ from paraflex.cli.request import (
     of_assembly,
     plan_study,
     results_folder,
-    say_where,
 )
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
@@ -59,15 +57,15 @@ def compare_command(request: CompareRequest) -> int:
         from paraflex.plots import save_figures
 
         save_figures(figures, folder / "figures")
-    if request.json:
-        print(json.dumps(figures, indent=2))
-    else:
-        print_comparison(plain_console(), figures)
+
+    def show(out: Console) -> None:
+        print_comparison(out, figures)
         if comparison.measurements:
-            say_where(console, began, "numbers and figure", folder)
-    if comparison.interrupted:
-        return INTERRUPTED
-    return COMPLETE if any(run.status == "complete" for run in comparison.measurements) else TROUBLE
+            say_where(began, "numbers and figure", folder)
+
+    tell(figures, show, as_json=request.json, doubts=())
+    done = any(run.status == "complete" for run in comparison.measurements)
+    return exit_code(done, interrupted=comparison.interrupted)
 
 
 def _options(request: CompareRequest) -> ComparisonOptions:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from rich.console import Console
+
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.search import parameter_table, search_command
-from paraflex.cli.tables import plain_console, plain_table
+from paraflex.cli.tables import plain_table
 from paraflex.studies import IdentificationResult, load_identification
 
 
@@ -13,8 +15,7 @@ def identify_command(request: SearchRequest) -> int:
     return search_command(request, load_identification(request.study), _report, "residual")
 
 
-def _report(result: IdentificationResult) -> None:
-    console = plain_console()
+def _report(console: Console, result: IdentificationResult) -> None:
     found = result.confidence
     # Half-widths of intervals of 68 %.
     known = {} if found is None else found.deviations

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
+from rich.console import Console
 
+from paraflex.cli import COMPLETE, INTERRUPTED
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import IndicesRequest
-from paraflex.cli.request import COMPLETE, INTERRUPTED
-from paraflex.cli.tables import number, plain_console, plain_table, warn_of
+from paraflex.cli.ending import tell
+from paraflex.cli.tables import number, plain_console, plain_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_figures
 from paraflex.studies import IndicesResult, load_indices
@@ -27,16 +28,16 @@ def indices_command(request: IndicesRequest) -> int:
         return INTERRUPTED
     save_figures(result.to_dict(), request.folder / "figures")
     verdict = study.sweep.setting.verdict()
-    warn_of(console if request.json else plain_console(), verdict)
-    if request.json:
-        print(json.dumps(result.to_dict() | {"verdict": verdict.to_dict()}, indent=2))
-    else:
-        _report(result)
+
+    def show(out: Console) -> None:
+        _report(out, result)
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)
+
+    tell(result.to_dict() | {"verdict": verdict.to_dict()}, show, as_json=request.json, doubts=verdict)
     return COMPLETE
 
 
-def _report(result: IndicesResult) -> None:
+def _report(console: Console, result: IndicesResult) -> None:
     title = "Sobol indices and half the width of their intervals of 95 %"
     keys = ("first", "first_confidence", "total", "total_confidence")
     rows = (
@@ -44,7 +45,6 @@ def _report(result: IndicesResult) -> None:
         for row in result.to_dict()["indices"]
     )
     heads = ("first", "±", "total", "±")
-    console = plain_console()
     console.print(plain_table("metric", "path", "mode", "parameter", numbers=heads, rows=rows, title=title))
     indices = result.indices
     for k, dropped in enumerate(indices["dropped"].values):

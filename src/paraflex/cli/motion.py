@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 import warnings
 from dataclasses import asdict, replace
@@ -17,18 +16,15 @@ from paraflex.cli.bars import bars, begun_late
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
+from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
-    COMPLETE,
-    INTERRUPTED,
-    TROUBLE,
     UNBALANCED,
     at_fault,
     of_assembly,
     results_folder,
-    say_where,
 )
-from paraflex.cli.tables import FINISHED, plain_console, validity, warn_of_doubts
+from paraflex.cli.tables import FINISHED, validity
 from paraflex.cli.writing import write_run
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
@@ -81,16 +77,16 @@ def run_motion(
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     figures = motion_summary(data)
     write_run(data, figures, folder, report=request.report)
-    warn_of_doubts(console if request.json else plain_console(), figures)
-    if request.json:
-        print(json.dumps(figures, indent=2))
-    else:
-        _report(figures, data)
-        say_where(console, began, "results, figures", folder, report=request.report)
-    if run.solution.status in FINISHED:
-        return COMPLETE
-    console.print(f"error: {run.solution.message}", soft_wrap=True)
-    return INTERRUPTED if run.solution.status == "interrupted" else TROUBLE
+
+    def show(out: Console) -> None:
+        _report(out, figures, data)
+        say_where(began, "results, figures", folder, report=request.report)
+
+    tell(figures, show, as_json=request.json)
+    finished = run.solution.status in FINISHED
+    if not finished:
+        console.print(f"error: {run.solution.message}", soft_wrap=True)
+    return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 
 def _simulate(
@@ -169,8 +165,7 @@ def _ended(figures: dict) -> str:
     return f"{status}, {steps}; " + ("no sample was reached" if time is None else f"the last sample is t = {time:g} s")
 
 
-def _report(figures: dict, data: xr.Dataset) -> None:
-    out = plain_console()
+def _report(out: Console, figures: dict, data: xr.Dataset) -> None:
     final = figures["final"]
     out.print(f"{figures['mechanism']}: {_ended(figures)}")
     if figures["event"]:

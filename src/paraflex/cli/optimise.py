@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from rich.console import Console
+
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.search import parameter_table, search_command
-from paraflex.cli.tables import plain_console, plain_table
+from paraflex.cli.tables import plain_table
 from paraflex.studies import OptimisationResult, load_optimisation
 
 
@@ -13,8 +15,7 @@ def optimise_command(request: SearchRequest) -> int:
     return search_command(request, load_optimisation(request.study), _report, "objective")
 
 
-def _report(result: OptimisationResult) -> None:
-    console = plain_console()
+def _report(console: Console, result: OptimisationResult) -> None:
     console.print(parameter_table(result))
     values = [("objective", result.start_objective, result.objective)]
     values += [(name, result.start_metrics[name], value) for name, value in result.metrics.items()]

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import typer
 
+from paraflex.cli import COMPLETE
 from paraflex.cli.commands.results import PlotRequest
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.sources import Source, open_source
 
 ALL = "all"
-COMPLETE = 0
 STYLES = ("single", "double")
 # Denser pictures are larger than any printer's, and than memory.
 _DENSEST = 2400.0

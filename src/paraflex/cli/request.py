@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-
-from rich.console import Console
 
 from paraflex.cli.commands.options import FramesChoice, PlanChoice
 from paraflex.cli.commands.requests import flags
@@ -19,8 +16,6 @@ from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.simulate import TrackingTask
 from paraflex.validity import to_blame
 from paraflex.writing import unwritable
-
-COMPLETE, TROUBLE, INTERRUPTED = 0, 1, 130
 
 
 def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:
@@ -127,9 +122,3 @@ def results_folder(out: str) -> Path:
             if parent.is_dir() and not any(parent.iterdir()):
                 parent.rmdir()
     return folder
-
-
-def say_where(console: Console, began: float, what: str, folder: Path, *, report: bool = False) -> None:
-    """The last line of a command: how long it took, and where things are."""
-    more = " and report.html" if report else ""
-    console.print(f"{time.perf_counter() - began:.1f} s; {what}{more} in {folder}", soft_wrap=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,23 +15,20 @@ from paraflex.checks import check_planned
 from paraflex.cli.bars import bars
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.runs import RunRequest
+from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
-    COMPLETE,
-    INTERRUPTED,
-    TROUBLE,
     at_fault,
     find_modes,
     find_path,
     flagged,
     plan_study,
     results_folder,
-    say_where,
     with_frames,
 )
-from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of, warn_of_doubts
+from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of
 from paraflex.cli.writing import write_run
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
@@ -85,22 +81,19 @@ def run_command(request: RunRequest) -> int:
     if result.data is None:
         warn_of(console, collected(doubts))
         failures(console, result)
-        return INTERRUPTED if result.interrupted else TROUBLE
+        return exit_code(False, interrupted=result.interrupted)
     keep_findings(result.data, collected(verdict_of(result.data)))
     figures = result.to_dict()
     write_run(result.data, figures, folder, report=request.report)
-    if request.json:
-        warn_of_doubts(console, figures)
-        print(json.dumps(figures, indent=2))
-    else:
-        warn_of_doubts(plain_console(), figures)
-        print_study(plain_console(), figures, task, _model_name(request, mechanism))
-        validity(plain_console(), {name: mode.get("validity") for name, mode in figures["modes"].items()})
-        say_where(console, began, "results, figures", folder, report=request.report)
+
+    def show(out: Console) -> None:
+        print_study(out, figures, task, _model_name(request, mechanism))
+        validity(out, {name: mode.get("validity") for name, mode in figures["modes"].items()})
+        say_where(began, "results, figures", folder, report=request.report)
+
+    tell(figures, show, as_json=request.json)
     failures(console, result)
-    if result.interrupted:
-        return INTERRUPTED
-    return COMPLETE if result.complete else TROUBLE
+    return exit_code(result.complete, interrupted=result.interrupted)
 
 
 def _method(request: RunRequest, options: IntegrationOptions) -> Simulator | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -11,18 +10,20 @@ from rich.console import Console
 from rich.table import Table
 
 from paraflex.campaign import Progress
+from paraflex.cli import INTERRUPTED
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SearchRequest
-from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
-from paraflex.cli.tables import plain_console, plain_table, warn_of
+from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.tables import plain_console, plain_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_figures
 from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
+Report = Callable[[Console, R], None]
 
 
-def search_command(request: SearchRequest, study: DesignStudy[R], report: Callable[[R], None], what: str) -> int:
+def search_command(request: SearchRequest, study: DesignStudy[R], report: Report[R], what: str) -> int:
     """Do what is left of a search, write its figures and say what it found; the exit code."""
     console = plain_console(stderr=True)
     compile_kernels_for(study.base.model().mechanism, console.print)
@@ -32,16 +33,14 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Callab
         return INTERRUPTED
     save_figures(result.to_dict(), request.folder / "figures")
     verdict = study.base.setting.verdict()
-    warn_of(console if request.json else plain_console(), verdict)
-    if request.json:
-        more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
-        print(json.dumps(result.to_dict() | more, indent=2))
-    else:
-        report(result)
+
+    def show(out: Console) -> None:
+        report(out, result)
         _say_end(console, result, request.folder)
-    if result.interrupted:
-        return INTERRUPTED
-    return COMPLETE if result.values else TROUBLE
+
+    more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
+    tell(result.to_dict() | more, show, as_json=request.json, doubts=verdict)
+    return exit_code(bool(result.values), interrupted=result.interrupted)
 
 
 def parameter_table(result: R, **columns: dict[str, str]) -> Table:

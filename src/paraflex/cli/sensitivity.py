@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +9,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from paraflex.cli import COMPLETE
 from paraflex.cli.commands.studies import SensitivityRequest
+from paraflex.cli.ending import tell
 from paraflex.cli.replacing import say_replaced
-from paraflex.cli.request import COMPLETE
-from paraflex.cli.tables import number, plain_console, plain_table, print_titled, warn_of_doubts
+from paraflex.cli.tables import number, plain_table, print_titled
 from paraflex.errors import InputError
 from paraflex.plots import save_figures
 from paraflex.studies import Sensitivities, load_sensitivities
@@ -33,14 +33,13 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     found = study.run(folder, on_progress=lambda at: None if at.done else say_replaced(folder, "sensitivity"))
     figures = found.to_dict()
     save_figures(figures, folder / FIGURES)
-    console = plain_console()
-    warn_of_doubts(plain_console(stderr=True) if request.json else console, figures)
-    if request.json:
-        print(json.dumps(figures, indent=2))
-        return COMPLETE
-    for row in range(len(found.rows)):
-        _print(console, found, row)
-    console.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
+
+    def show(out: Console) -> None:
+        for row in range(len(found.rows)):
+            _print(out, found, row)
+        out.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
+
+    tell(figures, show, as_json=request.json)
     return COMPLETE
 
 

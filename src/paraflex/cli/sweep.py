@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from pathlib import Path
 
@@ -11,8 +10,8 @@ from rich.console import Console
 from paraflex.campaign import Progress
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SweepRequest
-from paraflex.cli.request import COMPLETE, INTERRUPTED, TROUBLE
-from paraflex.cli.tables import plain_console, warn_of
+from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits
 from paraflex.studies import SweepResult, load_sweep
@@ -30,17 +29,16 @@ def sweep_command(request: SweepRequest) -> int:
     result = _sweep(console, study, folder, request)
     has_report = request.report and bool(result.done) and _write_report(console, folder)
     verdict = study.setting.verdict()
-    warn_of(console if request.json else plain_console(), verdict)
-    if request.json:
-        parts = {path: part.figures() for path, part in study.setting.parts().items()}
-        print(json.dumps(_figures(result) | {"part": parts, "verdict": verdict.to_dict()}, indent=2))
-    else:
+    parts = {path: part.figures() for path, part in study.setting.parts().items()}
+
+    def show(out: Console) -> None:
         _report(console, result)
         if has_report:
             console.print(f"report: {folder / REPORT}", soft_wrap=True)
-    if result.interrupted:
-        return INTERRUPTED
-    return TROUBLE if result.done and not result.counts.get("complete") else COMPLETE
+
+    more = {"part": parts, "verdict": verdict.to_dict()}
+    tell(_figures(result) | more, show, as_json=request.json, doubts=verdict)
+    return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)
 
 
 def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequest) -> SweepResult:

@@ -36,11 +36,6 @@ def warn_of(console: Console, findings: Iterable[Finding]) -> None:
     printed(findings)
 
 
-def warn_of_doubts(console: Console, figures: Mapping[str, Any]) -> None:
-    """What makes results doubtful, by their summary, before a number of theirs is printed."""
-    warn_of(console, map(Finding.from_dict, figures["verdict"]["findings"]))
-
-
 def print_study(console: Console, figures: dict[str, Any], task: TrackingTask, model: str) -> None:
     """What every mode came to in a model: tables, and a line for each mode that an event stopped."""
     console.print(_study_table(figures, task, model))

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import asdict
 from pathlib import Path
 
+from rich.console import Console
+
 from paraflex.cli.agreement import print_agreement
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import VerifyRequest
+from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
-    COMPLETE,
-    INTERRUPTED,
-    TROUBLE,
     find_mode,
     find_modes,
     find_path,
     flagged,
     plan_study,
     results_folder,
-    say_where,
     with_frames,
 )
-from paraflex.cli.tables import plain_console, warn_of_doubts
+from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
@@ -62,21 +60,18 @@ def verify_command(request: VerifyRequest) -> int:
     figures = verification.to_dict()
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
         _write(verification, figures, folder, report=request.report)
-    warn_of_doubts(console if request.json else plain_console(), figures)
-    if request.json:
-        print(json.dumps(figures, indent=2))
-    else:
-        out = plain_console()
+
+    def show(out: Console) -> None:
         for mode in figures["modes"]:
             print_agreement(out, figures, mode)
-        say_where(console, began, "numbers, figures", folder, report=request.report)
+        say_where(began, "numbers, figures", folder, report=request.report)
+
+    tell(figures, show, as_json=request.json)
     for mode, by_model in verification.runs.items():
         for name, runs in by_model.items():
             if runs.failure:
                 console.print(f'error: mode "{mode}", {name}: {runs.failure}', soft_wrap=True)
-    if verification.interrupted:
-        return INTERRUPTED
-    return COMPLETE if verification.complete else TROUBLE
+    return exit_code(verification.complete, interrupted=verification.interrupted)
 
 
 def _options(request: VerifyRequest) -> VerificationOptions:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -19,6 +18,10 @@ from paraflex.errors import InputError, suggestion
 from paraflex.results.storage import save_results
 from paraflex.writing import whole_file
 
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
 FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
 TIME_SERIES, FIGURES, SHAPES = "time_series", "figures", "shapes"
@@ -28,30 +31,9 @@ _ROWS = ("model", "mode", "time")
 _LONGEST_NAME = 63
 
 
-@dataclass(frozen=True)
-class Column:
-    """A column of a table: values by name, their unit (empty where there is none) and what they are."""
-
-    name: str
-    unit: str
-    meaning: str
-    values: NDArray[Any]
-
-
-@dataclass(frozen=True)
-class TidyTable:
-    """Columns of one length."""
-
-    columns: tuple[Column, ...]
-
-    def __getitem__(self, name: str) -> Column:
-        """The column of that name."""
-        return next(column for column in self.columns if column.name == name)
-
-
 @checked_arguments()
-def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, TidyTable]:
-    """Results as tidy tables, a row an observation.
+def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.DataFrame]:
+    """Results as tidy tables, a row an observation; what a run did not reach is NaN.
 
     Parameters
     ----------
@@ -62,53 +44,42 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, TidyTa
 
     Returns
     -------
-    dict of str to TidyTable
+    dict of str to pandas.DataFrame
         `time_series`: a row a model (of a verification), mode and time; a variable of more dimensions makes a column
         for each of their labels, `torque_tau1` or `joint_force_B1_x`. `figures`: a row a model and mode. `shapes`: a
-        row a model, mode, time and drawn point.
+        row a model, mode, time and drawn point. Their `attrs` hold `units` and `meanings` of columns.
     """
     drawn = [name for name in data.data_vars if "station" in data[name].dims]
     over_time = [name for name in data.data_vars if "time" in data[name].dims and name not in drawn]
     single = [name for name in data.data_vars if name not in drawn and name not in over_time]
-    tables = {
-        TIME_SERIES: _table(data, over_time, [dim for dim in _ROWS if dim in data.dims]),
-        FIGURES: _table(data, single, [dim for dim in _ROWS[:2] if dim in data.dims]),
-    }
+    tables = {TIME_SERIES: _table(data, over_time, _ROWS), FIGURES: _table(data, single, _ROWS[:2])}
     if shapes and drawn:
-        tables[SHAPES] = _table(
-            data.assign_coords(station=np.arange(data.sizes["station"])),
-            ["station_body", *drawn],
-            [dim for dim in (*_ROWS, "station") if dim in data.dims],
-        )
+        stations = data.assign_coords(station=np.arange(data.sizes["station"]))
+        tables[SHAPES] = _table(stations, ["station_body", *drawn], (*_ROWS, "station"))
     return tables
 
 
-def _table(data: xr.Dataset, names: Sequence[Any], rows: list[str]) -> TidyTable:
-    shape = [data.sizes[dim] for dim in rows]
-    columns = []
-    for axis, dim in enumerate(rows):
-        labels = data[dim].values
-        values = np.broadcast_to(labels.reshape([-1 if k == axis else 1 for k in range(len(rows))]), shape).ravel()
-        columns.append(Column(dim, *_told(data[dim]), values))
-    for name in names:
-        array = data[name]
-        others = [dim for dim in array.dims if dim not in rows]
-        own = [dim for dim in rows if dim in array.dims]
-        values = array.transpose(*own, *others).values
+def _table(data: xr.Dataset, names: Sequence[Any], rows: Sequence[str]) -> pd.DataFrame:
+    import pandas as pd
+
+    rows = [dim for dim in rows if dim in data.dims]
+    every = xr.DataArray(np.zeros([data.sizes[dim] for dim in rows]), {dim: data[dim] for dim in rows}, rows)
+    columns: dict[str, NDArray[Any]] = {}
+    units: dict[str, str] = {}
+    meanings: dict[str, str] = {}
+    for name in (*rows, *names):
         # Over rows that a variable does not depend on it is the same.
-        values = values.reshape([data.sizes[dim] if dim in own else 1 for dim in rows] + list(values.shape[len(own) :]))
-        values = np.broadcast_to(values, [*shape, *values.shape[len(rows) :]])
-        labels = [_labels(data, dim) for dim in others]
+        array = data[name].broadcast_like(every)
+        others = [dim for dim in array.dims if dim not in rows]
+        values = array.transpose(*rows, *others).values
+        labels = [data[dim].values if dim in data.coords else range(data.sizes[dim]) for dim in others]
         for index in product(*(range(len(one)) for one in labels)):
-            suffix = "".join(f"_{one[i]}" for one, i in zip(labels, index, strict=True))
-            columns.append(Column(f"{name}{suffix}", *_told(array), values[(..., *index)].ravel()))
-    return TidyTable(tuple(columns))
-
-
-def _labels(data: xr.Dataset, dim: Any) -> list[str]:
-    return (
-        [str(label) for label in data[dim].values] if dim in data.coords else [str(i) for i in range(data.sizes[dim])]
-    )
+            column = "_".join([str(name), *(str(one[i]) for one, i in zip(labels, index, strict=True))])
+            columns[column] = values[(..., *index)].ravel()
+            units[column], meanings[column] = _told(data[name])
+    table = pd.DataFrame(columns)
+    table.attrs = {"units": units, "meanings": meanings}
+    return table
 
 
 def _told(array: xr.DataArray) -> tuple[str, str]:
@@ -168,36 +139,30 @@ def export_results(
     _refuse(list(files.values()), force)
     for name, file in files.items():
         with whole_file(file) as unfinished:
-            write_table(tables[name], unfinished, to, {key: _plain(value) for key, value in data.attrs.items()})
+            _write_table(tables[name], unfinished, to, {key: _plain(value) for key, value in data.attrs.items()})
     return list(files.values())
 
 
-def write_table(table: TidyTable, file: Path, to: str, told: dict[str, str] | None = None) -> None:
+def _write_table(table: pd.DataFrame, file: Path, to: str, about: Mapping[str, str]) -> None:
     """Write a table as CSV, units in the names of columns, or Parquet, units in their metadata."""
     import pyarrow as pa
-    from pyarrow import csv, parquet
+    from pyarrow import parquet
 
-    arrays = [_arrow(column.values) for column in table.columns]
+    units, meanings = table.attrs["units"], table.attrs["meanings"]
+    found = pa.Table.from_pandas(table, preserve_index=False)
     if to == "csv":
-        names = [f"{column.name} [{column.unit}]" if column.unit else column.name for column in table.columns]
-        csv.write_csv(pa.table(arrays, names=names), file)
+        _write_csv(found, units, file)
         return
-    fields = [
-        pa.field(column.name, array.type, metadata={"unit": column.unit, "long_name": column.meaning})
-        for column, array in zip(table.columns, arrays, strict=True)
-    ]
-    parquet.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=told or {})), file, compression="zstd")
+    about_columns = {name: {"unit": units[name], "long_name": meanings[name]} for name in units}
+    fields = [field.with_metadata(about_columns[field.name]) for field in found.schema]
+    parquet.write_table(found.cast(pa.schema(fields, metadata=dict(about))), file, compression="zstd")
 
 
-def _arrow(values: NDArray[Any]) -> Any:
-    """What a run did not reach is empty."""
-    import pyarrow as pa
+def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
+    from pyarrow import csv
 
-    if values.dtype.kind == "f":
-        return pa.array(np.ascontiguousarray(values), from_pandas=True)
-    if values.dtype.kind in "biu":
-        return pa.array(np.ascontiguousarray(values))
-    return pa.array([str(value) for value in values])
+    names = [f"{name} [{units[name]}]" if units[name] else name for name in table.column_names]
+    csv.write_csv(table.rename_columns(names), file)
 
 
 def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
@@ -263,7 +228,7 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
         It cannot be written.
     """
     import pyarrow as pa
-    from pyarrow import csv, parquet
+    from pyarrow import parquet
 
     if to not in ("csv", "mat"):
         raise InputError(
@@ -273,28 +238,25 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
     file = output if output.suffix.lower() == ENDINGS[to] else output / f"results{ENDINGS[to]}"
     _refuse([file], force)
     try:
-        table = parquet.read_table(source)
+        found = parquet.read_table(source)
     except (OSError, pa.ArrowException) as error:
         raise InputError(
             "damaged or cut short: not a readable table", field=str(source), remedy="run the study again"
         ) from error
     with whole_file(file) as unfinished:
         if to == "csv":
-            units = [(field.metadata or {}).get(b"unit", b"").decode() for field in table.schema]
-            names = [f"{name} [{unit}]" if unit else name for name, unit in zip(table.column_names, units, strict=True)]
-            csv.write_csv(table.rename_columns(names), unfinished)
+            units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in found.schema}
+            _write_csv(found, units, unfinished)
         else:
-            columns = {matlab_name(name): _matlab_value(_column(table[name])) for name in table.column_names}
+            table = found.to_pandas()
+            columns = {matlab_name(name): _matlab_value(_known(table[name]).to_numpy()) for name in table}
             _write_mat({"results": columns}, unfinished)
     return [file]
 
 
-def _column(column: Any) -> NDArray[Any]:
-    """Values of an Arrow column; missing numbers are NaN, missing text empty."""
-    values = column.to_pylist()
-    if all(value is None or isinstance(value, (int, float)) for value in values):
-        return np.array([np.nan if value is None else value for value in values])
-    return np.array(["" if value is None else str(value) for value in values])
+def _known(column: pd.Series) -> pd.Series:
+    """A column in which text that is missing is empty."""
+    return column.fillna("") if column.dtype == object else column
 
 
 def _plain(value: Any) -> str:

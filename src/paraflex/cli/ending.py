@@ -1,0 +1,54 @@
+"""How commands end: what they print of results, and their exit code."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from paraflex.cli import COMPLETE, INTERRUPTED, TROUBLE
+from paraflex.cli.tables import plain_console, warn_of
+from paraflex.findings import Finding
+
+
+def exit_code(well: bool, *, interrupted: bool) -> int:
+    """Of a command that did what was asked for, or not, or was interrupted."""
+    if interrupted:
+        return INTERRUPTED
+    return COMPLETE if well else TROUBLE
+
+
+def tell(
+    numbers: dict[str, Any], show: Callable[[Console], None], *, as_json: bool, doubts: Iterable[Finding] | None = None
+) -> None:
+    """Print results, as JSON or as they are shown; before them, beside JSON on stderr, what makes them doubtful.
+
+    Parameters
+    ----------
+    numbers : dict
+        In plain values.
+    show : callable
+        Prints tables to a console.
+    as_json : bool
+    doubts : iterable of Finding, optional
+        Those of the numbers' own verdict by default.
+    """
+    out = plain_console()
+    if doubts is None:
+        doubts = map(Finding.from_dict, numbers["verdict"]["findings"])
+    warn_of(plain_console(stderr=True) if as_json else out, doubts)
+    if as_json:
+        print(json.dumps(numbers, indent=2))
+    else:
+        show(out)
+
+
+def say_where(began: float, what: str, folder: Path, *, report: bool = False) -> None:
+    """The last line of a command: how long it took, and where things are."""
+    more = " and report.html" if report else ""
+    text = f"{time.perf_counter() - began:.1f} s; {what}{more} in {folder}"
+    plain_console(stderr=True).print(text, soft_wrap=True)
