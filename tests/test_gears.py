@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import paraflex as pf
-from paraflex.dynamics import build_system, consistent_state, natural_frequencies, redundant_rows
+from paraflex.cli.inspect import describe
+from paraflex.cli.inspect_tables import print_facts
+from paraflex.dynamics import build_system, consistent_state, natural_frequencies, redundant_rows, static_equilibrium
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.soundness import mobility
 from paraflex.elastodynamics import simulate_ked
@@ -41,6 +44,7 @@ from paraflex.plots.scene import scene
 from paraflex.plots.svg import sketch
 from paraflex.results import motion_dataset
 from paraflex.results.drawing import assembled_data
+from paraflex.results.joint_loads import joint_loads
 from paraflex.results.record import record
 
 ref = PointRef.parse
@@ -101,7 +105,7 @@ def rack(radius=0.04, **more):
     )
 
 
-def chain(ratio=-2.0, **more):
+def chain(ratio=-2.0, angles=(0.1, 0.5), **more):
     """Two links hanging in gravity, the second geared to the first."""
     links = [
         RigidBody(name, m, J, (c, 0.0), {"A": (0.0, 0.0), "B": (0.4, 0.0)})
@@ -117,7 +121,7 @@ def chain(ratio=-2.0, **more):
         ),
         gears=(Gear("mesh", "hip", "knee", ratio),),
         gravity=(0.0, -9.81),
-        assemblies=(Assembly("start", {"upper": 0.1, "lower": 0.5}),),
+        assemblies=(Assembly("start", dict(zip(("upper", "lower"), angles, strict=True))),),
         **more,
     )
 
@@ -255,6 +259,40 @@ def test_a_wheel_that_cannot_turn_clamps_the_beam():
     assert found[1] == pytest.approx(3.51602 * np.sqrt(stiffness / mass / 0.6**4), rel=1e-3)
 
 
+def test_a_chain_in_equilibrium_swings_about_it():
+    mechanism = chain(1.5, angles=(-1.3, -1.5))
+    (m1, J1, c1), (m2, J2, c2), l, g, n = (1.2, 0.02, 0.2), (0.7, 0.01, 0.15), 0.4, 9.81, 2.5
+    phase = -0.2 + 1.5 * 1.3
+
+    def slope(theta):
+        return g * ((m1 * c1 + m2 * l) * np.cos(theta) + m2 * c2 * n * np.cos(n * theta + phase))
+
+    system = build_system(mechanism)
+    state = static_equilibrium(system, consistent_state(system, mechanism.assembly()), [])
+    theta = brentq(slope, state.q[2] - 0.1, state.q[2] + 0.1, xtol=1e-14)
+    assert state.q[2] == pytest.approx(theta, abs=1e-9)
+    M = J1 + m1 * c1**2 + m2 * l**2 + (J2 + m2 * c2**2) * n**2 + 2 * m2 * l * c2 * n * np.cos(1.5 * theta + phase)
+    stiffness = (slope(theta + 1e-6) - slope(theta - 1e-6)) / 2e-6
+    found = natural_frequencies(system, state)
+    np.testing.assert_allclose(found.frequencies, [np.sqrt(stiffness / M)], rtol=1e-7)
+
+
+def test_moments_in_joints_turn_the_wheels():
+    """Euler's law for either wheel: the gear's torque is part of what its joint does."""
+    run = simulate_motion(train(-2.0), 0.2, torques={"drive": 1.5}, options=EXACT, samples=3)
+    loads = joint_loads(run.system, ("A", "B"), run.solution.q, run.solution.multipliers, np.full((3, 1), 1.5))
+    np.testing.assert_allclose(loads.moment, run.solution.a[:, [2, 5]] * [0.02, 0.05], rtol=1e-9)
+
+
+def test_one_brake_holds_both_cranks_as_two_do():
+    task = pf.plan_tracking(pf.load("geared_five_bar"), "stroke", duration=0.4, samples=21, after="hold")
+    assert task.holds
+    both, one = (task.simulate(mode, options=pf.IntegrationOptions(tolerance=1e-7)).solution for mode in ("++", "+-"))
+    np.testing.assert_allclose(both.q, one.q, rtol=0, atol=2e-6)
+    cranks = [joint_coordinate(task.system, name, one.q).value[-3:] for name in ("A1", "A2")]
+    np.testing.assert_allclose(np.ptp(cranks, axis=1), 0.0, atol=1e-9)
+
+
 # --- What a gear is to a mechanism ----------------------------------------------------------------------------------
 
 
@@ -382,6 +420,15 @@ def test_segments_come_to_bend_as_beams_do(five_bar):
     few, many = (np.max(np.abs(error(five_bar.in_segments(n)) - beams)) for n in (12, 48))
     assert many < 0.4 * few
     assert many < 0.1 * np.max(np.abs(beams))
+
+
+def test_info_tells_what_gears_hold(capsys):
+    facts = describe(pf.load("geared_five_bar"))
+    assert facts["gears"] == ["mesh: A2 = -1 A1 + 3.142"]
+    print_facts(facts)
+    assert "mesh: A2 = -1 A1 + 3.142" in capsys.readouterr().out
+    print_facts(describe(pf.load("pendulum")))
+    assert "gears" not in capsys.readouterr().out
 
 
 def test_a_saved_model_has_the_gear(tmp_path):
