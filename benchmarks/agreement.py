@@ -46,7 +46,7 @@ def main() -> None:
     given = parser.parse_args()
     single_thread()
     model = pf.load("raparm_i")
-    case = tracking_case(pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7), "++++")
+    case = tracking_case(pf.plan(model.mechanism, model.path("square"), duration=0.7), "++++")
 
     def run(**options) -> tuple[NDArray[np.float64], Solution]:
         solution = case.solve(IntegrationOptions(**options), None)

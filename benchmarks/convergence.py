@@ -23,7 +23,7 @@ TOLERANCES, SHOWN = (2e-4, 1e-4, 5e-5, 2e-5), 1e-4
 def main() -> None:
     given = command_line(__doc__).parse_args()
     model = pf.load("raparm_i")
-    task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7)
+    task = pf.plan(model.mechanism, model.path("square"), duration=0.7)
 
     def study(tolerance: float) -> xr.Dataset:
         result = pf.run_study(task, model.study.modes, options=IntegrationOptions(method=METHOD, tolerance=tolerance))

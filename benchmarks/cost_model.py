@@ -102,7 +102,7 @@ def over_bodies(rows: Sequence[int], chains: Sequence[int]) -> list[dict[str, An
 def plan(duration: float = 0.7) -> TrackingTask:
     """The study of RAParM-I, a sample each millisecond."""
     model = pf.load("raparm_i")
-    return pf.plan_tracking(model.mechanism, model.path("square"), duration=duration, samples=round(1e3 * duration) + 1)
+    return pf.plan(model.mechanism, model.path("square"), duration=duration, samples=round(1e3 * duration) + 1)
 
 
 def quickest(task: TrackingTask, **options: Any) -> Solution:

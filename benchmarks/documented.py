@@ -180,12 +180,12 @@ def gradients() -> dict[str, Any]:
 
 def indices() -> dict[str, Any]:
     """Sobol indices of the study of docs/optimisation.md."""
-    from paraflex.studies import sobol_indices
+    from paraflex.studies import indices
 
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         chosen = {"metrics": ["tracking_rms", "peak_torque_max"], "samples": 128, "seed": 1}
-        result = sobol_indices(EXAMPLES / "optimisation.toml", folder, **chosen)
+        result = indices(EXAMPLES / "optimisation.toml", folder, **chosen)
         draw("indices", result.to_dict())
         rows: dict[str, dict[str, Any]] = {}
         for row in result.to_dict()["indices"]:

@@ -142,7 +142,7 @@ class Part:
 def plan(duration: float = 0.7) -> TrackingTask:
     """The study of RAParM-I."""
     model = pf.load("raparm_i")
-    return pf.plan_tracking(model.mechanism, model.path("square"), duration=duration)
+    return pf.plan(model.mechanism, model.path("square"), duration=duration)
 
 
 def half_way(task: TrackingTask, tolerance: float, attempts: int = 300) -> NativeRun:

@@ -45,7 +45,7 @@ def measure(name: str) -> list[dict[str, Any]]:
     """All modes of a mechanism."""
     model = pf.load(name)
     path = model.study.path
-    task = pf.plan_tracking(model.mechanism, model.path(path), duration=model.study.duration)
+    task = pf.plan(model.mechanism, model.path(path), duration=model.study.duration)
     rows = []
     for mode in MODES[name]:
         rows.append({"mechanism": model.mechanism.name, "path": path, **of_mode(task, mode)})

@@ -27,7 +27,7 @@ def main() -> None:
     single_thread()
     compile_kernels()
     model = pf.load("raparm_i")
-    case = tracking_case(pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7), "++++")
+    case = tracking_case(pf.plan(model.mechanism, model.path("square"), duration=0.7), "++++")
     options = ComparisonOptions(tolerances=TOLERANCES, limit=given.limit, repetitions=3)
     comparison = compare_methods(case, given.method, options=options)
     rows = [

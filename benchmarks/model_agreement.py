@@ -97,7 +97,7 @@ def main() -> None:
     parser.add_argument("--mode", action="append", metavar="SIGNS", help="the paper's six by default")
     given = parser.parse_args()
     model = pf.load("raparm_i")
-    task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.7)
+    task = pf.plan(model.mechanism, model.path("square"), duration=0.7)
     rows = [of_mode(task, mode) for mode in given.mode or MODES]
     print_rows(rows)
     exact = [{"step": options.step, "refinement": options.refinement} for options in EXUDYN]

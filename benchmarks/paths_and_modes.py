@@ -56,7 +56,7 @@ def measure(paths: list[str], modes: list[str] | None, *, exudyn: bool) -> list[
     """A row for every path and mode."""
     model, rows = pf.load("raparm_i"), []
     for path in paths:
-        task = pf.plan_tracking(model.mechanism, model.path(path), duration=DURATION)
+        task = pf.plan(model.mechanism, model.path(path), duration=DURATION)
         for mode in model.mechanism.modes:
             if modes and mode.name not in modes:
                 continue

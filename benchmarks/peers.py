@@ -270,7 +270,7 @@ def mujoco_choices(task: TrackingTask, target: float, segments: int = 8) -> Iter
 def plan(duration: float) -> TrackingTask:
     """The study of RAParM-I on its square, a sample each millisecond."""
     model = pf.load("raparm_i")
-    return pf.plan_tracking(model.mechanism, model.path("square"), duration=duration, samples=round(1e3 * duration) + 1)
+    return pf.plan(model.mechanism, model.path("square"), duration=duration, samples=round(1e3 * duration) + 1)
 
 
 def main() -> None:

@@ -25,7 +25,7 @@ def main() -> None:
     given = command_line(__doc__).parse_args()
     single_thread()
     model = pf.load("raparm_i")
-    task = pf.plan_tracking(model.mechanism, model.path("square"), duration=DURATION)
+    task = pf.plan(model.mechanism, model.path("square"), duration=DURATION)
 
     def run(**options):
         return task.simulate(MODE, options=IntegrationOptions(**options))

@@ -8,7 +8,7 @@ import paraflex as pf
 def main() -> dict[str, float]:
     robot = pf.load("4rrr")
     path = robot.paths["circle"]
-    task = pf.plan_tracking(robot.mechanism.with_geometry("second-order"), path, samples=301)
+    task = pf.plan(robot.mechanism.with_geometry("second-order"), path, samples=301)
     data = pf.tracking_dataset([task.simulate(mode.name) for mode in robot.mechanism.modes])
     print(" mode   error   peak torque   worst condition")
     for mode in data["tracking_rms_motion"].sortby(data["tracking_rms_motion"])["mode"].values:

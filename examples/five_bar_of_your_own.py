@@ -58,7 +58,7 @@ def main() -> dict[str, float]:
     print(f"motors held, it vibrates at {lowest / (2 * pi):.1f} Hz")
 
     circle = pf.Circle(centre=(0.0, 0.280), radius=0.030, max_acceleration=30.0)
-    task = pf.plan_tracking(mechanism, circle, duration=0.5)
+    task = pf.plan(mechanism, circle, duration=0.5)
     run = task.simulate("++")
     data = pf.tracking_dataset([run])
     error, torque = float(data["tracking_rms_motion"][0]), float(data["peak_torque"].max())

@@ -7,7 +7,7 @@ import paraflex as pf
 
 def main() -> dict[str, float]:
     robot = pf.load("raparm_i")  # or your own TOML file
-    task = pf.plan_tracking(robot.mechanism, robot.paths["square"], duration=0.7)
+    task = pf.plan(robot.mechanism, robot.paths["square"], duration=0.7)
     runs = [task.simulate(mode) for mode in ("+-+-", "++++")]
     data = pf.tracking_dataset(runs)
     for mode in data["mode"].values:

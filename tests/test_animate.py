@@ -22,7 +22,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
 from paraflex.plots import mechanism_drawing
-from paraflex.plots.film import FilmOptions, find_encoder, plan_film, write_film
+from paraflex.plots.film import FilmOptions, animate, find_encoder, plan_film
 from paraflex.plots.marks import block, ground_of, is_guide, zigzag
 from paraflex.plots.scene import figure_of, scale_bar, scene, select
 from paraflex.results import motion_dataset
@@ -35,7 +35,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 @pytest.fixture(scope="module")
 def data(raparm, square):
     """Two modes of RAParM-I, a tenth of a second; the second stops half way."""
-    task = pf.plan_tracking(raparm, square, duration=0.1, samples=21)
+    task = pf.plan(raparm, square, duration=0.1, samples=21)
     whole = task.simulate("++++", options=IntegrationOptions(tolerance=1e-4))
     with pytest.raises(pf.NumericalError) as caught:
         task.simulate("+--+", options=IntegrationOptions(tolerance=1e-4, max_steps=40))
@@ -190,7 +190,7 @@ def test_a_film_plays_the_run_at_its_speed(data):
 
 
 def test_a_gif_moves_and_keeps_its_ground(data, tmp_path):
-    write_film(data, tmp_path / "film.gif", ["++++"], SMALL)
+    animate(data, tmp_path / "film.gif", ["++++"], SMALL)
     with Image.open(tmp_path / "film.gif") as film:
         assert film.size == (320, 240)
         assert film.n_frames == 11
@@ -206,7 +206,7 @@ def test_a_gif_moves_and_keeps_its_ground(data, tmp_path):
 
 def test_a_folder_of_pictures_and_one_picture(data, slider, tmp_path):
     told = []
-    write_film(data, tmp_path / "frames", ["++++", "+--+"], SMALL, on_progress=lambda *how_far: told.append(how_far))
+    animate(data, tmp_path / "frames", ["++++", "+--+"], SMALL, on_progress=lambda *how_far: told.append(how_far))
     names = sorted(each.name for each in (tmp_path / "frames").iterdir())
     assert names == [f"frame_{i:04d}.png" for i in range(1, 12)]
     assert told == [(i, 11) for i in range(1, 12)]
@@ -216,7 +216,7 @@ def test_a_folder_of_pictures_and_one_picture(data, slider, tmp_path):
     # Both panels show something: link colours left and right.
     for half in (last[:, :160], last[:, 160:]):
         assert np.sum(np.ptp(half.astype(int), axis=-1) > 60) > 100
-    write_film(slider, tmp_path / "one.png", (), FilmOptions(at=0.005, theme="dark", size=(300, 201)))
+    animate(slider, tmp_path / "one.png", (), FilmOptions(at=0.005, theme="dark", size=(300, 201)))
     with Image.open(tmp_path / "one.png") as picture:
         # Even, as encoders want it.
         assert picture.size == (300, 202)
@@ -225,7 +225,7 @@ def test_a_folder_of_pictures_and_one_picture(data, slider, tmp_path):
 
 def test_an_svg_plays_by_itself(data, tmp_path):
     file = tmp_path / "film.svg"
-    film = write_film(data, file, ["++++"], SMALL)
+    film = animate(data, file, ["++++"], SMALL)
     text = file.read_text(encoding="utf-8")
     assert not re.search(r"href|url\(|<script|@import", text)
     root = ET.fromstring(text)
@@ -260,14 +260,14 @@ def _distance(place, curve):
 
 def test_names_are_escaped_in_an_svg(data, tmp_path):
     odd = data.assign_attrs(mechanism='<b>"5R" & more</b>')
-    write_film(odd, tmp_path / "film.svg", ["++++"], SMALL)
+    animate(odd, tmp_path / "film.svg", ["++++"], SMALL)
     root = ET.fromstring((tmp_path / "film.svg").read_text(encoding="utf-8"))
     assert any(text.text == '<b>"5R" & more</b>' for text in root.iter(f"{SVG}text"))
 
 
 def test_an_mp4_decodes_to_what_was_drawn(data, tmp_path):
-    write_film(data, tmp_path / "film.mp4", ["++++"], SMALL)
-    write_film(data, tmp_path / "frames", ["++++"], SMALL)
+    animate(data, tmp_path / "film.mp4", ["++++"], SMALL)
+    animate(data, tmp_path / "frames", ["++++"], SMALL)
     decode = [find_encoder(), "-loglevel", "error", "-i", str(tmp_path / "film.mp4"), "-f", "rawvideo",
               "-pix_fmt", "rgb24", "-"]  # fmt: skip
     raw = subprocess.run(decode, capture_output=True, check=True).stdout
@@ -283,7 +283,7 @@ def test_without_an_encoder_the_package_is_named(data, tmp_path, monkeypatch):
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(InputError, match=r"pip install 'paraflex\[video\]'"):
-        write_film(data, tmp_path / "film.mp4", ["++++"], SMALL)
+        animate(data, tmp_path / "film.mp4", ["++++"], SMALL)
     assert not list(tmp_path.iterdir())
 
 
@@ -293,7 +293,7 @@ def test_an_encoder_that_gives_up_leaves_nothing(data, tmp_path, monkeypatch):
     fake.chmod(0o755)
     monkeypatch.setattr("shutil.which", lambda name: str(fake))
     with pytest.raises(OutputError, match=r"gave up .no such codec."):
-        write_film(data, tmp_path / "film.mp4", ["++++"], SMALL)
+        animate(data, tmp_path / "film.mp4", ["++++"], SMALL)
     assert [each.name for each in tmp_path.iterdir()] == ["ffmpeg"]
 
 
@@ -304,7 +304,7 @@ def test_what_is_interrupted_leaves_nothing(data, tmp_path, name):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_film(data, tmp_path / name, ["++++"], SMALL, on_progress=interrupt)
+        animate(data, tmp_path / name, ["++++"], SMALL, on_progress=interrupt)
     assert not list(tmp_path.iterdir())
 
 
@@ -322,7 +322,7 @@ def test_what_is_interrupted_leaves_nothing(data, tmp_path, name):
 )
 def test_options_that_make_no_film(data, tmp_path, name, options, message):
     with pytest.raises(InputError, match=message):
-        write_film(data, tmp_path / name, ["++++"], FilmOptions(**options))
+        animate(data, tmp_path / name, ["++++"], FilmOptions(**options))
     assert not list(tmp_path.iterdir())
 
 

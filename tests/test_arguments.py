@@ -21,7 +21,7 @@ from paraflex.errors import InputError, ValidityWarning
 from paraflex.findings import Finding, Verdict
 from paraflex.mechanism import EndEffector, Mechanism, Motor, PointRef, RevoluteJoint, RigidBody, Start, WeldJoint
 from paraflex.motion import simulate_motion
-from paraflex.results.export import export_results, result_tables
+from paraflex.results.export import export, result_tables
 from paraflex.simulate import simulate
 
 # A call, and how its error begins.
@@ -99,21 +99,21 @@ SLIPS = [
     ("pf.Polygon(3,3)", "corners: not a list of points"),
     ("pf.Polygon('square',3)", "corners: not a list of points"),
     ("pf.Line(3,3,1)", "start: not a list of points"),
-    ("pf.plan_tracking(model,'sqare')", "raparm_i.toml: path: unknown path"),
-    ("pf.plan_tracking(mech,'square')", "path: a mechanism has no paths by name"),
-    ("pf.plan_tracking('raparm_i','square')", "mechanism: not a mechanism"),
-    ("pf.plan_tracking(mech,[(0,0.3),(0.1,0.3)])", "path: not a path"),
-    ("pf.plan_tracking(mech,model)", "path: not a path"),
-    ("pf.plan_tracking(mech,None)", "path: is not given"),
-    ("pf.plan_tracking(task,'square')", "mechanism: not a mechanism"),
-    ("pf.plan_tracking(model,'square',duration='0.7')", "duration: not a number"),
-    ("pf.plan_tracking(model,'square',duration=-1)", "duration: must be positive"),
-    ("pf.plan_tracking(model,'square',samples=70.5)", "samples: not a whole number"),
-    ("pf.plan_tracking(model,'square',samples='70')", "samples: not a whole number"),
-    ("pf.plan_tracking(model,'square',assembly=1)", "assembly: not a text"),
-    ("pf.plan_tracking(model,'square',orientation='up')", "orientation: not a number"),
-    ("pf.plan_tracking(model,'square',after='stop')", "after: unknown ending"),
-    ("pf.plan_tracking(model,'square',after=1)", "after: not an Ending"),
+    ("pf.plan(model,'sqare')", "raparm_i.toml: path: unknown path"),
+    ("pf.plan(mech,'square')", "path: a mechanism has no paths by name"),
+    ("pf.plan('raparm_i','square')", "mechanism: not a mechanism"),
+    ("pf.plan(mech,[(0,0.3),(0.1,0.3)])", "path: not a path"),
+    ("pf.plan(mech,model)", "path: not a path"),
+    ("pf.plan(mech,None)", "path: is not given"),
+    ("pf.plan(task,'square')", "mechanism: not a mechanism"),
+    ("pf.plan(model,'square',duration='0.7')", "duration: not a number"),
+    ("pf.plan(model,'square',duration=-1)", "duration: must be positive"),
+    ("pf.plan(model,'square',samples=70.5)", "samples: not a whole number"),
+    ("pf.plan(model,'square',samples='70')", "samples: not a whole number"),
+    ("pf.plan(model,'square',assembly=1)", "assembly: not a text"),
+    ("pf.plan(model,'square',orientation='up')", "orientation: not a number"),
+    ("pf.plan(model,'square',after='stop')", "after: unknown ending"),
+    ("pf.plan(model,'square',after=1)", "after: not an Ending"),
     ("simulate(model,'++++')", "task: not a task"),
     ("simulate(mech,'++++')", "task: not a task"),
     ("simulate(task,1)", "mode: not an actuation mode"),
@@ -181,7 +181,7 @@ SLIPS = [
     ("residual_vibration(mdata, 0.1)", 'data: these are results of the kind "motion"'),
     ("residual_vibration(data,'end')", "motion_end: not a number"),
     ("result_tables(run)", "data: not a dataset of results"),
-    ("export_results('results','csv')", "data: not a dataset of results"),
+    ("export('results','csv')", "data: not a dataset of results"),
     ("run_study(model,['++++'])", "task: not a task"),
     ("run_study(task,3)", "modes: not an actuation mode"),
     ("run_study(task,['++++',3])", "modes: not an actuation mode"),
@@ -234,8 +234,8 @@ SLIPS = [
     ("pf.optimise('no.toml',3)", "folder: not a file name"),
     ("pf.identify(3,tmp)", "study: not an identification or a file name"),
     ("pf.identify('no.toml',None)", "folder: is not given"),
-    ("pf.sobol_indices(3,tmp)", "study: not an IndicesStudy or a file name"),
-    ("pf.sobol_indices('no.toml',tmp,samples='3')", "samples: not a whole number"),
+    ("pf.indices(3,tmp)", "study: not an IndicesStudy or a file name"),
+    ("pf.indices('no.toml',tmp,samples='3')", "samples: not a whole number"),
     ("pf.sensitivities(3)", "study: not a SensitivityStudy or a file name"),
     ("pf.sensitivities(model)", "study: not a SensitivityStudy or a file name"),
     ("pf.sensitivities('no.toml',at=[1])", "at: not a dictionary"),
@@ -248,13 +248,13 @@ SLIPS = [
     ("pf.load_path('raparm_i')", "raparm_i: file: cannot be read (no such file or directory)"),
     ("model.path(3)", "name: not a text"),
     ("model.path('sqare')", "raparm_i.toml: path: unknown path"),
-    ("pf.four_bars_in_a_row('3')", "n: not a whole number"),
-    ("pf.four_bars_in_a_row(2.5)", "n: not a whole number"),
-    ("pf.chain_of_segments('3')", "n: not a whole number"),
-    ("pf.chain_of_segments(3,length='1')", "length: not a number"),
-    ("pf.raparm_i(e='0.1')", "e: not a number"),
-    ("pf.raparm_i(section=0.1)", "section: not a Section"),
-    ("pf.raparm_i(material='steel')", "material: not a Material"),
+    ("pf.library.four_bars_in_a_row('3')", "n: not a whole number"),
+    ("pf.library.four_bars_in_a_row(2.5)", "n: not a whole number"),
+    ("pf.library.chain_of_segments('3')", "n: not a whole number"),
+    ("pf.library.chain_of_segments(3,length='1')", "length: not a number"),
+    ("pf.library.raparm_i(e='0.1')", "e: not a number"),
+    ("pf.library.raparm_i(section=0.1)", "section: not a Section"),
+    ("pf.library.raparm_i(material='steel')", "material: not a Material"),
     ("mech.body('lnk')", "body: unknown body"),
     ("mech.body(3)", "body: unknown body"),
     ("mech.joint('A9')", "joint: unknown joint"),
@@ -355,13 +355,13 @@ def given(tmp_path_factory):
     """What the calls above name: all that is public, and one of each thing that is passed on."""
     tmp = tmp_path_factory.mktemp("slips")
     model, pend = pf.load("raparm_i"), pf.load("pendulum")
-    task = pf.plan_tracking(model, "square", duration=0.01, samples=5)
+    task = pf.plan(model, "square", duration=0.01, samples=5)
     run, mrun = task.simulate("++++"), simulate_motion(pend, 0.05, samples=5)
     data = pf.tracking_dataset(run)
     pf.save_results(data, tmp / "results.nc")
     public = [paraflex.mechanism, paraflex.dynamics, paraflex.results, paraflex.studies, paraflex.report]
     names = {name: getattr(module, name) for module in public for name in module.__all__}
-    functions = [simulate, simulate_ked, simulate_motion, export_results, result_tables]
+    functions = [simulate, simulate_ked, simulate_motion, export, result_tables]
     return names | {each.__name__: each for each in functions} | {
         "pf": pf, "plots": pf.plots, "tmp": tmp, "model": model, "mech": model.mechanism, "pend": pend,
         "task": task, "run": run, "mrun": mrun, "data": data, "mdata": paraflex.results.motion_dataset(mrun),
@@ -423,7 +423,7 @@ TAKEN = [
 @pytest.mark.parametrize(("call", "full"), TAKEN, ids=[call for call, _ in TAKEN])
 def test_what_can_be_meant_in_one_way_is_taken(given, call, full):
     def plan(*arguments, **others):
-        return pf.plan_tracking(*arguments, duration=0.01, samples=3, **others).motion.q.tolist()
+        return pf.plan(*arguments, duration=0.01, samples=3, **others).motion.q.tolist()
 
     def free(mechanism, **others):
         return simulate_motion(mechanism, 0.05, samples=3, **others).solution.q.tolist()
@@ -483,6 +483,6 @@ def test_a_task_is_no_model(given):
     with pytest.raises(
         InputError, match=r"^mechanism: not a mechanism \(got a TrackingTask\); give a Mechanism, or the"
     ):
-        pf.plan_tracking(given["task"], given["model"].path("square"))
+        pf.plan(given["task"], given["model"].path("square"))
     with pytest.raises(InputError, match=r"^mechanism: not a mechanism \(got namespace"):
-        pf.plan_tracking(SimpleNamespace(mechanism=3, paths={}), "square")
+        pf.plan(SimpleNamespace(mechanism=3, paths={}), "square")

@@ -37,7 +37,7 @@ import startup  # noqa: E402
 @pytest.fixture(scope="module")
 def task():
     model = pf.load("raparm_i")
-    return pf.plan_tracking(model.mechanism, model.path("square"), duration=0.02, samples=21)
+    return pf.plan(model.mechanism, model.path("square"), duration=0.02, samples=21)
 
 
 def test_a_lucky_setting_is_passed_over():
@@ -222,7 +222,7 @@ def measured(path, mode):
 def test_errors_of_paths_and_modes_are_those_of_the_models(mode):
     """On the line +-+- is the better one, in the motion and over the whole run, by every model."""
     model = pf.load("raparm_i")
-    task = pf.plan_tracking(model.mechanism, model.path("line"), duration=paths_and_modes.DURATION)
+    task = pf.plan(model.mechanism, model.path("line"), duration=paths_and_modes.DURATION)
     found = paths_and_modes.run_models(task, mode, exudyn=False)
     known = measured("line", mode)
     for name in ("second_order", "linear"):
@@ -353,7 +353,7 @@ def test_what_trust_md_says_of_other_mechanisms_was_measured():
 
 def test_errors_are_taken_until_the_motion_ends_and_over_the_whole_run():
     model = pf.load("raparm_i")
-    task = pf.plan_tracking(model.mechanism, model.path("line"), duration=0.2, samples=41)
+    task = pf.plan(model.mechanism, model.path("line"), duration=0.2, samples=41)
     run = models.SECOND_ORDER.task(task).simulate("++++", method="esdirk5")
     data = pf.tracking_dataset([run])
     errors = models.tracking_errors(run, task.path.duration)

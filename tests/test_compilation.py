@@ -22,7 +22,7 @@ for call in _PARTS.values():
     call(Geometry.LINEAR)
 before = compiled()
 model = pf.load("raparm_i")
-task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.01, samples=5)
+task = pf.plan(model.mechanism, model.path("square"), duration=0.01, samples=5)
 pf.run_study(task, ["++++"])
 print(len(before), compiled() - before)
 """
@@ -42,7 +42,7 @@ for each in kernels[::-1] if sys.argv[1:] else []:
         each.from_python.compile(signature)
         loaded += 1
 model = pf.load("raparm_i")
-task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.01, samples=5)
+task = pf.plan(model.mechanism, model.path("square"), duration=0.01, samples=5)
 run = task.simulate("++++", options=IntegrationOptions(method="esdirk5", tolerance=1e-3))
 print(loaded, hashlib.sha256(run.solution.q.tobytes()).hexdigest())
 """

@@ -82,7 +82,7 @@ def test_five_bar_of_your_own(run):
     assert found["frequency"] == pytest.approx(frequency, rel=1e-6)
     # Twice the mesh, another method and a tenth of the tolerance.
     circle = pf.Circle(centre=(0.0, 0.280), radius=0.030, max_acceleration=30.0)
-    task = pf.plan_tracking(finer, circle, duration=0.5)
+    task = pf.plan(finer, circle, duration=0.5)
     converged = pf.tracking_dataset(
         [task.simulate("++", method="esdirk5", options=pf.IntegrationOptions(tolerance=1e-6))]
     )
@@ -98,7 +98,7 @@ def test_choosing_modes(run):
     assert order == sorted(errors, key=errors.get)
     assert order[0] == "++++"
     robot = pf.load("4rrr")
-    task = pf.plan_tracking(robot.mechanism.with_geometry("second-order"), robot.paths["circle"], samples=301)
+    task = pf.plan(robot.mechanism.with_geometry("second-order"), robot.paths["circle"], samples=301)
     options = pf.IntegrationOptions(method="esdirk4", tolerance=1e-6)
     converged = pf.tracking_dataset([task.simulate("+++-", options=options)])
     assert errors["+++-"] == pytest.approx(float(converged["tracking_rms_motion"][0]), rel=0.01)

@@ -18,7 +18,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset
-from paraflex.results.export import export_results, matlab_name, matlab_struct, result_tables
+from paraflex.results.export import export, matlab_name, matlab_struct, result_tables
 from paraflex.results.storage import SCHEMA
 
 OLD = Path(__file__).parent / "data" / "schema1.nc"
@@ -27,7 +27,7 @@ OLD = Path(__file__).parent / "data" / "schema1.nc"
 @pytest.fixture(scope="module")
 def data(raparm, square):
     """Two modes of RAParM-I; the second stops early, so it has samples that are missing."""
-    task = pf.plan_tracking(raparm, square, duration=0.1, samples=21)
+    task = pf.plan(raparm, square, duration=0.1, samples=21)
     whole = task.simulate("++++", options=IntegrationOptions(tolerance=1e-4))
     with pytest.raises(pf.NumericalError) as caught:
         task.simulate("+--+", options=IntegrationOptions(tolerance=1e-4, max_steps=40))
@@ -68,7 +68,7 @@ def test_tables_are_tidy(data):
 
 
 def test_csv_has_units_in_its_head_and_gaps_where_nothing_was_reached(data, tmp_path):
-    files = export_results(data, tmp_path / "out", "csv")
+    files = export(data, tmp_path / "out", "csv")
     assert [file.name for file in files] == ["time_series.csv", "figures.csv"]
     columns = read_csv(files[0])
     torque = np.array([float(value) for value in columns["torque_tau1 [N m]"]]).reshape(2, 21)
@@ -83,7 +83,7 @@ def test_csv_has_units_in_its_head_and_gaps_where_nothing_was_reached(data, tmp_
 
 
 def test_parquet_has_units_in_its_metadata(data, tmp_path):
-    (file,) = export_results(data, tmp_path / "series.parquet", "parquet")
+    (file,) = export(data, tmp_path / "series.parquet", "parquet")
     table = pq.read_table(file)
     field = table.schema.field("end_effector_velocity_x")
     assert field.metadata == {b"unit": b"m/s", b"long_name": b"end-effector velocity"}
@@ -94,7 +94,7 @@ def test_parquet_has_units_in_its_metadata(data, tmp_path):
 
 
 def test_matlab_finds_time_first_and_names_that_it_allows(data, tmp_path):
-    (file,) = export_results(data, tmp_path, "mat")
+    (file,) = export(data, tmp_path, "mat")
     assert file == tmp_path / "results.mat"
     results = loadmat(file, simplify_cells=True)["results"]
     assert results["torque"].shape == (21, 4, 2)
@@ -125,7 +125,7 @@ def test_names_for_matlab(name, allowed):
 
 
 def test_netcdf_is_the_dataset_itself(data, tmp_path):
-    (file,) = export_results(data, tmp_path / "copy.nc", "netcdf")
+    (file,) = export(data, tmp_path / "copy.nc", "netcdf")
     assert pf.open_results(file).equals(pf.open_results(file).load())
     assert pf.open_results(file)["torque"].equals(data["torque"])
 
@@ -136,7 +136,7 @@ def test_a_run_without_a_path_and_one_of_the_first_schema(tmp_path):
     names = list(result_tables(run)["time_series"])
     assert names[:2] == ["time", "coordinate_value_beam.x"]
     assert matlab_struct(run)["coordinate_value"].shape == (3, run.sizes["coordinate"])
-    files = export_results(pf.open_results(OLD), tmp_path, "csv", shapes=True)
+    files = export(pf.open_results(OLD), tmp_path, "csv", shapes=True)
     assert [file.name for file in files] == ["time_series.csv", "figures.csv"]
 
 
@@ -154,17 +154,17 @@ def test_results_of_several_models_have_a_row_for_each(data, tmp_path):
 def test_nothing_is_written_over_unasked(data, tmp_path):
     (tmp_path / "figures.csv").write_text("mine")
     with pytest.raises(InputError, match=r"figures.csv: exists already.*--force"):
-        export_results(data, tmp_path, "csv")
+        export(data, tmp_path, "csv")
     # Not even the file that was not there.
     assert [file.name for file in tmp_path.iterdir()] == ["figures.csv"]
-    export_results(data, tmp_path, "csv", force=True)
+    export(data, tmp_path, "csv", force=True)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["figures.csv", "time_series.csv"]
 
 
 def test_a_folder_that_cannot_be_written(data, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot be written"):
-        export_results(data, tmp_path / "file" / "deeper", "mat")
+        export(data, tmp_path / "file" / "deeper", "mat")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import paraflex
-from pages import apply_diff, blocks_of, check_output
+from pages import Block, apply_diff, blocks_of, check_output
 
 # The first line of a definition by name, or the line between two additions.
 DEFINED = re.compile(r" (?:class |def |\w+(?:: .*)? = ).*[([{:]$|@@$")
@@ -36,14 +36,54 @@ def test_a_mechanism_a_scheme_a_metric_a_family_of_studies_and_a_joint_are_added
     assert ran == 9
 
 
-def run(block, folder):
-    """What a block prints, run by a Python that finds the copy first."""
+OWN_FIELD = """
+from dataclasses import dataclass, field
+
+from paraflex.mechanism import Joint
+from paraflex.mechanism.quantities import positive, said
+
+
+@dataclass(frozen=True)
+class BushJoint(Joint, kind="bush", holds=("points",)):
+    width: float = field(metadata=said("the width in mm", positive, "mm"))
+
+
+import paraflex as pf
+from paraflex.files import load_data, model_from
+from paraflex.files.schema import model_schema
+
+data = load_data("pendulum")[0]
+(name, points), = data["joint"].items()
+for given in ({"width": 2.0}, {}, {"width": -1.0}, {"width": 2.0, "angle": 1.0}, {"type": "weld", "width": 2.0}):
+    data["joint"][name] = {"type": "bush", "points": points} | given
+    try:
+        joint = model_from(data, "own.toml").mechanism.joints[0]
+        print(type(joint).__name__, joint.width, joint.symbol)
+    except pf.InputError as error:
+        print(str(error).replace(name, "NAME"))
+print(model_schema()["$defs"]["JointTable"]["properties"]["width"]["description"])
+"""
+
+
+def test_a_joint_with_a_field_of_its_own_is_read_and_checked_by_what_the_field_says(tmp_path):
+    assert run(Block("python", "", OWN_FIELD, ""), tmp_path, Path(paraflex.__file__).parents[1]).splitlines() == [
+        "BushJoint 2.0 pin",
+        "own.toml: joint.NAME.width: is missing; give the width in mm",
+        "own.toml: joint.NAME.width: must be positive (got -1.0); give it in mm",
+        "own.toml: joint.NAME.angle: a bush joint has no angle (got 1.0); leave it out",
+        "own.toml: joint.NAME.width: a weld joint has no width (got 2.0); leave it out",
+        "the width in mm",
+    ]
+
+
+def run(block, folder, package=None):
+    """What a block prints, run by a Python that finds the copy in a folder, or the package, first."""
     if block.language == "python":
         commands = [[sys.executable, "-c", block.text]]
     else:
         assert block.language == "sh", block
         commands = [[sys.executable, "-m", *line.split()] for line in block.text.splitlines()]
-    environment = {**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "80"}
+    environment = {**os.environ, "PYTHONPATH": str(package or folder), "COLUMNS": "80"}
     printed = ""
     for command in commands:
         done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, env=environment)

@@ -47,7 +47,7 @@ def checked(file):
 
 
 @pytest.mark.parametrize(
-    "name", ["gantry", "lift", "linkage", "scissor", "tripod", "walker", *pf.library_names(), "chain:4", "four_bars:3"]
+    "name", ["gantry", "lift", "linkage", "scissor", "tripod", "walker", *pf.library.names(), "chain:4", "four_bars:3"]
 )
 def test_what_is_meant_is_sound(name):
     file = MODELS / f"{name}.toml"
@@ -192,7 +192,7 @@ def test_links_that_bend_like_springs_and_paths_that_are_not_followed_are_doubte
     with pytest.warns(pf.ModelWarning, match=r"\[material\]"):
         model = pf.load(soft)
     path = model.path("line")
-    task = pf.plan_tracking(model.mechanism, path, samples=51)
+    task = pf.plan(model.mechanism, path, samples=51)
     options = pf.IntegrationOptions(tolerance=1e-3)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -212,7 +212,7 @@ def test_efforts_far_beyond_inertia_are_doubted(tmp_path):
     """Springs of 1e7 N m/rad at the rods' feet: the motors work against them, and next to nothing else."""
     spring = '[spring.s]\njoint = "pin1"\nstiffness = 1e7\n[end_effector]'
     model = pf.load(slipped(tmp_path, "gantry", "[end_effector]", spring))
-    task = pf.plan_tracking(model.mechanism.rigid(), model.path("line"), samples=21)
+    task = pf.plan(model.mechanism.rigid(), model.path("line"), samples=21)
     run = task.simulate("both", options=pf.IntegrationOptions(tolerance=1e-3), warning=False)
     found = [one for one in run.doubts if one.code == "torque-large"]
     assert found

@@ -285,7 +285,7 @@ def test_moments_in_joints_turn_the_wheels():
 
 
 def test_one_brake_holds_both_cranks_as_two_do():
-    task = pf.plan_tracking(pf.load("geared_five_bar"), "stroke", duration=0.4, samples=21, after="hold")
+    task = pf.plan(pf.load("geared_five_bar"), "stroke", duration=0.4, samples=21, after="hold")
     assert task.holds
     both, one = (task.simulate(mode, options=pf.IntegrationOptions(tolerance=1e-7)).solution for mode in ("++", "+-"))
     np.testing.assert_allclose(both.q, one.q, rtol=0, atol=2e-6)
@@ -371,7 +371,7 @@ def test_a_gear_needs_a_phase_or_an_assembly_and_joints_that_move():
 
 @pytest.fixture(scope="module")
 def five_bar():
-    return pf.plan_tracking(pf.load("geared_five_bar"), "stroke", duration=0.12, samples=25)
+    return pf.plan(pf.load("geared_five_bar"), "stroke", duration=0.12, samples=25)
 
 
 def test_cranks_in_mirror_image_draw_a_straight_line(five_bar):
@@ -411,7 +411,7 @@ def test_mujoco_has_the_same_gear(five_bar):
 
 
 def test_segments_come_to_bend_as_beams_do(five_bar):
-    # The hinges nearest to a gear stand half a segment away: errors go with the length of segments.
+    # The wheels are heavy, and the nearest hinge is half a segment away: errors go with the length of segments.
     def error(task):
         found = pf.tracking_dataset([task.simulate("+-", options=pf.IntegrationOptions(tolerance=1e-6))])
         return (found["end_effector"] - found["end_effector_desired"]).values
@@ -468,7 +468,7 @@ fields = ["parameters.l1"]
         for each in tables:
             table = table[each]
         table[key] = value
-        task = pf.plan_tracking(model_from(data, name), "stroke", duration=0.03, samples=13)
+        task = pf.plan(model_from(data, name), "stroke", duration=0.03, samples=13)
         found = pf.tracking_dataset([task.simulate("+-", options=pf.IntegrationOptions(step=1e-3, tolerance=1e-7))])
         return np.array([found["tracking_rms"].item(), found["torque"].isel(motor=0).max().item()])
 

@@ -92,7 +92,7 @@ def row(reader: _Reader, name: str) -> list[str]:
 @pytest.fixture(scope="module")
 def task():
     model = pf.load("five_bar")
-    return pf.plan_tracking(model.mechanism, model.path("line"), duration=0.05, samples=26)
+    return pf.plan(model.mechanism, model.path("line"), duration=0.05, samples=26)
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def run(task):
     return task.simulate("++")
 
 
-@pytest.mark.parametrize("name", pf.library_names())
+@pytest.mark.parametrize("name", pf.library.names())
 def test_every_mechanism_of_the_library_shows_itself(name: str) -> None:
     mechanism = pf.load(name).mechanism
     shown = read(mechanism)

@@ -10,7 +10,7 @@ import pytest
 from made_up import STUDY, made_up, write_study
 from paraflex.errors import InputError
 from paraflex.plots import sobol_bars
-from paraflex.studies import load_indices, sobol_indices
+from paraflex.studies import indices, load_indices
 from shell import paraflex
 
 ISHIGAMI = """
@@ -54,7 +54,7 @@ def test_indices_of_ishigami(tmp_path, seed):
     file = write_study(tmp_path, ISHIGAMI)
     run = made_up(tracking_rms=ishigami, total_mass=lambda mode, a, b, c: 3.0)
     given = {"metrics": ["tracking_rms", "total_mass"], "samples": 1024, "seed": seed}
-    result = sobol_indices(file, tmp_path / "out", run=run, **given)
+    result = indices(file, tmp_path / "out", run=run, **given)
     varying, constant = (result.data.isel(index=k) for k in (0, 1))
     first, total = known_ishigami()
     assert varying.first.values == pytest.approx(first, abs=0.05)
@@ -74,7 +74,7 @@ def test_indices_of_ishigami(tmp_path, seed):
     assert told[0]["total"] == varying.total[0].item()
     assert told[3]["total"] is None
     # The same seed says the same, from the runs that are there.
-    again = sobol_indices(file, tmp_path / "out", run=pytest.fail, **given)
+    again = indices(file, tmp_path / "out", run=pytest.fail, **given)
     assert again.to_dict() == result.to_dict()
     figure = sobol_bars(result.to_dict())
     assert len(figure.axes) == 1
@@ -86,9 +86,7 @@ def test_indices_of_a_sum_follow_the_ranges(tmp_path):
     """Of x + 2 y, x uniform over 0.006 and y over 0.003: variances as the squares of weighted widths, 1 to 1."""
     text = STUDY.replace('low = 0.1\nhigh = 1.0\nscale = "log"', "low = 0.1\nhigh = 0.103")
     run = made_up(tracking_rms=lambda mode, x, y: x + 2.0 * y)
-    result = sobol_indices(
-        write_study(tmp_path, text), tmp_path / "out", metrics=["tracking_rms"], samples=256, run=run
-    )
+    result = indices(write_study(tmp_path, text), tmp_path / "out", metrics=["tracking_rms"], samples=256, run=run)
     found = result.data.squeeze("index")
     assert found.first.values == pytest.approx([0.5, 0.5], abs=0.02)
     assert found.total.values == pytest.approx([0.5, 0.5], abs=0.02)
@@ -102,13 +100,13 @@ def test_base_samples_with_a_failure_are_left_out(tmp_path):
 
     file = write_study(tmp_path, STUDY)
     given = {"metrics": ["tracking_rms"], "samples": 128}
-    result = sobol_indices(file, tmp_path / "out", run=made_up(tracking_rms=sometimes), **given)
+    result = indices(file, tmp_path / "out", run=made_up(tracking_rms=sometimes), **given)
     found = result.data.squeeze("index")
     assert found.dropped + found.samples == 128
     assert 0 < found.dropped < 30
     assert found.first.values == pytest.approx([1.0, 0.0], abs=0.15)
     with pytest.raises(InputError, match=r"only 0 of 128 base samples are complete in \+\+\+\+"):
-        sobol_indices(file, tmp_path / "none", run=made_up(tracking_rms=lambda *_: float("nan")), **given)
+        indices(file, tmp_path / "none", run=made_up(tracking_rms=lambda *_: float("nan")), **given)
 
 
 def test_an_unfinished_sweep_has_no_indices(tmp_path):
@@ -119,10 +117,10 @@ def test_an_unfinished_sweep_has_no_indices(tmp_path):
 
     run = made_up(tracking_rms=lambda mode, x, y: x)
     given = {"metrics": ["tracking_rms"], "samples": 16}
-    stopped = sobol_indices(file, tmp_path / "out", run=run, on_progress=stop, **given)
+    stopped = indices(file, tmp_path / "out", run=run, on_progress=stop, **given)
     assert stopped.data.sizes["index"] == 0
     assert not stopped.table.exists()
-    assert len(sobol_indices(file, tmp_path / "out", run=run, **given).data["index"]) == 1
+    assert len(indices(file, tmp_path / "out", run=run, **given).data["index"]) == 1
 
 
 @pytest.mark.parametrize(

@@ -413,7 +413,7 @@ def test_real_runs(tmp_path):
 
 def run_best(file):
     model = pf.load(file)
-    task = pf.plan_tracking(model.mechanism, model.path("line"), duration=0.15, samples=26, assembly="outward")
+    task = pf.plan(model.mechanism, model.path("line"), duration=0.15, samples=26, assembly="outward")
     run = task.simulate("++++", options=pf.IntegrationOptions(method="esdirk5", tolerance=1e-4, max_steps=200_000))
     data = pf.tracking_dataset([run])
     return float(np.hypot(*(data["end_effector"] - data["end_effector_desired"]).isel(mode=0).values.T).max())

@@ -94,7 +94,7 @@ def results(tmp_path_factory) -> Path:
 
 def _runs(folder: Path) -> None:
     model = pf.load("five_bar")
-    task = pf.plan_tracking(model.mechanism, model.path("line"), duration=0.05, samples=26)
+    task = pf.plan(model.mechanism, model.path("line"), duration=0.05, samples=26)
     run = tracking_dataset([task.simulate("++")])
     # A second mode by name; the first is all that the motors can do.
     data = xr.concat([run, run.assign_coords(mode=["+-"])], "mode", combine_attrs="override")

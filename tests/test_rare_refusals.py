@@ -69,7 +69,7 @@ def refused(call, field, problem, remedy):
 
 def test_torques_that_no_spline_follows(monkeypatch):
     model = pf.load("five_bar")
-    task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.02, samples=5)
+    task = pf.plan(model.mechanism, model.path("square"), duration=0.02, samples=5)
     # No accuracy is fine enough for these, as where torques have a pole.
     monkeypatch.setattr(feed_forward, "_ACCURACY", 0.0)
     with pytest.raises(
@@ -111,7 +111,7 @@ def test_packages_that_are_missing(study, tmp_path, monkeypatch):
     )  # fmt: skip
     monkeypatch.setitem(sys.modules, "sksundae", None)
     model = pf.load("five_bar")
-    task = pf.plan_tracking(model.mechanism, model.path("square"), duration=0.02, samples=3)
+    task = pf.plan(model.mechanism, model.path("square"), duration=0.02, samples=3)
     refused(lambda: task.simulate("++", method="ida"), "method", "SUNDIALS", "pip install")
     monkeypatch.setattr("paraflex.report.page.find_spec", lambda _: None)
     # Once read it is kept.
@@ -150,7 +150,7 @@ def test_motions_of_no_length():
     refused(*few)
     model = pf.load("five_bar")
     refused(
-        lambda: pf.plan_tracking(model.mechanism, model.path("square"), samples=1),
+        lambda: pf.plan(model.mechanism, model.path("square"), samples=1),
         "samples", "too few samples", "at least 2",
     )  # fmt: skip
 
@@ -268,7 +268,7 @@ def test_a_path_near_a_singular_position_is_doubted():
     """As where the distal links are almost in line: one motor's torque hardly acts on the end-effector."""
     model = pf.load("five_bar")
     path = model.path("square")
-    task = pf.plan_tracking(model.mechanism, path, duration=0.02, samples=3)
+    task = pf.plan(model.mechanism, path, duration=0.02, samples=3)
     weak = task.effort.matrix * np.array([1.0, 1e-5])
     doubtful = replace(task, effort=replace(task.effort, matrix=weak))
     modes = [parse_mode(model.mechanism, "++")]

@@ -40,7 +40,7 @@ def motion():
 def tracking():
     """RAParM-I, rigid, the beginning of its square."""
     model = pf.load("raparm_i")
-    task = pf.plan_tracking(model.mechanism.rigid(), model.path("square"), duration=0.02, samples=5)
+    task = pf.plan(model.mechanism.rigid(), model.path("square"), duration=0.02, samples=5)
     return tracking_dataset([task.simulate("++++")])
 
 

@@ -6,8 +6,7 @@ import pytest
 from playwright.sync_api import Page
 
 from conftest import DESKTOP, PHONE
-from paraflex.report import Chart, Panel, save_page, tracking_page, verification_page
-from paraflex.report import Page as ReportPage
+from paraflex.report import Chart, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
 
 # Of opening, on a machine that is busy with other tests as well: the best of so many is told [ms].

@@ -230,7 +230,7 @@ def test_many_segments_approach_the_cable():
 
 def test_rows_of_stiff_springs_are_not_taken_for_a_singular_position():
     # The longer a step, the less a spring between segments gives beside their inertia; it always gives something.
-    system = build_system(finite_segments(pf.raparm_i(), 16).mechanism)
+    system = build_system(finite_segments(pf.library.raparm_i(), 16).mechanism)
     q = consistent_state(system, system.mechanism.assembly()).q
     least = []
     for b in (1e-14, 1e-8):
@@ -266,9 +266,9 @@ def test_names_with_numbers_are_told():
 
 def test_python_refuses_none_of_them():
     with pytest.raises(InputError, match=r"loops: at least one is needed \(got 0\)"):
-        pf.four_bars_in_a_row(0)
+        pf.library.four_bars_in_a_row(0)
     with pytest.raises(InputError, match=r"segments: at least one is needed"):
-        pf.chain_of_segments(0)
+        pf.library.chain_of_segments(0)
 
 
 def test_a_row_from_the_command_line(tmp_path):

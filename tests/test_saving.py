@@ -341,7 +341,7 @@ class Still:
 
 
 def test_paths_and_studies_that_a_file_cannot_say(tmp_path):
-    robot = pf.raparm_i()
+    robot = pf.library.raparm_i()
     with pytest.raises(InputError, match=r"^path.still: a model file cannot say this \(got 'Still'\); give a Polygon"):
         pf.Model(robot, {"still": Still()}).save(tmp_path / "not.toml")
     with pytest.raises(InputError, match=r"^study.path: unknown path \(got 'square'\)"):

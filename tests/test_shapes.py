@@ -192,9 +192,9 @@ def test_a_rigid_body_is_drawn_round_its_points():
 
 
 @pytest.mark.parametrize("geometry", list(Geometry))
-@pytest.mark.parametrize("make", [make_linkage, pf.raparm_i], ids=["linkage", "RAParM-I"])
+@pytest.mark.parametrize("make", [make_linkage, pf.library.raparm_i], ids=["linkage", "RAParM-I"])
 def test_joints_keep_together_however_much_is_magnified(make, geometry):
-    mechanism = make() if make is pf.raparm_i else replace(make(), prescribed=(), assemblies=(LINKED,))
+    mechanism = make() if make is pf.library.raparm_i else replace(make(), prescribed=(), assemblies=(LINKED,))
     system, q = closed(mechanism.with_geometry(geometry))
     drawn, stations = system_drawing(system, q), point_stations(mechanism)
     assert np.max(np.abs(drawn.shape - drawn.base)) > 1e-4
@@ -291,7 +291,7 @@ def test_what_slides_along_a_beam_stays_on_it():
 @pytest.fixture(scope="module")
 def short(raparm, square):
     """A run of RAParM-I, whole and cut into segments, and its plan."""
-    task = pf.plan_tracking(raparm, square, duration=0.1, samples=21)
+    task = pf.plan(raparm, square, duration=0.1, samples=21)
     options = IntegrationOptions(tolerance=1e-4)
     return task.simulate("++++", options=options), task.in_segments(6).simulate("++++", options=options)
 
@@ -316,7 +316,7 @@ def test_a_dataset_tells_shapes_of_links_whatever_they_were_cut_into(short):
 
 
 def test_runs_that_stop_have_no_shape_afterwards(raparm, square):
-    task = pf.plan_tracking(raparm, square, duration=0.1, samples=21)
+    task = pf.plan(raparm, square, duration=0.1, samples=21)
     with pytest.raises(pf.NumericalError) as caught:
         task.simulate("++++", options=IntegrationOptions(tolerance=1e-4, max_steps=40))
     data = pf.tracking_dataset([caught.value.partial])

@@ -58,7 +58,7 @@ def made():
 
 @pytest.fixture(scope="module")
 def task():
-    return pf.plan_tracking(pf.load("five_bar"), "line", duration=0.02, samples=5)
+    return pf.plan(pf.load("five_bar"), "line", duration=0.02, samples=5)
 
 
 @pytest.fixture(scope="module")

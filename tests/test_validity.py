@@ -38,7 +38,7 @@ def task():
     """RAParM-I as the paper has it, to the end of the square's third side."""
     model = pf.load("raparm_i")
     mechanism = bench.variant(model.mechanism, Geometry.LINEAR, CANTILEVER)
-    return pf.plan_tracking(mechanism, model.path("square"), duration=0.45, samples=91)
+    return pf.plan(mechanism, model.path("square"), duration=0.45, samples=91)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def valid():
     """RAParM-II's bars are thicker: in this mode linear geometry is 0.2 % off the deviation."""
     model = pf.load("raparm_ii")
     mechanism = bench.variant(model.mechanism, Geometry.LINEAR, PINNED)
-    return pf.plan_tracking(mechanism, model.path("square"), duration=0.45, samples=91).simulate("++++")
+    return pf.plan(mechanism, model.path("square"), duration=0.45, samples=91).simulate("++++")
 
 
 def indicators(validity: Validity | None):
@@ -161,7 +161,7 @@ def test_the_papers_mode_near_the_singularity_warns(task):
 
 
 def test_a_study_in_threads_warns_of_each_mode(task):
-    short = pf.plan_tracking(task.mechanism, task.path, duration=0.05, samples=11)
+    short = pf.plan(task.mechanism, task.path, duration=0.05, samples=11)
     with pytest.warns(ValidityWarning) as caught:
         pf.run_study(short, ["++++", "+++-"])
     assert [str(each.message).split(":")[0] for each in caught] == ["mode ++++", "mode +++-"]
@@ -184,7 +184,7 @@ def test_second_order_holds_in_the_mode_of_the_papers_headline(frame, task):
 
 
 def test_there_is_nothing_to_say_of_rigid_bodies_and_finite_segments(task):
-    short = pf.plan_tracking(task.mechanism, task.path, duration=0.02, samples=5)
+    short = pf.plan(task.mechanism, task.path, duration=0.02, samples=5)
     runs = [short.remodelled(task.mechanism.rigid()).simulate("++++"), short.in_segments(2).simulate("++++")]
     assert [run.validity for run in runs] == [None, None]
     data = tracking_dataset(runs[:1])

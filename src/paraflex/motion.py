@@ -20,11 +20,12 @@ from paraflex.dynamics import (
     pack_signals,
     start_state,
 )
-from paraflex.errors import InputError, IntegrationError, ResultWarning, suggestion
+from paraflex.errors import InputError, IntegrationError, ResultWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Solution, check_times, choose, integrate
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start
+from paraflex.mechanism.quantities import known
 from paraflex.validity import Validity, assess, doubtful_results, warn, with_blame
 
 
@@ -113,8 +114,7 @@ def simulate_motion(
     check_times(duration, samples)
     names = [motor.name for motor in mechanism.motors]
     for name, torque in (torques or {}).items():
-        if name not in names:
-            raise InputError("unknown motor", field="torques", value=name, remedy=suggestion(name, names))
+        known(name, names, "torques", "motor")
         if not np.isfinite(torque):
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: float((torques or {}).get(name, 0.0)) for name in names}

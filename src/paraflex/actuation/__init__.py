@@ -1,19 +1,13 @@
 """Required effort of a rigid motion, and its distribution over the active motors."""
 
 from paraflex.actuation.allocation import (
-    Effort,
-    actuation_condition,
-    allocate,
-    required_effort,
+    Effort as Effort,
+    actuation_condition as actuation_condition,
+    allocate as allocate,
+    required_effort as required_effort,
 )
-from paraflex.actuation.feed_forward import FeedForward, TorquePlan, plan_torques
-
-__all__ = [
-    "Effort",
-    "FeedForward",
-    "TorquePlan",
-    "actuation_condition",
-    "allocate",
-    "plan_torques",
-    "required_effort",
-]
+from paraflex.actuation.feed_forward import (
+    FeedForward as FeedForward,
+    TorquePlan as TorquePlan,
+    plan_torques as plan_torques,
+)

@@ -1,53 +1,41 @@
 """What every study is; and of many runs the workers that compute them, the journal that keeps them, their tables."""
 
-from paraflex.campaign.folder import STUDY, TRAJECTORIES, not_ours, of_another_study, open_campaign, read_study
-from paraflex.campaign.journal import Journal, Row, held
-from paraflex.campaign.study import KeptResult, OnProgress, Progress, Result, Study, Workers, kept_in, no_workers
-from paraflex.campaign.tables import CSV, RESULTS, UNFINISHED, read_data, read_table, tables_of, write_table
-from paraflex.campaign.workers import (
-    DASK,
-    ENGINES,
-    PROCESSES,
-    THREADS,
-    Engine,
-    LostCluster,
-    LostWorker,
-    open_engine,
-    outcomes,
+from paraflex.campaign.folder import (
+    STUDY as STUDY,
+    TRAJECTORIES as TRAJECTORIES,
+    not_ours as not_ours,
+    of_another_study as of_another_study,
+    open_campaign as open_campaign,
+    read_study as read_study,
 )
-
-__all__ = [
-    "CSV",
-    "DASK",
-    "ENGINES",
-    "PROCESSES",
-    "RESULTS",
-    "STUDY",
-    "THREADS",
-    "TRAJECTORIES",
-    "UNFINISHED",
-    "Engine",
-    "Journal",
-    "KeptResult",
-    "LostCluster",
-    "LostWorker",
-    "OnProgress",
-    "Progress",
-    "Result",
-    "Row",
-    "Study",
-    "Workers",
-    "held",
-    "kept_in",
-    "no_workers",
-    "not_ours",
-    "of_another_study",
-    "open_campaign",
-    "open_engine",
-    "outcomes",
-    "read_data",
-    "read_study",
-    "read_table",
-    "tables_of",
-    "write_table",
-]
+from paraflex.campaign.journal import Journal as Journal, Row as Row, held as held
+from paraflex.campaign.study import (
+    KeptResult as KeptResult,
+    OnProgress as OnProgress,
+    Progress as Progress,
+    Result as Result,
+    Study as Study,
+    Workers as Workers,
+    kept_in as kept_in,
+    no_workers as no_workers,
+)
+from paraflex.campaign.tables import (
+    CSV as CSV,
+    RESULTS as RESULTS,
+    UNFINISHED as UNFINISHED,
+    read_data as read_data,
+    read_table as read_table,
+    tables_of as tables_of,
+    write_table as write_table,
+)
+from paraflex.campaign.workers import (
+    DASK as DASK,
+    ENGINES as ENGINES,
+    PROCESSES as PROCESSES,
+    THREADS as THREADS,
+    Engine as Engine,
+    LostCluster as LostCluster,
+    LostWorker as LostWorker,
+    open_engine as open_engine,
+    outcomes as outcomes,
+)

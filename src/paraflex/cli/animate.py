@@ -30,13 +30,13 @@ def animate_command(request: AnimateRequest) -> int:
     data = open_results(request.results)
     output = Path(request.output)
     refuse_existing(output, request.force)
-    from paraflex.plots.film import FilmOptions, write_film
+    from paraflex.plots.film import FilmOptions, animate
 
     console = plain_console(stderr=True)
     try:
         size = None if request.size is None else _size(request.size)
         options = FilmOptions(size=size, **{name: getattr(request, name) for name in _OPTIONS})
-        film = _drawn(console, lambda report: write_film(data, output, request.modes, options, on_progress=report))
+        film = _drawn(console, lambda report: animate(data, output, request.modes, options, on_progress=report))
     except KeyboardInterrupt:
         console.print("interrupted: nothing was written")
         return INTERRUPTED

@@ -8,7 +8,7 @@ from paraflex.cli.commands.results import ExportRequest
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.results import open_results
-from paraflex.results.export import export_results, export_table
+from paraflex.results.export import export, export_table
 
 _TABLE = "results.parquet"
 
@@ -24,7 +24,7 @@ def export_command(request: ExportRequest) -> int:
             files = export_table(table, output, request.to, force=request.force)
         else:
             data = open_results(results)
-            files = export_results(data, output, request.to, shapes=request.shapes, force=request.force)
+            files = export(data, output, request.to, shapes=request.shapes, force=request.force)
     except InputError as error:
         if error.field not in ("to", "output"):
             raise

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from paraflex.files.read import naming, read_toml, validate
-from paraflex.files.schema import Count, Number, Text
+from paraflex.files.schema import Count, Number, Text, Yes
 
 T = TypeVar("T", bound=BaseModel)
-Yes = Annotated[bool, Field(strict=True)]
 
 
 class Table(BaseModel):

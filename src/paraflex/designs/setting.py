@@ -23,6 +23,7 @@ from paraflex.files.generators import is_generated
 from paraflex.files.model import read_model
 from paraflex.findings import Verdict
 from paraflex.integrators import IntegrationOptions, check_times
+from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
 from paraflex.results.following import Part
 from paraflex.results.metrics import METRICS
@@ -235,8 +236,7 @@ def _paths(model: Model, names: list[str]) -> tuple[str, ...]:
     if not names:
         return (model.path_name(),)
     for name in names:
-        if name not in model.paths:
-            raise InputError("unknown path", field="paths", value=name, remedy=suggestion(name, list(model.paths)))
+        known(name, model.paths, "paths", "path")
     return tuple(dict.fromkeys(names))
 
 

@@ -10,12 +10,7 @@ import numpy as np
 import scipy
 
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
-from paraflex.mechanism import (
-    Gear,
-    Joint,
-    Mechanism,
-    PointRef,
-)
+from paraflex.mechanism import Gear, Joint, Mechanism, PointRef
 
 
 @dataclass(frozen=True)
@@ -121,22 +116,15 @@ def _along(joint: Joint, name: str, **keywords) -> Constraint:
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
     constraints = [part for joint in mechanism.joints for part in _joint_constraints(joint)]
     # Signals are the motors' torques first, then the prescribed motions.
-    for k, prescribed in enumerate(mechanism.prescribed):
-        joint = mechanism.joint(prescribed.joint)
-        constraints.append(_along(joint, prescribed.name, signal=len(mechanism.motors) + k))
-    for spring in mechanism.springs:
-        joint = mechanism.joint(spring.joint)
-        constraints.append(_along(joint, spring.name, row=SPRING, compliance=1.0 / spring.stiffness, rest=spring.rest))
-    for damper in mechanism.dampers:
-        joint = mechanism.joint(damper.joint)
-        constraints.append(_along(joint, damper.name, row=DAMPER, compliance=1.0 / damper.coefficient))
-    for friction in mechanism.frictions:
-        joint = mechanism.joint(friction.joint)
-        slope = friction.limit / friction.speed
-        constraints.append(_along(joint, friction.name, row=FRICTION, compliance=1.0 / slope, limit=friction.limit))
-    for gear in mechanism.gears:
-        constraints.append(_gear_constraint(mechanism, gear))
-    return constraints
+    at_joints: list[tuple[Any, dict[str, Any]]] = [
+        *((one, {"signal": len(mechanism.motors) + k}) for k, one in enumerate(mechanism.prescribed)),
+        *((one, {"row": SPRING, "compliance": 1.0 / one.stiffness, "rest": one.rest}) for one in mechanism.springs),
+        *((one, {"row": DAMPER, "compliance": 1.0 / one.coefficient}) for one in mechanism.dampers),
+        *((one, {"row": FRICTION, "compliance": 1.0 / (one.limit / one.speed), "limit": one.limit})
+          for one in mechanism.frictions),
+    ]  # fmt: skip
+    constraints += [_along(mechanism.joint(one.joint), one.name, **keywords) for one, keywords in at_joints]
+    return constraints + [_gear_constraint(mechanism, gear) for gear in mechanism.gears]
 
 
 def _gear_constraint(mechanism: Mechanism, gear: Gear) -> Constraint:

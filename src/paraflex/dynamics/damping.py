@@ -33,15 +33,7 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
 from paraflex.fem.eigen import eigenpairs
-from paraflex.mechanism import (
-    GROUND,
-    Damping,
-    Joint,
-    Mechanism,
-    PointRef,
-    RigidBody,
-    stiffness_proportional,
-)
+from paraflex.mechanism import GROUND, Damping, Joint, Mechanism, PointRef, RigidBody, stiffness_proportional
 
 # Conditions of which less than this part is left once the others hold follow from them.
 _DEPENDENT = 1e-9

@@ -30,13 +30,7 @@ from paraflex.kernel.packed import (
 )
 from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
-from paraflex.mechanism import (
-    Joint,
-    Load,
-    Mechanism,
-    PointForce,
-    PointRef,
-)
+from paraflex.mechanism import Joint, Load, Mechanism, PointForce, PointRef
 
 
 def pack_system(

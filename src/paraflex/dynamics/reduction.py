@@ -14,14 +14,7 @@ import numpy as np
 
 from paraflex.dynamics.coordinates import BodyCoordinates
 from paraflex.dynamics.system import System
-from paraflex.mechanism import (
-    AppliedTorque,
-    Mechanism,
-    PointRef,
-    RigidBody,
-    grouped,
-    joints_named,
-)
+from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, RigidBody, grouped, joints_named
 
 # A smaller part of a turn is not worth a word.
 _MISSED = 0.05

@@ -1,5 +1,3 @@
 """Other people's engines on the same mechanism, torques and start: adapters for comparison."""
 
-from paraflex.engines.common import ENGINES, check_dwell, check_engine
-
-__all__ = ["ENGINES", "check_dwell", "check_engine"]
+from paraflex.engines.common import ENGINES as ENGINES, check_dwell as check_dwell, check_engine as check_engine

@@ -1,34 +1,31 @@
 """Flexible beams: element, mesh, reference conditions, inertia shape integrals, eigenmodes. Knows no mechanisms."""
 
-from paraflex.fem.assumed import AssumedShapes, PlacedLump, Polynomial, ShapeFunction, Sine, assumed_integrals
-from paraflex.fem.foreshortening import MassPoints, mass_points, node_weights, slope_square_integrals, slope_squares
-from paraflex.fem.integrals import Lump, ShapeIntegrals, SpanProperties, beam_integrals, rigid_integrals
-from paraflex.fem.mesh import BeamMesh, mesh_beam
-from paraflex.fem.modes import ModalBasis, modal_basis, natural_frequencies
-from paraflex.fem.reference import ReferenceCondition, reference_basis
-
-__all__ = [
-    "AssumedShapes",
-    "BeamMesh",
-    "Lump",
-    "MassPoints",
-    "ModalBasis",
-    "PlacedLump",
-    "Polynomial",
-    "ReferenceCondition",
-    "ShapeFunction",
-    "ShapeIntegrals",
-    "Sine",
-    "SpanProperties",
-    "assumed_integrals",
-    "beam_integrals",
-    "mass_points",
-    "mesh_beam",
-    "modal_basis",
-    "natural_frequencies",
-    "node_weights",
-    "reference_basis",
-    "rigid_integrals",
-    "slope_square_integrals",
-    "slope_squares",
-]
+from paraflex.fem.assumed import (
+    AssumedShapes as AssumedShapes,
+    PlacedLump as PlacedLump,
+    Polynomial as Polynomial,
+    ShapeFunction as ShapeFunction,
+    Sine as Sine,
+    assumed_integrals as assumed_integrals,
+)
+from paraflex.fem.foreshortening import (
+    MassPoints as MassPoints,
+    mass_points as mass_points,
+    node_weights as node_weights,
+    slope_square_integrals as slope_square_integrals,
+    slope_squares as slope_squares,
+)
+from paraflex.fem.integrals import (
+    Lump as Lump,
+    ShapeIntegrals as ShapeIntegrals,
+    SpanProperties as SpanProperties,
+    beam_integrals as beam_integrals,
+    rigid_integrals as rigid_integrals,
+)
+from paraflex.fem.mesh import BeamMesh as BeamMesh, mesh_beam as mesh_beam
+from paraflex.fem.modes import (
+    ModalBasis as ModalBasis,
+    modal_basis as modal_basis,
+    natural_frequencies as natural_frequencies,
+)
+from paraflex.fem.reference import ReferenceCondition as ReferenceCondition, reference_basis as reference_basis

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files.schema import (
     AssumedModesTable,
@@ -35,6 +35,7 @@ from paraflex.mechanism import (
     ShapeFunction,
     Sine,
 )
+from paraflex.mechanism.quantities import known
 
 
 def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | ModalTable, table: ModelTable) -> Body:
@@ -46,19 +47,13 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
         A section, material or lump that the file does not have, or numbers that cannot be.
     """
     if isinstance(body, RigidTable):
-        return RigidBody(
-            name=name,
-            mass=body.mass,
-            inertia=body.inertia,
-            centre_of_mass=(body.centre_of_mass[0], body.centre_of_mass[1]),
-            points={key: (point[0], point[1]) for key, point in body.points.items()},
-        )
+        return RigidBody(name, **_given(body))
     if isinstance(body, ModalTable):
         return _modal_body(name, body)
     lumps = []
     for point, lump_name in body.lumps.items():
         lump = _named(table.lump, lump_name, f"body.{name}.lumps.{point}", "lump")
-        lumps.append(LumpedMass(point, lump.mass, lump.inertia))
+        lumps.append(LumpedMass(point, **dict(lump)))
     if isinstance(body, AssumedModesTable):
         section, material = _section(name, body.section, table), _material(name, body.material, table)
         return _assumed_modes_beam(name, body, section, material, tuple(lumps))
@@ -85,14 +80,14 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
 def _section(body: str, name: str, table: ModelTable) -> Section:
     section = _named(table.section, name, f"body.{body}.section", "section")
     if isinstance(section, GeneralSectionTable):
-        return Section(section.area, section.second_moment)
+        return Section(**dict(section))
     _check_sides(section.width, section.thickness, f"section.{name}")
     return Section.rectangle(section.width, section.thickness)
 
 
 def _material(body: str, name: str, table: ModelTable) -> Material:
     material = _named(table.material, name, f"body.{body}.material", "material")
-    return Material(material.youngs_modulus, material.density)
+    return Material(**dict(material))
 
 
 def _check_sides(width: float, thickness: float, name: str) -> None:
@@ -102,8 +97,7 @@ def _check_sides(width: float, thickness: float, name: str) -> None:
 
 
 def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:
-    if name not in tables:
-        raise InputError(f"unknown {kind}", field=where, value=name, remedy=suggestion(name, list(tables)))
+    known(name, tables, where, kind)
     return tables[name]
 
 
@@ -134,23 +128,13 @@ def _assumed_modes_beam(
 
 def _modal_body(name: str, table: ModalTable) -> ModalBody:
     """A body by its own matrices."""
-    return ModalBody(
-        name=name,
-        mass=table.mass,
-        first_moment=table.first_moment,
-        inertia=table.inertia,
-        mass_matrix=table.mass_matrix,
-        stiffness=table.stiffness,
-        S2=table.S2,
-        I1=table.I1,
-        G1=table.G1,
-        G2=table.G2,
-        I2=table.I2,
-        points={key: ModalPoint(point.position, point.shape, point.slope) for key, point in table.points.items()},
-        modes=table.modes,
-        damping=_damping(table.damping, name),
-        flexible=table.flexible,
-    )
+    points = {key: ModalPoint(**dict(point)) for key, point in table.points.items()}
+    return ModalBody(name, **_given(table) | {"points": points, "damping": _damping(table.damping, name)})
+
+
+def _given(table: RigidTable | ModalTable) -> dict[str, Any]:
+    """The fields of a table without its type."""
+    return {key: value for key, value in table if key != "type"}
 
 
 def _damping(table: DampingTable | None, name: str) -> Damping | None:

@@ -9,20 +9,13 @@ from paraflex.errors import InputError
 from paraflex.files.bodies import read_body
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import quantities, read_law
-from paraflex.files.schema import (
-    AssemblyTable,
-    JointTable,
-    ModelTable,
-    PathTable,
-    PrescribedTable,
-)
+from paraflex.files.schema import AssemblyTable, JointTable, ModelTable, PathTable, PrescribedTable
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
     JOINT_KINDS,
     ActuationMode,
     Assembly,
     EndEffector,
-    Geometry,
     Group,
     Joint,
     Mechanism,
@@ -46,25 +39,20 @@ def read_mechanism(table: ModelTable) -> Mechanism:
         Anything in it that does not fit together.
     """
     effector = table.end_effector
+    made: dict[str, Any] = {
+        key: getattr(table, key) for key in ("name", "description", "geometry", "ground", "gravity")
+    }
+    for field, group in groups_of(Mechanism).items():
+        if group.kinds:
+            made[field] = [_member(group, name, dict(one)) for name, one in getattr(table, group.table).items()]
     return Mechanism(
-        name=table.name,
-        description=table.description,
-        geometry=Geometry(table.geometry),
-        ground={name: (point[0], point[1]) for name, point in table.ground.items()},
+        **made,
         bodies=tuple(read_body(name, body, table) for name, body in table.body.items()),
         joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
         motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
         prescribed=_prescribed(table),
-        **{
-            field: tuple(_member(group, name, dict(entry)) for name, entry in getattr(table, group.table).items())
-            for field, group in groups_of(Mechanism).items()
-            if group.kinds
-        },
-        gravity=(table.gravity[0], table.gravity[1]),
-        end_effector=None
-        if effector is None
-        else EndEffector(PointRef.parse(effector.point, "end_effector.point"), tuple(effector.coordinates)),
-        assemblies=tuple(_assembly(name, entry) for name, entry in table.assembly.items()),
+        end_effector=None if effector is None else EndEffector(**dict(effector)),
+        assemblies=tuple(_assembly(name, one) for name, one in table.assembly.items()),
         modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
     )
 
@@ -115,8 +103,7 @@ def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointT
 
 
 def _assembly(name: str, entry: AssemblyTable) -> Assembly:
-    field = f"assembly.{name}.points"
-    points = {PointRef.parse(text, field): (place[0], place[1]) for text, place in entry.points.items()}
+    points: Any = entry.points
     return Assembly(name, entry.angles, points)
 
 

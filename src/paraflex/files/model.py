@@ -127,6 +127,7 @@ class Model(CheckedFields):
         duration: float | None = None,
         samples: int | None = None,
         assembly: str | None = None,
+        orientation: float | None = None,
         after: Ending | str | None = None,
         warning: bool = True,
     ) -> TrackingTask:
@@ -138,7 +139,7 @@ class Model(CheckedFields):
             A path, or the name of one of the model's.
         mechanism : Mechanism, optional
             Another form of the model's own: rigid, or of another geometry.
-        duration, samples, assembly, after, warning
+        duration, samples, assembly, orientation, after, warning
             See `simulate.plan_tracking`.
 
         Raises
@@ -148,7 +149,7 @@ class Model(CheckedFields):
         """
         self.check_start()
         followed = path if isinstance(path, Path) else self.path(path)
-        study = self.study.filled(samples=samples, assembly=assembly, after=after)
+        study = self.study.filled(samples=samples, assembly=assembly, orientation=orientation, after=after)
         return plan_tracking(
             self.mechanism if mechanism is None else mechanism,
             followed,
@@ -198,6 +199,41 @@ class Model(CheckedFields):
         path = FilePath(path)
         data = with_names(_data(self), self.text, path.parent)
         write_text(path, document_text(data, self.text), remedy="choose another file")
+
+
+@checked_arguments()
+def plan(
+    model: Model | Mechanism | str,
+    path: Path | str | None = None,
+    *,
+    duration: float | None = None,
+    samples: int | None = None,
+    assembly: str | None = None,
+    orientation: float | None = None,
+    after: Ending | str | None = None,
+    warning: bool = True,
+) -> TrackingTask:
+    """Plan a run of the end-effector along a path: joint motion, and what it asks of the motors.
+
+    Parameters
+    ----------
+    model : Model, Mechanism or str
+        A model, whose [study] says what is not given; or the name or file of one; or a mechanism.
+    path, duration, samples, assembly, orientation, after, warning
+        See `Model.plan` and `simulate.plan_tracking`.
+
+    Raises
+    ------
+    InputError, AssemblyError, UnreachablePathError
+        See there.
+    """
+    if isinstance(model, str):
+        model = load(model)
+    model = model if isinstance(model, Model) else Model(model)
+    return model.plan(
+        path, duration=duration, samples=samples, assembly=assembly, orientation=orientation, after=after,
+        warning=warning,
+    )  # fmt: skip
 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions, check_times
 from paraflex.kinematics import Path
 from paraflex.mechanism import Mechanism, parse_mode
+from paraflex.mechanism.quantities import known
 
 
 @dataclass(frozen=True)
@@ -78,10 +79,8 @@ class StudyDefaults:
 
 def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
     """Check that a study names what the mechanism and its paths have, and that its numbers can be."""
-    if study.path is not None and study.path not in paths:
-        raise InputError(
-            "unknown path", field="study.path", value=study.path, remedy=suggestion(study.path, list(paths))
-        )
+    if study.path is not None:
+        known(study.path, paths, "study.path", "path")
     for mode in study.modes:
         try:
             parse_mode(mechanism, mode)
@@ -89,15 +88,9 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
             raise error.at("study.modes") from error
     motors = [motor.name for motor in mechanism.motors]
     for name in study.torques:
-        if name not in motors:
-            raise InputError("unknown motor", field="study.torques", value=name, remedy=suggestion(name, motors))
-    if study.assembly is not None and study.assembly not in {a.name for a in mechanism.assemblies}:
-        raise InputError(
-            "unknown assembly",
-            field="study.assembly",
-            value=study.assembly,
-            remedy=suggestion(study.assembly, [a.name for a in mechanism.assemblies]),
-        )
+        known(name, motors, "study.torques", "motor")
+    if study.assembly is not None:
+        known(study.assembly, [one.name for one in mechanism.assemblies], "study.assembly", "assembly")
     try:
         check_times(study.duration, study.samples)
         study.integration()

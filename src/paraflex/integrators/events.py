@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.mechanism import AtEnd, FlexibleBeam, Mechanism, RigidBody
+from paraflex.mechanism.quantities import known
 
 
 @dataclass(frozen=True)
@@ -143,23 +144,18 @@ def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:
     """
     for event in events:
         if isinstance(event, JointLimit):
-            _known("joint", event.joint, [joint.name for joint in mechanism.joints])
+            known(event.joint, [joint.name for joint in mechanism.joints], "events", "joint")
             mechanism.joint(event.joint).check_moves("events")
         elif isinstance(event, DeflectionLimit):
-            _known("body", event.body, [body.name for body in mechanism.bodies])
+            known(event.body, [body.name for body in mechanism.bodies], "events", "body")
             body = mechanism.body(event.body)
             if isinstance(body, RigidBody) or not body.flexible:
                 raise InputError("a rigid body does not bend", field="events", value=event.body, remedy="leave it out")
         elif isinstance(event, SingularDistance):
             for name in event.motors:
-                _known("motor", name, [motor.name for motor in mechanism.motors])
+                known(name, [motor.name for motor in mechanism.motors], "events", "motor")
         else:
             raise InputError(
                 "not an event", field="events", value=event,
                 remedy="give JointLimit, DeflectionLimit or SingularDistance",
             )  # fmt: skip
-
-
-def _known(kind: str, name: str, names: list[str]) -> None:
-    if name not in names:
-        raise InputError(f"unknown {kind}", field="events", value=name, remedy=suggestion(name, names))

@@ -1,24 +1,20 @@
 """Paths of the end-effector, and the joint motion that follows them."""
 
-from paraflex.kinematics.closure import RigidMotion, follow_path, path_follower, reach_shortfall
-from paraflex.kinematics.laws import TrapezoidalLaw
-from paraflex.kinematics.model import ModelWithPaths
-from paraflex.kinematics.paths import Circle, Line, Path, PathMotion, PointPath, Polygon, length_fraction
-from paraflex.kinematics.reach import Shortfall
-
-__all__ = [
-    "Circle",
-    "Line",
-    "ModelWithPaths",
-    "Path",
-    "PathMotion",
-    "PointPath",
-    "Polygon",
-    "RigidMotion",
-    "Shortfall",
-    "TrapezoidalLaw",
-    "follow_path",
-    "length_fraction",
-    "path_follower",
-    "reach_shortfall",
-]
+from paraflex.kinematics.closure import (
+    RigidMotion as RigidMotion,
+    follow_path as follow_path,
+    path_follower as path_follower,
+    reach_shortfall as reach_shortfall,
+)
+from paraflex.kinematics.laws import TrapezoidalLaw as TrapezoidalLaw
+from paraflex.kinematics.model import ModelWithPaths as ModelWithPaths
+from paraflex.kinematics.paths import (
+    Circle as Circle,
+    Line as Line,
+    Path as Path,
+    PathMotion as PathMotion,
+    PointPath as PointPath,
+    Polygon as Polygon,
+    length_fraction as length_fraction,
+)
+from paraflex.kinematics.reach import Shortfall as Shortfall

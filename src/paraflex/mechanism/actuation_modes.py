@@ -8,6 +8,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import ActuationMode
+from paraflex.mechanism.quantities import known
 
 # The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
 _SIGNS = str.maketrans({"⊕": "+", "⊖": "-", "−": "-", "–": "-"})
@@ -43,13 +44,12 @@ def mode_of_motors(mechanism: Mechanism, names: Sequence[str]) -> ActuationMode:
     InputError
         An unknown motor, or one named twice.
     """
-    known = [motor.name for motor in mechanism.motors]
+    motors = [motor.name for motor in mechanism.motors]
     for name in names:
-        if name not in known:
-            raise InputError("unknown motor", field="mode", value=name, remedy=f"choose from {', '.join(known)}")
+        known(name, motors, "mode", "motor")
     if len(set(names)) != len(names):
         raise InputError("a motor is named twice", field="mode", value=",".join(names), remedy="name each once")
-    return mode_of_signs(mechanism, "".join("+" if name in names else "-" for name in known))
+    return mode_of_signs(mechanism, "".join("+" if name in names else "-" for name in motors))
 
 
 @checked_arguments()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any
 
@@ -42,9 +42,9 @@ class Group:
         return self.plural or f"{self.word}s"
 
 
-def group(table: str, word: str, *kinds: type, **others: Any) -> dict[str, Group]:
-    """Metadata of the field of `Members` that has the members of a group."""
-    return {"group": Group(table, word, kinds, **others)}
+def group(table: str, word: str, *kinds: type, **others: Any) -> Any:
+    """The field of `Members` that has the members of a group, none by default."""
+    return field(default=(), metadata={"group": Group(table, word, kinds, **others)})
 
 
 @cache

@@ -184,8 +184,6 @@ class PrismaticJoint(Joint, kind="prismatic", holds=("axis", "angle")):
 
     Attributes
     ----------
-    name : str
-    a, b : PointRef
     direction : float
         Of the axis against body a [rad].
     angle : float
@@ -215,8 +213,6 @@ class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", fol
 
     Attributes
     ----------
-    name : str
-    a, b : PointRef
     at_end : AtEnd or str
         What a run does where point b comes to an end of the beam; a value is taken for the member.
     """

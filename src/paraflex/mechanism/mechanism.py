@@ -13,6 +13,7 @@ from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, 
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
 from paraflex.mechanism.phases import with_phases
+from paraflex.mechanism.quantities import known
 
 
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
@@ -91,12 +92,9 @@ class Mechanism(Members, Shown):
         InputError
             If a name is not that of a body.
         """
-        names = [body.name for body in self.bodies] if names is None else list(names)
-        known = [body.name for body in self.bodies]
-        for name in names:
-            if name not in known:
-                raise InputError("unknown body", field="rigid", value=name, remedy=f"choose from {', '.join(known)}")
-        bodies = [self.body(name) for name in names]
+        for name in names or ():
+            known(name, [body.name for body in self.bodies], "rigid", "body")
+        bodies = self.bodies if names is None else [self.body(name) for name in names]
         return self.with_bodies(body.as_rigid() for body in bodies if not isinstance(body, RigidBody))
 
     @checked_arguments()

@@ -9,10 +9,10 @@ from functools import cached_property
 from typing import Self, TypeVar
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body
 from paraflex.mechanism.gears import Gear
-from paraflex.mechanism.groups import group, grouped
+from paraflex.mechanism.groups import Group, group, grouped
 from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
 from paraflex.mechanism.loads import (
     AppliedTorque,
@@ -23,6 +23,7 @@ from paraflex.mechanism.loads import (
     TorsionalDamper,
     TorsionalSpring,
 )
+from paraflex.mechanism.quantities import known
 
 T = TypeVar("T")
 
@@ -119,32 +120,21 @@ class Members(CheckedFields):
 
     name: str
     ground: Mapping[str, tuple[float, float]]
-    bodies: tuple[Body, ...] = field(metadata=group("body", "body", plural="bodies", engines=True))
-    joints: tuple[Joint, ...] = field(metadata=group("joint", "joint", engines=True))
-    motors: tuple[Motor, ...] = field(default=(), metadata=group("motor", "motor", engines=True))
-    prescribed: tuple[PrescribedAngle, ...] = field(default=(), metadata=group("prescribed", "prescribed angle"))
+    bodies: tuple[Body, ...] = field(metadata={"group": Group("body", "body", plural="bodies", engines=True)})
+    joints: tuple[Joint, ...] = field(metadata={"group": Group("joint", "joint", engines=True)})
+    motors: tuple[Motor, ...] = group("motor", "motor", engines=True)
+    prescribed: tuple[PrescribedAngle, ...] = group("prescribed", "prescribed angle")
     end_effector: EndEffector | None = None
-    assemblies: tuple[Assembly, ...] = field(
-        default=(), metadata=group("assembly", "assembly", plural="assemblies", engines=True)
+    assemblies: tuple[Assembly, ...] = group("assembly", "assembly", plural="assemblies", engines=True)
+    modes: tuple[ActuationMode, ...] = group("mode", "actuation mode", engines=True)
+    springs: tuple[TorsionalSpring, ...] = group("spring", "spring", TorsionalSpring, engines=True, resists=True)
+    dampers: tuple[TorsionalDamper, ...] = group("damper", "damper", TorsionalDamper, resists=True)
+    frictions: tuple[JointFriction, ...] = group("friction", "friction law", JointFriction, resists=True)
+    linear_springs: tuple[LinearSpring, ...] = group(
+        "linear_spring", "spring between points", LinearSpring, plural="springs between points", resists=True
     )
-    modes: tuple[ActuationMode, ...] = field(default=(), metadata=group("mode", "actuation mode", engines=True))
-    springs: tuple[TorsionalSpring, ...] = field(
-        default=(), metadata=group("spring", "spring", TorsionalSpring, engines=True, resists=True)
-    )
-    dampers: tuple[TorsionalDamper, ...] = field(
-        default=(), metadata=group("damper", "damper", TorsionalDamper, resists=True)
-    )
-    frictions: tuple[JointFriction, ...] = field(
-        default=(), metadata=group("friction", "friction law", JointFriction, resists=True)
-    )
-    linear_springs: tuple[LinearSpring, ...] = field(
-        default=(),
-        metadata=group(
-            "linear_spring", "spring between points", LinearSpring, plural="springs between points", resists=True
-        ),
-    )
-    gears: tuple[Gear, ...] = field(default=(), metadata=group("gear", "gear", Gear, engines=True))
-    loads: tuple[Load, ...] = field(default=(), metadata=group("load", "load", PointForce, AppliedTorque))
+    gears: tuple[Gear, ...] = group("gear", "gear", Gear, engines=True)
+    loads: tuple[Load, ...] = group("load", "load", PointForce, AppliedTorque)
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
@@ -164,10 +154,8 @@ class Members(CheckedFields):
         return self._by_name("joint", name, self._joints_by_name)
 
     def _by_name(self, kind: str, name: str, members: Mapping[str, T]) -> T:
-        try:
-            return members[name]
-        except (KeyError, TypeError):
-            raise InputError(f"unknown {kind}", field=kind, value=name, remedy=suggestion(name, members)) from None
+        known(name, members, kind, kind)
+        return members[name]
 
     @cached_property
     def _bodies_by_name(self) -> dict[str, Body]:
@@ -223,8 +211,8 @@ class Members(CheckedFields):
         InputError
             If there is none.
         """
-        known = ", ".join(assembly.name for assembly in self.assemblies) or "none"
+        names = ", ".join(assembly.name for assembly in self.assemblies) or "none"
         for assembly in self.assemblies:
             if name is None or assembly.name == name:
                 return assembly
-        raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {known}")
+        raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {names}")

@@ -46,17 +46,10 @@ def not_zero(value: float, field: str, unit: str) -> None:
 def said(
     description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: bool = False
 ) -> dict[str, Any]:
-    """Metadata of a member's field.
+    """Metadata of a member's field: what model files, their schema and errors say of it, with the unit behind "in".
 
-    Parameters
-    ----------
-    description : str
-        As model files, their schema and errors have it; a unit stands behind "in".
-    check : callable, optional
-        Of its number, unless that is None: `finite`, or with a unit to ask for `positive`, `not_negative`, `not_zero`.
-    unit : str
-    joint : bool
-        Whether it names a joint.
+    A number is checked, unless it is None, by `finite`, or with a unit to ask for by `positive`, `not_negative` or
+    `not_zero`; a name may be a joint's.
     """
     checked = partial(check, unit=unit) if check is not None and unit else check
     return {"description": description, "check": checked, "joint": joint}

@@ -149,7 +149,7 @@ def plan_film(
     return Film(scenes, _size(scenes, options.size), fps, speed, theme(options.theme), kind != ".png")
 
 
-def write_film(
+def animate(
     data: xr.Dataset,
     file: str | Path,
     modes: Sequence[str] = (),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,8 +52,9 @@ class Mark(NamedTuple):
 
 def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of the ground, at one time."""
-    held = [joint for joint in shown.joints if joint.grounded and symbol_of(joint).on_ground]
-    found = [(joint.name, ground_of(joint, limits)) for joint in held]
+    # What neither slides nor holds a point stands on nothing.
+    held = [joint for joint in shown.joints if joint.slides or {"pin", "weld"} & SYMBOLS.get(joint.kind, {}).keys()]
+    found = [(joint.name, ground_of(joint, limits)) for joint in held if joint.grounded]
     found += [("", support(place, limits)) for place in shown.anchors]
     return [
         Mark(look, name, _joined(pieces)[None])
@@ -66,7 +67,7 @@ def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of gears, springs and joints."""
     out = [Mark("gear", gear.name, line) for gear in shown.gears for line in pitch_lines(gear)]
     out += [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
-    parts = [(joint, look, shape) for joint in shown.joints for look, shape in symbol_of(joint).parts.items()]
+    parts = [(joint, look, shape) for joint in shown.joints for look, shape in SYMBOLS.get(joint.kind, {}).items()]
     out += [Mark(look, joint.name, shape(joint, limits)) for joint, look, shape in parts]
     return sorted(out, key=lambda mark: list(LOOKS).index(mark.look))
 
@@ -172,31 +173,12 @@ def zigzag(ends: Array, limits: Limits) -> Array:
     return a[:, None] + along[:, None] * d[:, None] + swing[:, None] * across[:, None]
 
 
-class Symbol(NamedTuple):
-    """How a joint is drawn.
-
-    Attributes
-    ----------
-    parts : mapping of str to callable
-        By their looks what makes the shapes of it.
-    on_ground : bool
-        Whether a support or a rail is drawn where the joint is on the ground.
-    """
-
-    parts: Mapping[str, Callable[[DrawnJoint, Limits], Array]]
-    on_ground: bool = True
-
-
-# By `Joint.symbol`. What slides and turns, turns on a pin; what is welded to a block does neither.
-SYMBOLS = {
-    "pin": Symbol({"pin": dot}),
-    "weld": Symbol({"weld": square}),
-    "slider": Symbol({"block": block}),
-    "slot": Symbol({"block": block, "pin": dot}),
-    "sliding": Symbol({"block": block, "pin": dot}),
+# Shapes of what moves of a joint by their looks, by `Joint.symbol`; a joint that has none is not drawn. What slides and
+# turns, turns on a pin; what is welded to a block does neither.
+SYMBOLS: dict[str, dict[str, Callable[[DrawnJoint, Limits], Array]]] = {
+    "pin": {"pin": dot},
+    "weld": {"weld": square},
+    "slider": {"block": block},
+    "slot": {"block": block, "pin": dot},
+    "sliding": {"block": block, "pin": dot},
 }
-
-
-def symbol_of(joint: DrawnJoint) -> Symbol:
-    """The symbol of a joint; one that has none is not drawn."""
-    return SYMBOLS.get(joint.kind, Symbol({}, on_ground=False))

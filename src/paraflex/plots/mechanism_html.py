@@ -7,7 +7,7 @@ from typing import Any
 
 from paraflex.display import facts, page, sentence, table, view
 from paraflex.dynamics.constraints import constraint_count
-from paraflex.mechanism import Mechanism, grouped, loops
+from paraflex.mechanism import Body, Mechanism, grouped, loops
 from paraflex.plots.svg import sketch
 
 # Bodies, joints or modes listed one by one.
@@ -19,7 +19,7 @@ _LISTED = ("body", "joint", "motor", "assembly", "mode")
 @view.register(Mechanism)
 def mechanism_html(mechanism: Mechanism) -> str:
     """Bodies, joints, motors, freedoms and a sketch of the first assembly."""
-    rows = [(body.name, _words(type(body).__name__, body), getattr(body, "length", None), ", ".join(body.points))
+    rows = [(body.name, _words(body), getattr(body, "length", None), ", ".join(body.points))
             for body in mechanism.bodies]  # fmt: skip
     joints = [(joint.name, joint.kind, f"{joint.a} – {joint.b}") for joint in mechanism.joints]
     return page(
@@ -70,7 +70,7 @@ def _few(what: str, headings: tuple[str, ...], rows: list[tuple]) -> str:
     return table(headings, rows[:_MOST]) + (sentence(f"and {more} more {what}") if more > 0 else "")
 
 
-def _words(name: str, body: object = None) -> str:
-    """The name of a class in words: "flexible beam"; of a body held rigid with that."""
-    text = re.sub(r"(?<!^)(?=[A-Z])", " ", name).lower()
-    return f"{text}, held rigid" if body is not None and getattr(body, "flexible", True) is False else text
+def _words(body: Body) -> str:
+    """The class of a body in words: "flexible beam"; of one held rigid with that."""
+    text = re.sub(r"(?<!^)(?=[A-Z])", " ", type(body).__name__).lower()
+    return f"{text}, held rigid" if getattr(body, "flexible", True) is False else text

@@ -1,22 +1,15 @@
 """Reports: one HTML file with tables, interactive charts and the mechanism in motion."""
 
-from paraflex.report.film import Animation, animation
-from paraflex.report.motion import motion_page
-from paraflex.report.page import Chart, Curve, Look, Page, Panel, render, save_page
-from paraflex.report.tracking import tracking_page
-from paraflex.report.verification import verification_page
-
-__all__ = [
-    "Animation",
-    "Chart",
-    "Curve",
-    "Look",
-    "Page",
-    "Panel",
-    "animation",
-    "motion_page",
-    "render",
-    "save_page",
-    "tracking_page",
-    "verification_page",
-]
+from paraflex.report.film import Animation as Animation, animation as animation
+from paraflex.report.motion import motion_page as motion_page
+from paraflex.report.page import (
+    Chart as Chart,
+    Curve as Curve,
+    Look as Look,
+    Page as Page,
+    Panel as Panel,
+    render as render,
+    save_page as save_page,
+)
+from paraflex.report.tracking import tracking_page as tracking_page
+from paraflex.report.verification import verification_page as verification_page

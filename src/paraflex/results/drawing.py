@@ -12,17 +12,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
-from paraflex.mechanism import (
-    GROUND,
-    Body,
-    Gear,
-    Joint,
-    Mechanism,
-    PointRef,
-    Pose,
-    RigidBody,
-    placed_poses,
-)
+from paraflex.mechanism import GROUND, Body, Gear, Joint, Mechanism, PointRef, Pose, RigidBody, placed_poses
 from paraflex.mechanism.poses import local_points
 from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape, turned
 

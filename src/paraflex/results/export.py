@@ -89,9 +89,7 @@ def _told(array: xr.DataArray) -> tuple[str, str]:
 
 
 @checked_arguments()
-def export_results(
-    data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = False, force: bool = False
-) -> list[Path]:
+def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = False, force: bool = False) -> list[Path]:
     """Write results for other programs; every file appears whole or not at all.
 
     Parameters

@@ -13,41 +13,21 @@ from paraflex.errors import ValidityWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import Solution
 from paraflex.validity.bending import bending_of
-from paraflex.validity.blame import to_blame, with_blame
+from paraflex.validity.blame import to_blame as to_blame, with_blame as with_blame
 from paraflex.validity.indicators import (
-    AXIAL_LIMIT,
-    DRIVEN_AXIAL_LIMIT,
-    FOURTH_ORDER_LIMIT,
-    SHORTENING_LIMIT,
-    SLOPE_LIMIT,
-    Following,
-    Indicator,
-    fourth_order,
+    AXIAL_LIMIT as AXIAL_LIMIT,
+    DRIVEN_AXIAL_LIMIT as DRIVEN_AXIAL_LIMIT,
+    FOURTH_ORDER_LIMIT as FOURTH_ORDER_LIMIT,
+    SHORTENING_LIMIT as SHORTENING_LIMIT,
+    SLOPE_LIMIT as SLOPE_LIMIT,
+    Following as Following,
+    Indicator as Indicator,
+    fourth_order as fourth_order,
     of_linear,
     of_second_order,
 )
-from paraflex.validity.numbers import doubtful_numbers, mechanism_size
-from paraflex.validity.plausibility import Driven, doubtful_results
-
-__all__ = [
-    "AXIAL_LIMIT",
-    "DRIVEN_AXIAL_LIMIT",
-    "FOURTH_ORDER_LIMIT",
-    "SHORTENING_LIMIT",
-    "SLOPE_LIMIT",
-    "Driven",
-    "Following",
-    "Indicator",
-    "Validity",
-    "assess",
-    "doubtful_numbers",
-    "doubtful_results",
-    "fourth_order",
-    "mechanism_size",
-    "to_blame",
-    "warn",
-    "with_blame",
-]
+from paraflex.validity.numbers import doubtful_numbers as doubtful_numbers, mechanism_size as mechanism_size
+from paraflex.validity.plausibility import Driven as Driven, doubtful_results as doubtful_results
 
 
 @dataclass(frozen=True)

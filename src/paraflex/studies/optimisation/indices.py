@@ -152,7 +152,7 @@ def load_indices(
 
 
 @checked_arguments()
-def sobol_indices(
+def indices(
     study: IndicesStudy | str | Path,
     folder: str | Path,
     *,

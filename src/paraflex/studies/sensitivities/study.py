@@ -21,8 +21,9 @@ from paraflex.designs.run import Task
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, digest, make_setting
-from paraflex.errors import InputError, OutputError, suggestion
+from paraflex.errors import InputError, OutputError
 from paraflex.findings import Verdict
+from paraflex.mechanism.quantities import known
 from paraflex.results.summary import finite_or_none
 from paraflex.writing import read_json, whole_file
 
@@ -283,10 +284,7 @@ def _check_names(names: Sequence[str]) -> None:
 
 def _values(setting: Setting, at: Mapping[str, float]) -> tuple[float, ...]:
     for name, value in at.items():
-        if name not in setting.names:
-            raise InputError(
-                "unknown parameter", field="--at", value=name, remedy=suggestion(name, list(setting.names))
-            )
+        known(name, setting.names, "--at", "parameter")
         if not np.isfinite(value):
             raise InputError("not a number", field="--at", value=f"{name}={value}", remedy="give a finite one")
     return tuple(

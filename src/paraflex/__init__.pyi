@@ -1,0 +1,102 @@
+# Every public name, once; grouped as the page "The interface" of the documentation shows them.
+from . import library as library, plots as plots
+
+# Mechanisms: bodies, joints, what acts on them
+from .mechanism import (
+    Mechanism as Mechanism,
+    RigidBody as RigidBody,
+    FlexibleBeam as FlexibleBeam,
+    AssumedModesBeam as AssumedModesBeam,
+    ModalBody as ModalBody,
+    ModalPoint as ModalPoint,
+    Material as Material,
+    Section as Section,
+    LumpedMass as LumpedMass,
+    RevoluteJoint as RevoluteJoint,
+    PrismaticJoint as PrismaticJoint,
+    SlotJoint as SlotJoint,
+    SlidingJoint as SlidingJoint,
+    WeldJoint as WeldJoint,
+    PointRef as PointRef,
+    Motor as Motor,
+    EndEffector as EndEffector,
+    ActuationMode as ActuationMode,
+    Assembly as Assembly,
+    Start as Start,
+    PointForce as PointForce,
+    AppliedTorque as AppliedTorque,
+    TorsionalSpring as TorsionalSpring,
+    LinearSpring as LinearSpring,
+    TorsionalDamper as TorsionalDamper,
+    JointFriction as JointFriction,
+    LossFactor as LossFactor,
+    RayleighDamping as RayleighDamping,
+    ModalDamping as ModalDamping,
+    PrescribedAngle as PrescribedAngle,
+    ConstantSpeed as ConstantSpeed,
+    PiecewiseLaw as PiecewiseLaw,
+    TabulatedLaw as TabulatedLaw,
+    SampledAngle as SampledAngle,
+)
+
+# Paths
+from .kinematics import Circle as Circle, Line as Line, PointPath as PointPath, Polygon as Polygon
+
+# Models: read, looked over, planned, run
+from .files import Model as Model, load as load, load_path as load_path, plan as plan
+from .checks import check as check
+from .simulate import simulate as simulate
+from .motion import simulate_motion as simulate_motion
+
+# Integration
+from .integrators import (
+    METHODS as METHODS,
+    DeflectionLimit as DeflectionLimit,
+    IntegrationOptions as IntegrationOptions,
+    JointLimit as JointLimit,
+    SingularDistance as SingularDistance,
+)
+
+# Studies
+from .campaign import Workers as Workers
+from .studies import (
+    run_study as run_study,
+    verify as verify,
+    compare_methods as compare_methods,
+    tracking_case as tracking_case,
+    motion_case as motion_case,
+    sweep as sweep,
+    optimise as optimise,
+    identify as identify,
+    indices as indices,
+    sensitivities as sensitivities,
+    load_sweep as load_sweep,
+    load_optimisation as load_optimisation,
+    load_identification as load_identification,
+    load_indices as load_indices,
+    load_sensitivities as load_sensitivities,
+)
+
+# Results
+from .results import (
+    tracking_dataset as tracking_dataset,
+    motion_dataset as motion_dataset,
+    summary as summary,
+    save_results as save_results,
+    load_results as load_results,
+    open_results as open_results,
+)
+from .results.export import export as export
+from .plots.film import FilmOptions as FilmOptions, animate as animate
+
+# What goes wrong, and what is doubted
+from .errors import (
+    ParaflexError as ParaflexError,
+    InputError as InputError,
+    NumericalError as NumericalError,
+    ParaflexWarning as ParaflexWarning,
+    ModelWarning as ModelWarning,
+    ResultWarning as ResultWarning,
+    StiffnessWarning as StiffnessWarning,
+    ValidityWarning as ValidityWarning,
+)

@@ -1,0 +1,32 @@
+from .agreement import (
+    compared_deflections as compared_deflections,
+    compared_links as compared_links,
+    compared_paths as compared_paths,
+    model_distances as model_distances,
+)
+from .derivatives import elasticities as elasticities
+from .drawing import mechanism_drawing as mechanism_drawing
+from .driving import (
+    actuation_condition as actuation_condition,
+    mode_comparison as mode_comparison,
+    mode_conditions as mode_conditions,
+    tracking_distance as tracking_distance,
+)
+from .energy import energies as energies
+from .free_motion import coordinates as coordinates, motion_overview as motion_overview, point_paths as point_paths
+from .methods import work_precision as work_precision
+from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
+from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
+from .parallel import parallel_coordinates as parallel_coordinates
+from .phase import link_phases as link_phases, phase_diagrams as phase_diagrams
+from .responses import pareto_front as pareto_front, response_curves as response_curves
+from .save import save_figures as save_figures
+from .spectra import numerical_damping as numerical_damping
+from .time_series import (
+    end_effector_motion as end_effector_motion,
+    joint_forces as joint_forces,
+    link_deflections as link_deflections,
+    link_motions as link_motions,
+    tip_deflections as tip_deflections,
+)
+from .workspace import desired_path as desired_path, end_effector_path as end_effector_path

@@ -1,0 +1,16 @@
+from .dataset import tracking_dataset as tracking_dataset
+from .following import (
+    peak_torque as peak_torque,
+    residual_vibration as residual_vibration,
+    rms_torque as rms_torque,
+    tracking_error as tracking_error,
+)
+from .kinds import kind_of as kind_of
+from .motion_data import motion_dataset as motion_dataset, motion_summary as motion_summary
+from .storage import (
+    load_results as load_results,
+    open_results as open_results,
+    results_file as results_file,
+    save_results as save_results,
+)
+from .summary import summary as summary
