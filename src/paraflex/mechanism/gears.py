@@ -36,17 +36,17 @@ class Gear(CheckedFields):
     second_joint: str = field(metadata=AT_JOINT)
     ratio: float = field(
         metadata=said(
-            "of the second joint's angle to the first's, negative where wheels mesh outside; of a rack the radius of "
-            "its pinion",
+            "the second joint's angle by the first's, negative where wheels mesh outside; of a rack the radius of its "
+            "pinion",
             not_zero,
-            "second by first: an angle by an angle, or a travel by an angle in m/rad",
+            "as the second joint's angle or travel by the first's",
         )
     )
     phase: float | None = field(
         default=None,
         metadata=said(
-            "the coordinate of the second joint where that of the first is zero in rad, or m; as the first assembly "
-            "stands by default",
+            "the coordinate of the second joint where that of the first is zero in rad, or m; by default as the first "
+            "assembly stands",
             finite,
         ),
     )
