@@ -16,7 +16,7 @@ from common import command_line, single_thread, write_json
 from numpy.typing import NDArray
 
 import paraflex as pf
-from paraflex.integrators import METHODS, IntegrationOptions, Solution
+from paraflex.integrators import METHODS, IntegrationOptions, Solution, find_method
 from paraflex.integrators.stiffness import StiffnessWarning
 from paraflex.studies.cases import tracking_case
 
@@ -64,7 +64,8 @@ def main() -> None:
     rows = []
     for name in given.method:
         settings = SETTINGS[name]
-        path, solution = run(method=name.split(",")[0], **settings)
+        options = {key: value for key, value in settings.items() if key != "parameters"}
+        path, solution = run(method=find_method(name.split(",")[0], settings.get("parameters")), **options)
         row = {
             "method": name,
             **settings,

@@ -153,7 +153,9 @@ def summary(found: dict[str, dict[str, Any]]) -> dict[str, Any]:
         "number": len(found),
         "failed": sum(line["failed"] for line in lines),
         "worst": worst,
-        "default": next(row for row in lines if (row["method"], row["tolerance"]) == (ours.method, ours.tolerance)),
+        "default": next(
+            row for row in lines if (row["method"], row["tolerance"]) == (ours.method.name, ours.tolerance)
+        ),
         "rows": lines,
     }
 

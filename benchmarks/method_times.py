@@ -15,13 +15,13 @@ from paraflex.integrators import METHODS
 from paraflex.studies import ComparisonOptions, compare_methods, tracking_case
 
 TOLERANCES = (1e-3, 5e-4, 3e-4, 1e-4, 3e-5, 1e-5)
-# What runs at 1 / frequency of the fastest mode takes minutes.
-EXPLICIT = ("rk45", "adams")
 
 
 def main() -> None:
     parser = command_line(__doc__)
-    parser.add_argument("method", nargs="*", default=[name for name in METHODS if name not in EXPLICIT])
+    # What runs at 1 / frequency of the fastest mode takes minutes.
+    implicit = [name for name, method in METHODS.items() if not method.explicit]
+    parser.add_argument("method", nargs="*", default=implicit)
     parser.add_argument("--limit", type=float, default=15.0, help="of a run [s]")
     given = parser.parse_args()
     single_thread()

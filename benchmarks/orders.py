@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System, build_system, consistent_state
 from paraflex.fem import ReferenceCondition
-from paraflex.integrators import METHODS, IntegrationOptions, Solution, integrate
+from paraflex.integrators import METHODS, IntegrationOptions, Method, Solution, integrate
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import (
     Assembly,
@@ -86,7 +86,7 @@ def smooth_torque() -> Signals:
     return Signals(np.array([0, 2]), np.array([0.0, END]), pieces)
 
 
-def run(problem: tuple[System, State], method: str, steps: int, **options) -> Solution:
+def run(problem: tuple[System, State], method: Method | str, steps: int, **options) -> Solution:
     """So many even steps, solved to rounding."""
     chosen = IntegrationOptions(method=method, step=END / steps, tolerance=1e-3, newton_fraction=1e-10, **options)
     return integrate(problem[0], smooth_torque(), problem[1], np.array([END]), options=chosen)
@@ -98,7 +98,7 @@ def converged(modes: int | None = None) -> tuple[NDArray, NDArray, NDArray]:
     return _at_end(run(started(modes), "esdirk5", 4000))
 
 
-def errors(method: str, steps: Sequence[int], modes: int | None = None, **options) -> NDArray[np.float64]:
+def errors(method: Method | str, steps: Sequence[int], modes: int | None = None, **options) -> NDArray[np.float64]:
     """Largest errors at the end for each number of steps, in positions, velocities and multipliers: (steps, 3)."""
     found = [_at_end(run(started(modes), method, n, **options)) for n in steps]
     return np.array([[np.max(np.abs(a - b)) for a, b in zip(one, converged(modes), strict=True)] for one in found])

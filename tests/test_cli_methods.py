@@ -71,11 +71,11 @@ def test_what_makes_no_sense_names_the_flag(request_, says):
 def test_flags_go_before_the_study_and_its_step_goes_with_its_method():
     study = StudyDefaults(method="esdirk3", tolerance=1e-5, step=1e-3)
     kept = integration_options(RunRequest(), study)
-    assert (kept.method, kept.tolerance, kept.step) == ("esdirk3", 1e-5, 1e-3)
+    assert (kept.method.name, kept.tolerance, kept.step) == ("esdirk3", 1e-5, 1e-3)
     finer = integration_options(RunRequest(step=1e-4, tolerance=1e-7), study)
-    assert (finer.method, finer.tolerance, finer.step) == ("esdirk3", 1e-7, 1e-4)
+    assert (finer.method.name, finer.tolerance, finer.step) == ("esdirk3", 1e-7, 1e-4)
     other = integration_options(RunRequest(method="radau"), study)
-    assert (other.method, other.tolerance, other.step) == ("radau", 1e-5, None)
+    assert (other.method.name, other.tolerance, other.step) == ("radau", 1e-5, None)
 
 
 def with_study(tmp_path, lines):

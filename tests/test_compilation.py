@@ -1,10 +1,17 @@
 """Compiling beforehand: it covers what a study calls, and knows when it has been done."""
 
 import os
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
+
+import numba
+import numpy as np
 
 from paraflex.compilation import are_compiled, compile_kernels
+from paraflex.kernel.plain import TESTED, VARIABLE, choose
 
 # Calls what is compiled beforehand, then a study; prints what the study had to compile besides.
 STUDY = """
@@ -48,6 +55,22 @@ print(loaded, hashlib.sha256(run.solution.q.tobytes()).hexdigest())
 """
 
 
+# Prints what a kernel finds, which of our changes to Numba are loaded, and how often the kernel came from the cache.
+PLAIN = """
+import sys
+import numpy as np
+import paraflex as pf
+from paraflex.dynamics import build_system
+from paraflex.dynamics.state import mass_matrix
+from paraflex.kernel.bodies import motion_forces
+system = build_system(pf.load("raparm_i").mechanism)
+print(*mass_matrix(system, np.linspace(-1.0, 1.0, system.n)).ravel().tolist())
+changes = ("disk_cache", "machine_code", "passes", "records")
+print([name for name in changes if f"paraflex.kernel.{name}" in sys.modules])
+print(sum(motion_forces.from_python.stats.cache_hits.values()))
+"""
+
+
 def python(*arguments: str, **environment: str) -> str:
     done = subprocess.run(
         [sys.executable, *arguments], capture_output=True, text=True, check=True, env={**os.environ, **environment}
@@ -73,3 +96,45 @@ def test_what_is_loaded_before_changes_no_bit():
     before, result = python("-c", RUN, "all").split()
     assert (int(nothing), int(before) >= 6) == (0, True)
     assert result == expected
+
+
+def test_plain_numba_finds_the_same_and_loads_none_of_our_changes(tmp_path):
+    """One kernel, with sums over the coordinates of flexible bodies: all of them take minutes."""
+    ours, loaded, _ = python("-c", PLAIN).splitlines()
+    assert loaded == "['disk_cache', 'machine_code', 'passes', 'records']"
+    folder = {"PARAFLEX_PLAIN_NUMBA": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+    for hits in ("0", "1"):
+        plain, loaded, found = python("-c", PLAIN, **folder).splitlines()
+        assert (loaded, found) == ("[]", hits)
+        np.testing.assert_allclose(numbers(plain), numbers(ours), rtol=1e-13, atol=1e-15)
+    assert ours.count(" ") > 1000
+
+
+def numbers(line):
+    return np.array([float(word) for word in line.split()])
+
+
+def test_releases_of_numba_that_are_not_tested_are_compiled_for_plainly(caplog):
+    for release in (*TESTED, "0.66.0", "0.68.1", "0.65.0dev0+3.gabc"):
+        assert not choose(release, {}), release
+    assert not caplog.records
+    for release in ("0.61.2", "0.69.0", "0.100.0", "1.0.0"):
+        environment = {}
+        assert choose(release, environment)
+        # Said once; processes that are started do the same.
+        assert choose(release, environment)
+        assert [record.getMessage().count(release) for record in caplog.records] == [1]
+        assert environment == {VARIABLE: "1"}
+        caplog.clear()
+    assert choose(numba.__version__, {VARIABLE: "1"})
+    assert not choose("0.99.0", {VARIABLE: "0"})
+    assert not caplog.records
+
+
+def test_the_tested_releases_are_those_that_are_installed():
+    root = Path(__file__).parents[1]
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert f"numba>={TESTED[0]}" in project["dependencies"]
+    (pinned,) = re.findall(r"^numba==(\S+)$", (root / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    assert not choose(pinned, {})
+    assert " to ".join(TESTED) in (root / "docs" / "install.md").read_text(encoding="utf-8")

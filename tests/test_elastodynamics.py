@@ -18,7 +18,7 @@ from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import ActuationError, InputError, IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions, integrate
-from paraflex.integrators.newmark import NewmarkNumbers
+from paraflex.integrators.methods import GeneralisedAlpha
 from paraflex.kinematics import Line, PointPath
 from paraflex.mechanism import (
     Assembly,
@@ -260,7 +260,7 @@ def test_it_agrees_with_the_full_model_driven_by_the_motor_angles_the_better_the
 
 @pytest.mark.parametrize("radius", [0.0, 0.5, 0.8, 1.0])
 def test_parameters_are_those_of_chung_and_hulbert(radius):
-    scheme = NewmarkNumbers.by_spectral_radius(radius)
+    scheme = GeneralisedAlpha(spectral_radius=radius).numbers
     # Amplification of x'' + w^2 x = 0 at w -> infinity, in (x, h x', h^2 a, h^2 x''): all eigenvalues of this size.
     stiff = 1e12
     am, af, gamma, beta, b = scheme.alpha_m, scheme.alpha_f, scheme.gamma, scheme.beta, scheme.weight(1.0)

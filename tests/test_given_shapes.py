@@ -26,8 +26,7 @@ from paraflex.fem import (
     natural_frequencies,
 )
 from paraflex.files import load
-from paraflex.integrators import IntegrationOptions
-from paraflex.integrators.tableaux import TABLEAUX
+from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import (
@@ -395,7 +394,7 @@ def test_the_mixture_keeps_its_energy():
     assert solution.energy_balance_max < 1e-4 * solution.kinetic_energy.max()
     assert solution.constraint_position_max < 1e-7
     # As few Newton iterations as with one kind of body alone: about two a stage.
-    stages = TABLEAUX[solution.method].c.size - 1
+    stages = METHODS[solution.method].scheme.c.size - 1
     assert solution.newton_iterations < 4 * stages * solution.steps
 
 

@@ -31,6 +31,7 @@ from paraflex.mechanism import (
     RigidBody,
     SampledAngle,
     Section,
+    TorsionalSpring,
 )
 from paraflex.mechanism.joints import PrescribedAngle
 
@@ -267,6 +268,34 @@ def test_a_drive_beyond_reach_stops_the_run_with_what_there_is():
     partial = caught.value.partial
     assert partial.t[-1] > 0.29
     assert partial.q[:, system.body("slider").offset] == pytest.approx(0.25 + 0.2 * partial.t, abs=1e-2)
+
+
+def spinning(start: float, speed: float = 1e7, span: float = 1e-5, **options):
+    """A disc on a spring, turned by 0.1 rad, whose run starts at a time; so many rad/s are its own."""
+    disc = RigidBody("disc", mass=2.0, inertia=0.5, points={"O": (0.0, 0.0)})
+    spring = TorsionalSpring("spring", "O", stiffness=0.5 * speed**2)
+    mechanism = replace(pendulum(disc), springs=(spring,), assemblies=(Assembly("turned", {"disc": 0.1}),))
+    system = build_system(mechanism)
+    signals, _ = pack_signals(mechanism, [], span)
+    initial = replace(consistent_state(system, mechanism.assembly()), time=start)
+    chosen = IntegrationOptions(method="tr-bdf2", **options)
+    return integrate(system, signals, initial, start + np.linspace(0.0, span, 5), options=chosen)
+
+
+@pytest.mark.parametrize("start", [1000.0, -1000.0])
+def test_when_a_run_starts_does_not_bound_its_steps(start):
+    """The smallest step is a part of the run, not of the clock; the clock has its digits, a thousandth of a step."""
+    usual, late = (spinning(time, tolerance=1e-6) for time in (0.0, start))
+    assert late.rejected > 0
+    assert late.steps == pytest.approx(usual.steps, rel=0.02)
+    np.testing.assert_allclose(late.q, usual.q, rtol=0.0, atol=0.02)
+
+
+@pytest.mark.parametrize("start", [0.0, -1.0, -3.0])
+def test_a_run_that_cannot_go_on_ends_whenever_it_starts(start):
+    """One that ends at zero or before would shorten its steps for ever."""
+    with pytest.raises(IntegrationError, match=r"Newton.s iteration does not converge, however small the step"):
+        spinning(start, speed=1e14, span=1.0, max_steps=2000)
 
 
 def test_too_many_steps_keep_the_partial_solution():

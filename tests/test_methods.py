@@ -1,7 +1,9 @@
 """Our own methods on a stiff flexible mechanism with a loop: orders, treatments of constraints, steps, bad input."""
 
 import importlib.util
+import pickle
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +12,8 @@ import pytest
 from paraflex.errors import InputError, IntegrationError
 from paraflex.files import load
 from paraflex.integrators import METHODS, IntegrationOptions, integrate
-from paraflex.integrators.methods import Family
-from paraflex.integrators.newmark import newmark_numbers
+from paraflex.integrators.methods import BDF, HHT, Family, GeneralisedAlpha, Newmark, Wilson, find_method
+from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.mechanism import Geometry
 from paraflex.simulate import plan_tracking
 from paraflex.studies import tracking_case
@@ -25,12 +27,14 @@ _SPEC.loader.exec_module(study)
 
 NATIVE = [name for name, method in METHODS.items() if method.family in (Family.ESDIRK, Family.NEWMARK)]
 ESDIRK = [name for name in NATIVE if METHODS[name].family is Family.ESDIRK]
+INDEX_3 = [name for name in NATIVE if METHODS[name].family is Family.NEWMARK]
+OF_ORDER_2 = [name for name in NATIVE if METHODS[name].order == 2]
 
 
 # --- Orders --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["tr-bdf2", "trapezoidal", "hht-alpha", "generalised-alpha", "wilson-theta"])
+@pytest.mark.parametrize("method", OF_ORDER_2)
 def test_order_2_in_positions_velocities_and_multipliers(method):
     """Of all modes, up to 290,000 rad/s: hω is 290 at the coarsest step."""
     steps = (50, 100, 200)
@@ -40,10 +44,10 @@ def test_order_2_in_positions_velocities_and_multipliers(method):
 @pytest.mark.parametrize(("gamma", "order"), [(0.6, 1.0), (0.5, 2.0)])
 def test_newmark_is_of_order_1_where_it_damps(gamma, order):
     steps = (50, 100, 200)
-    found = study.orders(steps, study.errors("newmark", steps, parameters={"gamma": gamma}))
+    found = study.orders(steps, study.errors(Newmark(gamma=gamma), steps))
     # Without damping multipliers of index 3 keep the error of the first step.
     assert found[:, :2] == pytest.approx(order, abs=0.12)
-    assert newmark_numbers("newmark", {"gamma": gamma, "beta": 0.3025}).order == order
+    assert Newmark(gamma=gamma, beta=0.3025).numbers.order == order
 
 
 def test_order_3_in_positions_velocities_and_multipliers():
@@ -93,7 +97,7 @@ def test_projection_and_stabilised_index_2_keep_positions_and_velocities(method)
     assert dphi < 1e-2
 
 
-@pytest.mark.parametrize("method", ["newmark", "hht-alpha", "generalised-alpha", "wilson-theta"])
+@pytest.mark.parametrize("method", INDEX_3)
 def test_index_3_keeps_positions_at_every_step(method):
     position, velocity = violations(method)
     assert position < 1e-13
@@ -101,7 +105,7 @@ def test_index_3_keeps_positions_at_every_step(method):
     assert velocity < 1e-12 if method == "wilson-theta" else velocity > 1e-9
 
 
-@pytest.mark.parametrize("method", ["hht-alpha", "generalised-alpha", "wilson-theta"])
+@pytest.mark.parametrize("method", [name for name in INDEX_3 if name in OF_ORDER_2])
 def test_index_3_keeps_velocities_too_where_steps_vary(method):
     problem = study.started()
     options = IntegrationOptions(method=method, tolerance=1e-4)
@@ -209,15 +213,12 @@ def converged_path(raparm):
     return paths(raparm, method="esdirk5", tolerance=1e-7)[0]
 
 
-@pytest.mark.parametrize(
-    ("method", "tolerance"),
-    [("tr-bdf2", 2e-6), ("trapezoidal", 2e-6), ("esdirk3", 1e-6), ("esdirk4", 2e-6), ("wilson-theta", 1e-6),
-     ("hht-alpha", 2e-6), ("generalised-alpha", 2e-6), ("newmark", 2e-6)],
-)  # fmt: skip
-def test_methods_agree_on_the_path_of_the_end_effector(raparm, converged_path, method, tolerance):
+@pytest.mark.parametrize("method", NATIVE)
+def test_methods_agree_on_the_path_of_the_end_effector(raparm, converged_path, method):
     """Those of our own; the others take minutes and stand in benchmarks/agreement.py."""
-    parameters = {"gamma": 0.5} if method == "newmark" else {}
-    found, _ = paths(raparm, method=method, tolerance=tolerance, parameters=parameters)
+    # Of order 1 it would take too long.
+    chosen = Newmark(gamma=0.5) if method == "newmark" else method
+    found, _ = paths(raparm, method=chosen, tolerance=1e-6 if method in ("esdirk3", "wilson-theta") else 2e-6)
     assert np.max(np.linalg.norm(found - converged_path, axis=-1)) < 1e-6
 
 
@@ -236,13 +237,7 @@ def test_newton_needs_few_iterations_and_few_factors(raparm):
     ("options", "field", "words"),
     [
         ({"method": "trbdf"}, "method", "tr-bdf2"),
-        ({"method": "newmark", "parameters": {"gamma": 0.4}}, "parameters.gamma", "0.5"),
-        ({"method": "newmark", "parameters": {"gamma": 0.7, "beta": 0.3}}, "parameters.beta", "0.36"),
-        ({"method": "wilson-theta", "parameters": {"theta": 1.2}}, "parameters.theta", "1.36"),
-        ({"method": "hht-alpha", "parameters": {"alpha": -0.5}}, "parameters.alpha", "-0.333"),
-        ({"method": "generalised-alpha", "parameters": {"spectral_radius": 1.5}}, "parameters.spectral_radius", "1"),
-        ({"method": "generalised-alpha", "parameters": {"rho": 0.5}}, "parameters", "spectral_radius"),
-        ({"method": "generalised-alpha", "parameters": {"spectral_radius": np.nan}}, "parameters.spectral_radius", "1"),
+        ({"method": "newmark", "parameters": {"gamma": 0.6}}, "parameters", "method=paraflex.methods.Newmark(...)"),
         ({"method": "radau", "step": 1e-4}, "step", "tolerance"),
         ({"step": -1.0}, "step", "seconds"),
         ({"constraints": "ggl", "method": "newmark"}, "constraints", "position"),
@@ -255,6 +250,72 @@ def test_bad_options_are_told(options, field, words):
         IntegrationOptions(**options)
     assert caught.value.field == field
     assert words in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("method", "given", "words"),
+    [
+        (Newmark, {"gamma": 0.4}, "0.5"),
+        (Newmark, {"gamma": 0.7, "beta": 0.3}, "0.36"),
+        (Wilson, {"theta": 1.2}, "1.36"),
+        (HHT, {"alpha": -0.5}, "-0.333"),
+        (GeneralisedAlpha, {"spectral_radius": 1.5}, "1"),
+        (GeneralisedAlpha, {"spectral_radius": np.nan}, "1"),
+        (GeneralisedAlpha, {"spectral_radius": "high"}, "number"),
+    ],
+)
+def test_a_method_checks_its_parameters_itself_and_as_files_have_them(method, given, words):
+    field = list(given)[-1]
+    for make, told in ((method, field), (lambda **x: find_method(method.name, x), f"parameters.{field}")):
+        with pytest.raises(InputError) as caught:
+            make(**given)
+        assert caught.value.field == told
+        assert words in caught.value.remedy
+
+
+def test_a_method_and_its_name_are_the_same():
+    for name, method in METHODS.items():
+        assert IntegrationOptions(method=name) == IntegrationOptions(method=method)
+        assert IntegrationOptions(method=method).method is method
+        assert find_method(name, {"max_order": 2.0} if "max_order" in method.parameters else None).name == name
+    assert find_method("bdf", {"max_order": 3.0}) == BDF(max_order=3) != METHODS["bdf"]
+    options = IntegrationOptions(method=GeneralisedAlpha(spectral_radius=0.8), step=1e-3)
+    assert replace(options, tolerance=1e-7).method == GeneralisedAlpha(spectral_radius=0.8)
+    assert pickle.loads(pickle.dumps(options)) == options
+    assert options.to_dict()["method_parameters"] == '{"spectral_radius": 0.8}'
+    # Another method has parameters of its own.
+    assert replace(options, method="hht-alpha").method == HHT()
+
+
+def test_parameters_of_another_method_are_told():
+    with pytest.raises(InputError, match=r"no parameter of generalised-alpha \(got 'rho'\).*spectral_radius"):
+        find_method("generalised-alpha", {"rho": 0.5})
+
+
+def test_no_name_stands_for_a_method_of_the_newmark_family_that_it_is_not():
+    """Numbers belong to the method: none of unknown name has those of generalised alpha."""
+
+    class MyAlpha(NewmarkMethod):
+        """Says nothing of its numbers."""
+
+        name, title = "my-alpha", "My alpha"
+
+    with pytest.raises(TypeError, match="numbers"):
+        MyAlpha()
+    with pytest.raises(InputError, match="unknown method"):
+        IntegrationOptions(method="my-alpha")
+    assert len({METHODS[name].numbers for name in INDEX_3}) == len(INDEX_3)
+
+
+def test_a_method_that_is_not_listed_runs():
+    """Of whoever has a tableau: the trapezoidal rule by another name."""
+
+    class Mine(type(METHODS["trapezoidal"])):
+        name = "mine"
+
+    mine, known = (study.run(study.started(1), method, 20) for method in (Mine(), "trapezoidal"))
+    np.testing.assert_array_equal(mine.q, known.q)
+    assert mine.method == "mine"
 
 
 def test_an_unknown_method_lists_the_known():

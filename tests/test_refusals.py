@@ -12,7 +12,6 @@ import pytest
 import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.fem import mesh_beam
-from paraflex.integrators.outside import _max_order
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.spectra import spectrum
 from paraflex.integrators.variation import check_differentiable
@@ -105,8 +104,8 @@ def test_files_that_figures_cannot_be_made_of(motion, tmp_path):
 
 def test_options_of_methods():
     refused(
-        lambda: pf.IntegrationOptions(method="newmark", parameters={"gamma": 0.9, "beta": 0.3}),
-        "parameters.beta", "too small for unconditional stability", "at least (gamma + 1/2)^2 / 4 = 0.49",
+        lambda: pf.methods.Newmark(gamma=0.9, beta=0.3),
+        "beta", "too small for unconditional stability", "at least (gamma + 1/2)^2 / 4 = 0.49",
     )  # fmt: skip
     refused(
         lambda: pf.IntegrationOptions(constraints="projection", automatic_gains=True),
@@ -161,5 +160,4 @@ def test_numbers_that_no_file_needs(tmp_path):
     file.write_text("a = " + "9" * 5000, encoding="utf-8")
     digits = "not valid TOML: a number of too many digits, or too many brackets in one another"
     refused(lambda: pf.load(file), "file", digits, "name a model file")
-    order = pf.IntegrationOptions(method="bdf", parameters={"max_order": 2.5})
-    refused(lambda: _max_order(order), "parameters.max_order", "must be a whole number", "say 2")
+    refused(lambda: pf.methods.BDF(max_order=2.5), "max_order", "not a whole number", "give a whole number")

@@ -16,7 +16,8 @@ import paraflex as pf
 from paraflex.dynamics import build_system, consistent_state, start_state
 from paraflex.errors import InputError, SingularPositionError
 from paraflex.files import generator_names, library_text, load
-from paraflex.integrators import IntegrationOptions
+from paraflex.integrators import METHODS, IntegrationOptions
+from paraflex.integrators.methods import Family
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.near import NEAR_PART
 from paraflex.kernel.packed import CONSTRAINT
@@ -125,7 +126,7 @@ def test_a_passage_keeps_the_tolerance(method, n, speed, tolerance):
     assert run.ratio < 10.0
 
 
-@pytest.mark.parametrize("method", ["tr-bdf2", "trapezoidal", "esdirk3", "esdirk4", "esdirk5"])
+@pytest.mark.parametrize("method", [name for name, method in METHODS.items() if method.family is Family.ESDIRK])
 def test_passages_keep_the_tolerance_wherever_steps_fall(method):
     """Speeds, tolerances and numbers of loops at random; `benchmarks/singular_passages.py` does so a thousand times."""
     rng = np.random.default_rng(7)

@@ -7,8 +7,7 @@ import pytest
 
 from paraflex.errors import ActuationError, IntegrationError
 from paraflex.fem import ReferenceCondition
-from paraflex.integrators import IntegrationOptions
-from paraflex.integrators.tableaux import TABLEAUX
+from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.kinematics import Circle, Line, PointPath, Polygon
 from paraflex.mechanism import Curvature, FlexibleBeam, Material, raparm_i
 from paraflex.mechanism.raparm import TABLE_1
@@ -81,7 +80,7 @@ def test_second_order_geometry_meets_geometrically_exact_beams(mode, exact, with
 def test_second_order_geometry_runs_in_every_mode(mode):
     task = plan_tracking(raparm_i().with_geometry("second-order"), SQUARE, duration=0.1, samples=21)
     run = simulate(task, mode, options=IntegrationOptions(tolerance=1e-4))
-    stages = TABLEAUX[run.solution.method].c.size - 1
+    stages = METHODS[run.solution.method].scheme.c.size - 1
     assert run.solution.newton_iterations < 3.5 * stages * run.solution.steps
     energy = run.solution.kinetic_energy + run.solution.strain_energy
     assert run.solution.energy_balance_max < 0.02 * energy.max()

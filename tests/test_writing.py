@@ -71,5 +71,5 @@ def test_a_step_of_the_study_goes_with_its_method():
     study = StudyDefaults(method="esdirk3", tolerance=1e-6, step=1e-3)
     assert study.integration().step == 1e-3
     other = study.integration({"method": "radau", "tolerance": None})
-    assert (other.method, other.tolerance, other.step) == ("radau", 1e-6, None)
+    assert (other.method.name, other.tolerance, other.step) == ("radau", 1e-6, None)
     assert study.filled(samples=5, assembly=None) == replace(study, samples=5)

@@ -22,6 +22,7 @@ PACKAGES = (
     "motion",
     "validity",
     "elastodynamics",
+    "integrators.methods",
     "integrators",
     "dynamics",
     "fem",
@@ -109,8 +110,9 @@ def _index_page(homes: dict[str, str]) -> str:
 
 
 def _link(name: str, homes: dict[str, str]) -> str:
-    if name == "plots":
-        return "[paraflex.plots](plots.md)"
+    modules = {"methods": "integrators.methods", "plots": "plots"}
+    if name in modules:
+        return f"[paraflex.{modules[name]}]({modules[name]}.md)"
     return f"[{homes[name]}][]"
 
 

@@ -50,6 +50,7 @@ from .motion import simulate_motion as simulate_motion
 
 # Integration
 from .integrators import (
+    methods as methods,
     METHODS as METHODS,
     DeflectionLimit as DeflectionLimit,
     IntegrationOptions as IntegrationOptions,

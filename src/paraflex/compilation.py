@@ -12,10 +12,9 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numba.core.registry import cpu_target
+from llvmlite import binding
 
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
 from paraflex.dynamics.state import check_accelerations
@@ -24,6 +23,7 @@ from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.kernel.march import march
 from paraflex.kernel.notice import LOG, announce_compiling
+from paraflex.kernel.plain import PLAIN, STATE
 from paraflex.kinematics import Line
 from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
 from paraflex.simulate import plan_tracking
@@ -89,8 +89,8 @@ def _shares(geometries: list[Geometry]) -> list[list[str]]:
 
 def _stamp(geometry: Geometry) -> Path:
     """A file among the machine code that says: made by this Python for this processor, as a folder may be shared."""
-    target: Any = cpu_target.target_context
-    here = repr((sys.version, target.codegen().magic_tuple()))
+    processor = (binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
+    here = repr((sys.version, processor, STATE, PLAIN))
     return Path(march.cache_path) / f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"
 
 

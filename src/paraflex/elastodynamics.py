@@ -31,7 +31,7 @@ from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
 from paraflex.integrators.beam_ends import beyond_ends, end_of_motion
 from paraflex.integrators.linear_structure import Block, Response, march
-from paraflex.integrators.newmark import NewmarkNumbers
+from paraflex.integrators.methods import GeneralisedAlpha
 from paraflex.kernel.bodies import motion_forces, system_energy
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode, Geometry, grouped
@@ -89,7 +89,8 @@ def simulate_ked(
         The rank of the constraints changes along the motion; it carries a TrackingRun with what was computed.
     """
     began = time.perf_counter()
-    _check(task, step, spectral_radius)
+    _check(task, step)
+    numbers = GeneralisedAlpha(spectral_radius=spectral_radius).numbers
     # Finite segments that no spring joins are rigid links: they have no geometry, and names of their own.
     if task.mechanism.geometry is not Geometry.LINEAR and task.whole is None:
         task = task.remodelled(task.mechanism.with_geometry(Geometry.LINEAR))
@@ -97,7 +98,6 @@ def simulate_ked(
     condition = actuation_condition(task.effort, torques.mode)
     substeps = max(1, math.ceil((samples[1] - samples[0]) / step * (1.0 - _ROUNDING)))
     times = np.linspace(samples[0], samples[-1], substeps * (samples.size - 1) + 1)
-    numbers = NewmarkNumbers.by_spectral_radius(spectral_radius)
     nominal, rigid = _nominal(task, times), task.motion
     end = end_of_motion(rigid.system, rigid.t, rigid.q, rigid.v)
     stop = math.inf if end is None else end.time
@@ -142,7 +142,7 @@ def simulate_ked(
     return run
 
 
-def _check(task: TrackingTask, step: float, spectral_radius: float) -> None:
+def _check(task: TrackingTask, step: float) -> None:
     mechanism = task.mechanism
     beyond = {(group.table, group.words): members for group, members in grouped(mechanism) if group.resists}
     beyond["damped beam", "damped beams"] = tuple(
@@ -158,10 +158,6 @@ def _check(task: TrackingTask, step: float, spectral_radius: float) -> None:
             )
     if not (math.isfinite(step) and step > 0.0):
         raise InputError("must be positive", field="step", value=step, remedy="give a time in seconds, say 1e-4")
-    if not 0.0 <= spectral_radius <= 1.0:
-        raise InputError(
-            "not between 0 and 1", field="spectral_radius", value=spectral_radius, remedy="choose it from 0 to 1"
-        )
 
 
 @dataclass(frozen=True)

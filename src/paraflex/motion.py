@@ -22,7 +22,7 @@ from paraflex.dynamics import (
 )
 from paraflex.errors import InputError, IntegrationError, ResultWarning
 from paraflex.findings import Finding, warn_of
-from paraflex.integrators import IntegrationOptions, Solution, check_times, choose, integrate
+from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start
 from paraflex.mechanism.quantities import known
@@ -68,7 +68,7 @@ def simulate_motion(
     samples: int = 701,
     torques: Mapping[str, float] | None = None,
     start: State | Start | str | None = None,
-    method: str | None = None,
+    method: Method | str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> MotionRun:
@@ -87,8 +87,8 @@ def simulate_motion(
     start : State, Start or str, optional
         Where it starts: the name of an assembly, at rest and undeformed; a `mechanism.Start` near the first assembly
         (near another, see `dynamics.start_state`); or a `dynamics.consistent_state`. The first assembly by default.
-    method : str, optional
-        Of integration: that of the options by default; see `paraflex.METHODS`.
+    method : Method or str, optional
+        Of integration: that of the options by default; an object of `paraflex.methods` or a name in `paraflex.METHODS`.
     options : IntegrationOptions, optional
     on_progress : callable, optional
         Called with the time reached [s].

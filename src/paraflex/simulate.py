@@ -26,7 +26,7 @@ from paraflex.dynamics import (
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
 from paraflex.findings import Finding, warn_of
-from paraflex.integrators import IntegrationOptions, Solution, check_times, choose, integrate
+from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from paraflex.integrators.beam_ends import leave_beam
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
@@ -197,7 +197,7 @@ class TrackingTask:
         self,
         mode: str | ActuationMode,
         *,
-        method: str | None = None,
+        method: Method | str | None = None,
         options: IntegrationOptions | None = None,
         after: Ending | str | None = None,
         warning: bool = True,
@@ -342,7 +342,7 @@ def simulate(
     task: TrackingTask,
     mode: str | ActuationMode,
     *,
-    method: str | None = None,
+    method: Method | str | None = None,
     options: IntegrationOptions | None = None,
     after: Ending | str | None = None,
     on_progress: Callable[[float], None] | None = None,
@@ -355,8 +355,8 @@ def simulate(
     task : TrackingTask
     mode : str or ActuationMode
         Its name, signs ("+-+-") or motor names ("tau1,tau5").
-    method : str, optional
-        Of integration: that of the options by default; see `paraflex.METHODS`.
+    method : Method or str, optional
+        Of integration: that of the options by default; an object of `paraflex.methods` or a name in `paraflex.METHODS`.
     options : IntegrationOptions, optional
     after : Ending or str, optional
         What the active motors do after the path, "free" or "hold": as the task says by default. Held, the joints of the
@@ -381,7 +381,7 @@ def simulate(
     if after is not None:
         task = replace(task, after=after)
     options = choose(method, options)
-    title = options.description.title
+    title = options.method.title
     torques = task.torques(mode)
     condition = actuation_condition(task.effort, torques.mode)
     try:
@@ -442,7 +442,7 @@ def _drive_and_hold(
     if count == 0 or until[-1] < end * (1.0 - _SAME_TIME):
         until = np.append(until, end)
     driven = _drive(task, torques, until, options, on_progress)
-    title = options.description.title
+    title = options.method.title
     if driven.status != "complete":
         return TrackingRun(task, torques, condition, driven, title)
     motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]

@@ -7,6 +7,7 @@ from typing import Any
 from rich.console import Console
 
 from paraflex.cli.tables import number, plain_table, print_titled
+from paraflex.integrators.methods import DEFAULT_METHOD, title_of
 
 _KEPT = {
     "gap\n[m]": "constraint_position_max",
@@ -68,7 +69,8 @@ def _print_tables(console: Console, figures: dict[str, Any], done: list[tuple[st
         [name, *(number(one["time_to_reach"][level], ".3g") for level in levels), number(one["relative_time"], ".2f")]
         for name, one in methods.items()
     )
-    table = plain_table("method", numbers=(*(f"{level} m" for level in levels), "x TR-BDF2"), rows=times)
+    relative = f"x {title_of(DEFAULT_METHOD)}"
+    table = plain_table("method", numbers=(*(f"{level} m" for level in levels), relative), rows=times)
     print_titled(console, "Wall time to an error [s]; the last column at 1e-5 m", table)
 
 

@@ -52,7 +52,8 @@ def verify_command(request: VerifyRequest) -> int:
         "model": dict(model.parameters),
         "run": {"mechanism": model.source, "path": path_name, "modes": [mode.name for mode in modes]}
         | asdict(request.frames)
-        | asdict(options),
+        | asdict(options)
+        | {"method": options.method.name, "method_parameters": options.method.values},
     }
     study = VerificationStudy(task, modes, models, options, parameters, model.study.error)
     with counting(console) as report:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.integrators import IntegrationOptions, check_times
+from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions, check_times, find_method
 from paraflex.kinematics import Path
 from paraflex.mechanism import Mechanism, parse_mode
 from paraflex.mechanism.quantities import known
@@ -63,7 +63,8 @@ class StudyDefaults:
     def integration(self, chosen: Mapping[str, Any] | None = None) -> IntegrationOptions:
         """How runs are integrated: as a caller chooses, then as the study says, else as `IntegrationOptions` has it.
 
-        A step goes with a method: where another method is chosen the study's step is left out.
+        A step goes with a method: where another method is chosen the study's step is left out. So do `parameters`, in
+        the words of files and commands.
 
         Raises
         ------
@@ -74,7 +75,9 @@ class StudyDefaults:
         own = {"method": self.method, "tolerance": self.tolerance, "step": self.step}
         if given.get("method", self.method) != self.method:
             own["step"] = None
-        return IntegrationOptions(**{name: value for name, value in own.items() if value is not None} | given)
+        options = {name: value for name, value in own.items() if value is not None} | given
+        method = find_method(options.pop("method", DEFAULT_METHOD), options.pop("parameters", None))
+        return IntegrationOptions(**options, method=method)
 
 
 def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:

@@ -1,4 +1,4 @@
-"""Time integration: methods by name, our own schemes as tableaux and parameters, SciPy's and SUNDIALS' as guests."""
+"""Time integration: methods as objects, our own schemes as tableaux and numbers, SciPy's and SUNDIALS' as guests."""
 
 from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, SingularDistance, check_events
 from paraflex.integrators.integrate import integrate
@@ -6,12 +6,10 @@ from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method, Treatm
 from paraflex.integrators.options import IntegrationOptions, check_times, choose
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.solution import Solution
-from paraflex.integrators.tableaux import TR_BDF2
 
 __all__ = [
     "DEFAULT_METHOD",
     "METHODS",
-    "TR_BDF2",
     "DeflectionLimit",
     "Event",
     "IntegrationOptions",

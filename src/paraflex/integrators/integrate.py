@@ -23,7 +23,7 @@ from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
 from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
-from paraflex.integrators.methods import Family
+from paraflex.integrators.method import NativeMethod
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Problem, Run, make_problem
@@ -39,7 +39,6 @@ _SLICE = 200
 _WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
-_NATIVE = (Family.ESDIRK, Family.NEWMARK)
 _PASSES = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
 _SHORTER = "take a shorter step, or leave it out and choose a tolerance"
 _NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
@@ -120,10 +119,8 @@ def integrate(
     functions = (*event_functions(system, initial.q, options.events), *ends.functions)
     run = prepare(problem, options)
     status, message, bent, drift, slow = "complete", "", None, None, None
-    native_method = options.description.family in _NATIVE
-    pace = Pace(
-        initial.time, float(problem.times[-1]), options.max_steps, _WINDOW if native_method else _WINDOW_OUTSIDE
-    )
+    window = _WINDOW if isinstance(options.method, NativeMethod) else _WINDOW_OUTSIDE
+    pace = Pace(initial.time, float(problem.times[-1]), options.max_steps, window)
     code, limits = PAUSED, (run.dependent_rows, options.tolerance, options.treatment)
     most = pace.most - (0 if begun is None else begun.steps + begun.rejected)
     try:
@@ -162,7 +159,7 @@ def integrate(
         error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)}),"
         remedy = f"prescribe motions within the mechanism's reach, or {_PASSES}"
     elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
-        error, cause = SingularPositionError, _before_singular(options.method, run.singular_ahead)
+        error, cause = SingularPositionError, _before_singular(options.method.name, run.singular_ahead)
         remedy = _PASSES
     moment = Moment(now.t, solution.steps + (0 if begun is None else begun.steps))
     raise _failed(error(cause, moment, solution, remedy))
@@ -186,10 +183,8 @@ def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
 
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     """A run of a problem by the method of the options, not yet started."""
-    family = options.description.family
-    if family in _NATIVE:
-        return native.prepare(problem, options)
-    return outside.prepare(problem, options)
+    kind = native if isinstance(options.method, NativeMethod) else outside
+    return kind.prepare(problem, options)
 
 
 def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:
@@ -236,7 +231,7 @@ def _solution(
         constraint_velocity_max=figures.constraint_velocity_max,
         energy_balance_max=figures.energy_balance_max,
         singular_positions=tuple(figures.passages.mean(axis=0).tolist()),
-        method=options.method,
+        method=options.method.name,
         evaluations=figures.evaluations,
         event="" if crossing is None else str(crossing.function.event),
     )

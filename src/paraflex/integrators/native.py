@@ -8,11 +8,10 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System
-from paraflex.integrators.methods import Family, Treatment
-from paraflex.integrators.newmark import newmark_numbers, newmark_scheme
+from paraflex.integrators.method import NativeMethod, Treatment
+from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, MEMORY, Figures, Instant, Problem, empty_samples
-from paraflex.integrators.tableaux import TABLEAUX
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Workspace
@@ -60,6 +59,9 @@ NEAR_ERROR = 0.01
 LEAST_NEAR_ERROR = 8e-11
 # A singular position is near that could be reached in this fraction of the time since the start.
 _AHEAD = 0.2
+# The smallest step, as a fraction of the run, and in units of the clock's last digit: by so little a step may differ
+# from what the clock moves by.
+_LEAST, _DIGITS = 1e-12, 64.0
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
 _GAIN = 0.1
 _TREATMENTS = {
@@ -160,12 +162,6 @@ class NativeRun:
         self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
 
 
-def _scheme(options: IntegrationOptions) -> Tableau:
-    if options.description.family == Family.ESDIRK:
-        return TABLEAUX[options.method]
-    return newmark_scheme(newmark_numbers(options.method, options.all_parameters))
-
-
 def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
     """Note the rows that follow from others at a pose; their number."""
     packed = system.packed
@@ -175,18 +171,26 @@ def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
     return count
 
 
+def _least_step(problem: Problem) -> float:
+    """The smallest step of a run, however far from zero its clock starts [s]."""
+    latest = max(abs(problem.initial.time), abs(float(problem.stops[-1])))
+    return max(_LEAST * problem.span, _DIGITS * float(np.spacing(latest)))
+
+
 def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     """Set up a run."""
     system, initial, span = problem.system, problem.initial, problem.span
-    newmark = options.description.family == Family.NEWMARK
-    scheme, treatment = _scheme(options), POSITION if newmark else _TREATMENTS[options.treatment]
+    method = options.method
+    assert isinstance(method, NativeMethod)
+    scheme = method.scheme
+    treatment = POSITION if isinstance(method, NewmarkMethod) else _TREATMENTS[options.treatment]
     state = make_march(system.n, system.m, scheme.c.size, len(system.mechanism.motors), treatment)
     state.q[:], state.v[:] = initial.q, initial.v
     state.clock[TIME], state.clock[STEP] = initial.time, min(FIRST_STEP * span, options.max_step)
     workspace = system.workspace()
     controls = Controls(
         rate=options.tolerance / span,
-        newton_fraction=options.newton_fraction or options.description.newton_fraction,
+        newton_fraction=options.newton_fraction or method.newton_fraction,
         newton_memory=_NEWTON_MEMORY * span,
         memory=MEMORY * span,
         alpha=options.alpha,
@@ -194,6 +198,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         gain=_GAIN if options.automatic_gains else 0.0,
         treatment=treatment,
         fixed_step=options.step or 0.0,
+        least_step=_least_step(problem),
         max_step=options.max_step,
         near_error=max(NEAR_ERROR * options.tolerance, LEAST_NEAR_ERROR * system.size),
         dependent_part=ROUNDING_PART,

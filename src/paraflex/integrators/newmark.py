@@ -1,12 +1,14 @@
-"""The Newmark family as sets of numbers: how each named method fills them."""
+"""The Newmark family: sets of numbers, and how each method fills them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 
+from paraflex.errors import InputError
+from paraflex.integrators.method import INDEX_3, Family, NativeMethod, Treatment, parameter
 from paraflex.kernel.run_state import Tableau
 
 
@@ -39,11 +41,6 @@ class NewmarkNumbers:
         gamma = 0.5 + alpha_f - alpha_m
         return cls(alpha_m, alpha_f, 0.25 * (0.5 + gamma) ** 2, gamma)
 
-    @classmethod
-    def by_spectral_radius(cls, radius: float) -> NewmarkNumbers:
-        """Generalised alpha by its spectral radius at infinite frequency (Chung and Hulbert 1993)."""
-        return cls.damped((2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0))
-
     def weight(self, step: float) -> float:
         """What a new position has of the new acceleration: b in q_1 = q* + b v_1' [s^2]."""
         return self.beta * step**2 * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
@@ -54,25 +51,103 @@ class NewmarkNumbers:
         return 2 if abs(self.gamma - 0.5 - self.alpha_f + self.alpha_m) < 1e-12 else 1
 
 
-def newmark_numbers(method: str, parameters: Mapping[str, float]) -> NewmarkNumbers:
-    """The numbers of a named method; all its parameters given (`methods.check_parameters`)."""
-    if method == "newmark":
-        return NewmarkNumbers(0.0, 0.0, parameters["beta"], parameters["gamma"])
-    if method == "wilson-theta":
-        return NewmarkNumbers(0.0, 0.0, 1.0 / 6.0, 0.5, parameters["theta"])
-    if method == "hht-alpha":
-        return NewmarkNumbers.damped(0.0, -parameters["alpha"])
-    return NewmarkNumbers.by_spectral_radius(parameters["spectral_radius"])
+class NewmarkMethod(NativeMethod):
+    """A member of the family, by its numbers."""
+
+    family = Family.NEWMARK
+    form = INDEX_3
+    order = 2
+    treatments = (Treatment.POSITION,)
+
+    @property
+    @abstractmethod
+    def numbers(self) -> NewmarkNumbers:
+        """What makes it a member."""
+
+    @property
+    def scheme(self) -> Tableau:
+        """As the kernel takes it."""
+        numbers = self.numbers
+        return Tableau(
+            A=np.array([[0.0, 0.0], [0.5, 0.5]]),
+            c=np.array([0.0, 1.0]),
+            error=np.zeros(0),
+            dense=np.array([0, 1]),
+            nodes=np.array([0, 1]),
+            order=numbers.order,
+            newmark=np.array([numbers.alpha_m, numbers.alpha_f, numbers.beta, numbers.gamma, numbers.theta]),
+        )
 
 
-def newmark_scheme(numbers: NewmarkNumbers) -> Tableau:
-    """As the kernel takes it."""
-    return Tableau(
-        A=np.array([[0.0, 0.0], [0.5, 0.5]]),
-        c=np.array([0.0, 1.0]),
-        error=np.zeros(0),
-        dense=np.array([0, 1]),
-        nodes=np.array([0, 1]),
-        order=numbers.order,
-        newmark=np.array([numbers.alpha_m, numbers.alpha_f, numbers.beta, numbers.gamma, numbers.theta]),
-    )
+@dataclass(frozen=True)
+class Newmark(NewmarkMethod):
+    """Newmark's method; beta, where it is not given, is the one that damps high frequencies most."""
+
+    name, title, order = "newmark", "Newmark", 1
+    source = "Newmark (1959), J. Eng. Mech. 85, 67-94"
+
+    gamma: float = parameter(0.6, 0.5, 1.0, "velocity weight: 1/2 does not damp, above that the order is 1")
+    beta: float | None = parameter(0.3025, 0.25, 1.0, "position weight, at least (gamma + 1/2)^2 / 4", follows=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        least = 0.25 * (self.gamma + 0.5) ** 2
+        if self.beta is None:
+            object.__setattr__(self, "beta", least)
+        elif self.beta < least * (1.0 - 1e-12):
+            raise InputError(
+                "too small for unconditional stability", field="beta", value=self.beta,
+                remedy=f"at least (gamma + 1/2)^2 / 4 = {least:.6g}",
+            )  # fmt: skip
+
+    @property
+    def numbers(self) -> NewmarkNumbers:
+        """What makes it a member."""
+        return NewmarkNumbers(0.0, 0.0, self.values["beta"], self.gamma)
+
+
+@dataclass(frozen=True)
+class Wilson(NewmarkMethod):
+    """Acceleration linear up to theta h, where equilibrium is asked for."""
+
+    name, title = "wilson-theta", "Wilson theta"
+    treatments = (Treatment.PROJECTION,)
+    source = "Wilson, Farhoomand and Bathe (1973), Earthq. Eng. Struct. Dyn. 1, 241-252"
+
+    theta: float = parameter(1.42, 1.366025403784439, 2.0, "where equilibrium is asked for")
+
+    @property
+    def numbers(self) -> NewmarkNumbers:
+        """What makes it a member."""
+        return NewmarkNumbers(0.0, 0.0, 1.0 / 6.0, 0.5, self.theta)
+
+
+@dataclass(frozen=True)
+class HHT(NewmarkMethod):
+    """Forces of both ends of the step are mixed by alpha."""
+
+    name, title = "hht-alpha", "HHT alpha"
+    source = "Hilber, Hughes and Taylor (1977), Earthq. Eng. Struct. Dyn. 5, 283-292"
+
+    alpha: float = parameter(-0.1, -1.0 / 3.0, 0.0, "damping of high frequencies, most at -1/3")
+
+    @property
+    def numbers(self) -> NewmarkNumbers:
+        """What makes it a member."""
+        return NewmarkNumbers.damped(0.0, -self.alpha)
+
+
+@dataclass(frozen=True)
+class GeneralisedAlpha(NewmarkMethod):
+    """Forces and accelerations are mixed so that low frequencies are damped least for a given radius."""
+
+    name, title = "generalised-alpha", "Generalised alpha"
+    source = "Chung and Hulbert (1993), J. Appl. Mech. 60, 371-375"
+
+    spectral_radius: float = parameter(0.7, 0.0, 1.0, "at infinite frequency: 0 annihilates, 1 keeps")
+
+    @property
+    def numbers(self) -> NewmarkNumbers:
+        """What makes it a member."""
+        radius = self.spectral_radius
+        return NewmarkNumbers.damped((2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0))

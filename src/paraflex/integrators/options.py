@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, replace
+from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, as_enum
 from paraflex.integrators.events import Event
-from paraflex.integrators.methods import DEFAULT_METHOD, Method, Treatment, check_parameters, find_method
+from paraflex.integrators.methods import Method, MethodField, Treatment
 
 _REMEDIES = {
     "tolerance": "give a length in metres, say 1e-5",
@@ -31,10 +31,9 @@ class IntegrationOptions(CheckedFields):
     tolerance : float
         Local errors over the whole run may add up to this much, in metres (root mean square over the mass). With a
         fixed step it only says how exactly Newton's iteration solves.
-    method : str
-        See `paraflex.METHODS`.
-    parameters : mapping of str to float
-        Those of the method that are not to be at their defaults.
+    method : Method or str
+        An object such as `paraflex.methods.GeneralisedAlpha(spectral_radius=0.8)`, or a name in `paraflex.METHODS`,
+        which stands for the method with its default parameters.
     step : float, optional
         A fixed step [s]; by default steps are chosen by their errors. Where something given is not smooth steps end,
         and each stretch between is divided evenly into steps no longer than this. One in which Newton's iteration does
@@ -66,16 +65,21 @@ class IntegrationOptions(CheckedFields):
     max_step: float = math.inf
     max_steps: int | None = None
     newton_fraction: float | None = None
-    method: str = DEFAULT_METHOD
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    method: MethodField = MethodField()  # noqa: RUF009 - a descriptor
+    # They were options once.
+    parameters: InitVar[Any] = None
     step: float | None = None
     constraints: Treatment | str | None = None
     automatic_gains: bool = False
     events: tuple[Event, ...] = ()
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, parameters: Any) -> None:
         super().__post_init__()
-        object.__setattr__(self, "method", find_method(self.method).name)
+        if parameters:
+            raise InputError(
+                "parameters belong to the method", field="parameters", value=parameters,
+                remedy=f"give them to it: method=paraflex.methods.{type(self.method).__name__}(...)",
+            )  # fmt: skip
         for name, remedy in _REMEDIES.items():
             value = getattr(self, name)
             if value is not None and not value > 0:
@@ -86,37 +90,26 @@ class IntegrationOptions(CheckedFields):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError("must not be negative", field=name, value=value, remedy="choose it from 0 to 50 1/s")
-        check_parameters(self.description, self.parameters)
         self._check_step()
         self._check_constraints()
 
     @property
-    def description(self) -> Method:
-        """The method."""
-        return find_method(self.method)
-
-    @property
-    def all_parameters(self) -> dict[str, float]:
-        """Of the method, defaults among them."""
-        return check_parameters(self.description, self.parameters)
-
-    @property
     def treatment(self) -> Treatment:
         """What keeps the constraints."""
-        return self.description.treatments[0] if self.constraints is None else Treatment(self.constraints)
+        return self.method.treatments[0] if self.constraints is None else Treatment(self.constraints)
 
     def to_dict(self) -> dict[str, str]:
         """Method, parameters, treatment of constraints, step and events in words, for provenance."""
         return {
-            "integration_method": self.method,
-            "method_parameters": json.dumps(self.all_parameters),
+            "integration_method": self.method.name,
+            "method_parameters": json.dumps(self.method.values),
             "constraints_treatment": self.treatment.value,
             "steps": "chosen by their errors" if self.step is None else f"fixed, {self.step:g} s",
             "stop_at": ", ".join(str(event) for event in self.events),
         }
 
     def _check_step(self) -> None:
-        if self.step is not None and not (math.isfinite(self.step) and self.description.fixed_step):
+        if self.step is not None and not (math.isfinite(self.step) and self.method.fixed_step):
             remedy = "leave it out, and choose a tolerance" if math.isfinite(self.step) else _REMEDIES["step"]
             problem = f"{self.method} chooses its steps itself" if math.isfinite(self.step) else "must be finite"
             raise InputError(problem, field="step", value=self.step, remedy=remedy)
@@ -124,7 +117,7 @@ class IntegrationOptions(CheckedFields):
     def _check_constraints(self) -> None:
         if self.constraints is not None:
             object.__setattr__(self, "constraints", as_enum(Treatment, self.constraints, "constraints").value)
-        known = [treatment.value for treatment in self.description.treatments]
+        known = [treatment.value for treatment in self.method.treatments]
         if self.constraints is not None and self.constraints not in known:
             raise InputError(
                 f"{self.method} cannot keep the constraints in this way", field="constraints", value=self.constraints,
@@ -152,7 +145,7 @@ def check_times(duration: float | None, samples: int | None) -> None:
 
 
 @checked_arguments()
-def choose(method: str | None, options: IntegrationOptions | None) -> IntegrationOptions:
+def choose(method: Method | str | None, options: IntegrationOptions | None) -> IntegrationOptions:
     """The options, by default the default ones, with the method where one is named.
 
     Raises

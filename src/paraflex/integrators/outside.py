@@ -9,11 +9,11 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
-from paraflex.integrators.methods import Family, Treatment
+from paraflex.integrators.guests import IDA, Guest, SciPyMethod
+from paraflex.integrators.method import Treatment
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
 from paraflex.integrators.scipy_methods import ScipyStepper
-from paraflex.integrators.spectra import MULTISTEP
 from paraflex.integrators.stepper import Stepper, Steps
 from paraflex.integrators.stiffness import warn_if_stiff
 from paraflex.integrators.sundials import CvodeStepper, IdaStepper
@@ -22,9 +22,6 @@ from paraflex.kernel.ode import stored_energy
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import FINISHED, PAUSED
 
-# What the estimated error of a step may be, of the tolerance: estimates say how far a solver errs in a step, not how
-# errors add up. Measured on RAParM-I, a soft arm and a falling platform, whose ends err by 0.01 to 2 tolerances.
-_PER_STEP = {"rk45": 0.1, "radau": 5.0, "ndf": 0.1, "adams": 0.5, "bdf": 0.1, "ida": 0.1}
 # With order p errors add up to h^p where a step's is h^(p + 1): multistep methods are held to the tolerance at this
 # one, and to a power (p + 1) / p of it elsewhere [m].
 _REFERENCE = 1e-4
@@ -65,9 +62,7 @@ class OutsideRun:
         self._note(self._instant)
         if self.samples.times[0] <= initial.time:
             self._sample(initial.time, initial.q, initial.v, 0.0)
-        # Adams formulas up to order 2 are solved by Newton's iteration and stable for any step.
-        if self._options.description.explicit and _max_order(self._options) > 2:
-            warn_if_stiff(self._stepper.form, self.problem, self._options.method)
+        warn_if_stiff(self._stepper.form, self.problem, self._options.method)
 
     def march(self, attempts: int) -> int:
         """See `Run`; fewer steps where they take long."""
@@ -173,24 +168,16 @@ def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
 
 
 def _stepper(problem: Problem, options: IntegrationOptions) -> Stepper:
-    method, order, error = options.method, _max_order(options), _PER_STEP[options.method] * options.tolerance
-    if method in MULTISTEP:
-        error *= (options.tolerance / _REFERENCE) ** (1.0 / order)
-    steps = Steps(min(FIRST_STEP * problem.span, options.max_step), options.max_step, order)
-    if method == "ida":
+    method = options.method
+    assert isinstance(method, Guest)
+    error = method.error_factor * options.tolerance
+    if method.multistep:
+        error *= (options.tolerance / _REFERENCE) ** (1.0 / method.highest_order)
+    steps = Steps(min(FIRST_STEP * problem.span, options.max_step), options.max_step, method.highest_order)
+    if isinstance(method, IDA):
         kind = StabilisedForm if options.treatment == Treatment.GGL else DescriptorForm
         form = kind(problem, options)
         return IdaStepper(form, form.tolerances(error, problem.span), steps)
     form = OdeForm(problem, options)
-    kind = ScipyStepper if options.description.family == Family.SCIPY else CvodeStepper
-    return kind(method, form, form.tolerances(error, problem.span), steps)
-
-
-def _max_order(options: IntegrationOptions) -> int:
-    """The highest order of a multistep method; any of the others have one order."""
-    order = options.all_parameters.get("max_order", options.description.order)
-    if order != int(order):
-        raise InputError(
-            "must be a whole number", field="parameters.max_order", value=order, remedy="give the order, say 2"
-        )
-    return int(order)
+    given = (form, form.tolerances(error, problem.span), steps)
+    return ScipyStepper(method, *given) if isinstance(method, SciPyMethod) else CvodeStepper(method, *given)

@@ -10,12 +10,10 @@ import scipy
 
 from paraflex.arrays import Array
 from paraflex.integrators.forms import OdeForm
+from paraflex.integrators.guests import SciPyMethod
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
 
-# Of each method: the solver in `scipy.integrate`, which is loaded when one runs; at how many times of a step it
-# evaluates, and evaluations of an iteration (none: explicit).
-_SOLVERS = {"rk45": ("RK45", 5, 0), "radau": ("Radau", 3, 3), "ndf": ("BDF", 1, 1)}
 # The least relative tolerance that SciPy takes without a warning.
 _RELATIVE = 1e-13
 
@@ -23,9 +21,10 @@ _RELATIVE = 1e-13
 class ScipyStepper:
     """Steps by one of SciPy's solvers, the absolute tolerances given: see `Stepper`."""
 
-    def __init__(self, method: str, form: OdeForm, tolerances: Array, steps: Steps) -> None:
-        name, self._places, self._stages = _SOLVERS[method]
-        self._class = getattr(scipy.integrate, name)
+    def __init__(self, method: SciPyMethod, form: OdeForm, tolerances: Array, steps: Steps) -> None:
+        # Loaded when one runs.
+        self._class = getattr(scipy.integrate, method.solver)
+        self._places, self._stages = method.places, method.evaluations
         self.form, self._tolerances, self._steps = form, tolerances, steps
         self._seen: list[float] = []
         self._past, self._rejected, self._dense = SolverCounts(0, 0, 0, 0), 0, None

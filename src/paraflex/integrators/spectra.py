@@ -6,7 +6,7 @@ eigenvalues are the method's characteristic roots. The principal root is the one
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,20 +15,17 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from paraflex.errors import InputError
-from paraflex.integrators.methods import Family, check_parameters, find_method
-from paraflex.integrators.newmark import NewmarkNumbers, newmark_numbers
-from paraflex.integrators.tableaux import TABLEAUX
+from paraflex.integrators.methods import METHODS, NDF, RK45, Adams, Method, Radau, find_method
+from paraflex.integrators.newmark import NewmarkMethod, NewmarkNumbers
+from paraflex.integrators.tableaux.make import ESDIRK
 
 Array = NDArray[Any]
 Roots = NDArray[Any]
 
-MULTISTEP = ("ndf", "adams", "bdf", "ida")
 # Of NDF, orders 0 to 5, as SciPy has them: Shampine and Reichelt (1997), Table 1.
 _KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
 # Frequencies between which the principal root moves little, as a factor, and where following it begins.
 _DENSE, _START = 1.02, 1e-3
-# Orders whose formulas are stable: of backward differences (and NDF), of Adams-Moulton as CVODE has them.
-_HIGHEST = {"ndf": 5, "bdf": 5, "ida": 5, "adams": 12}
 
 
 @dataclass(frozen=True)
@@ -69,32 +66,29 @@ class Spectrum:
         return self.frequency / self.phase - 1.0
 
 
-def spectrum(
-    method: str, frequency: ArrayLike, *, order: int | None = None, parameters: Mapping[str, float] | None = None
-) -> Spectrum:
-    """Characteristic roots of a method of `METHODS`.
+def spectrum(method: Method | str, frequency: ArrayLike, *, order: int | None = None) -> Spectrum:
+    """Characteristic roots of a method.
 
     Parameters
     ----------
-    method : str
+    method : Method or str
+        With its parameters, or a name in `METHODS`.
     frequency : (k,) array
         h omega, ascending from above zero [rad].
     order : int, optional
         Of a multistep method, which needs one: it changes order on its way, and its roots with it.
-    parameters : mapping of str to float, optional
-        Those of the method that are not to be at their defaults.
 
     Raises
     ------
     InputError
-        No such method, order or parameter; frequencies that do not ascend from above zero.
+        No such method or order; frequencies that do not ascend from above zero.
     """
     wanted = np.asarray(frequency, dtype=float).reshape(-1)
     if not (wanted.size and np.all(np.isfinite(wanted)) and wanted[0] > 0.0 and np.all(np.diff(wanted) > 0.0)):
         raise InputError(
             "frequencies must be positive and ascend", field="frequency", remedy="say numpy.geomspace(0.01, 100, 200)"
         )
-    roots = _roots(method, order, parameters or {})
+    roots = _roots(find_method(method), order)
     first = min(_START, wanted[0])
     steps = int(np.log(wanted[-1] / first) / np.log(_DENSE)) + 2
     grid = np.union1d(np.geomspace(first, wanted[-1], steps), wanted)
@@ -117,19 +111,18 @@ def _followed(roots: list[Roots], near: complex) -> Roots:
     return out
 
 
-def _roots(method: str, order: int | None, parameters: Mapping[str, float]) -> Callable[[float], Roots]:
+def _roots(method: Method, order: int | None) -> Callable[[float], Roots]:
     """The characteristic roots as a function of h omega."""
-    found = find_method(method)
-    values = check_parameters(found, parameters)
-    if method in MULTISTEP:
+    if method.multistep:
         left, right = multistep_formula(method, order)
         return lambda x: np.roots(left - 1j * x * right)
     if order is not None:
         raise InputError(
-            f"{method} has one order only", field="order", value=order, remedy=f"leave it out, or take {MULTISTEP}"
-        )
-    if found.family is Family.NEWMARK:
-        numbers = newmark_numbers(method, values)
+            f"{method} has one order only", field="order", value=order,
+            remedy=f"leave it out, or take {', '.join(each.name for each in METHODS.values() if each.multistep)}",
+        )  # fmt: skip
+    if isinstance(method, NewmarkMethod):
+        numbers = method.numbers
         if numbers.theta > 1.0:
             return lambda x: np.linalg.eigvals(wilson_step(x, numbers.theta))
         return lambda x: np.linalg.eigvals(newmark_step(x, numbers))
@@ -137,7 +130,7 @@ def _roots(method: str, order: int | None, parameters: Mapping[str, float]) -> C
     return lambda x: np.array([stability(A, b, 1j * x)])
 
 
-def tableau_of(method: str) -> tuple[Array, Array]:
+def tableau_of(method: Method) -> tuple[Array, Array]:
     """The matrix A and weights b of a Runge-Kutta method.
 
     Raises
@@ -145,14 +138,14 @@ def tableau_of(method: str) -> tuple[Array, Array]:
     InputError
         It is none, or its tableau is not known here.
     """
-    if method == "rk45":
+    if isinstance(method, RK45):
         return np.pad(scipy.integrate.RK45.A, ((0, 0), (0, 1))), scipy.integrate.RK45.B
-    if method == "radau":
+    if isinstance(method, Radau):
         return _collocation((4.0 - np.sqrt(6.0)) / 10.0, (4.0 + np.sqrt(6.0)) / 10.0, 1.0)
-    if method in TABLEAUX:
-        return TABLEAUX[method].A, TABLEAUX[method].A[-1]
+    if isinstance(method, ESDIRK):
+        return method.tableau.A, method.tableau.A[-1]
     raise InputError(
-        "the method has no Butcher tableau", field="method", value=method, remedy="take a Runge-Kutta method"
+        "the method has no Butcher tableau", field="method", value=method.name, remedy="take a Runge-Kutta method"
     )
 
 
@@ -197,14 +190,22 @@ def wilson_step(x: float, theta: float) -> Array:
     )
 
 
-def multistep_formula(method: str, order: int | None) -> tuple[Array, Array]:
+def highest_order(method: Method) -> int:
+    """Up to which a multistep method has formulas; a run may be held to fewer."""
+    return int(method.parameters["max_order"].high) if "max_order" in method.parameters else method.order
+
+
+def multistep_formula(method: Method, order: int | None) -> tuple[Array, Array]:
     """Coefficients of the new and old values and of their derivatives, the newest first, padded to one length."""
-    highest = _HIGHEST[method]
+    highest = highest_order(method)
     if order is None or not (isinstance(order, int) and 1 <= order <= highest):
         raise InputError(
             f"{method} needs an order", field="order", value=order, remedy=f"choose one from 1 to {highest}"
         )
-    values, rates = _adams(order) if method == "adams" else _backward_differences(order, method == "ndf")
+    if isinstance(method, Adams):
+        values, rates = _adams(order)
+    else:
+        values, rates = _backward_differences(order, isinstance(method, NDF))
     size = max(values.size, rates.size)
     return np.pad(values, (0, size - values.size)), np.pad(rates, (0, size - rates.size))
 

@@ -10,11 +10,9 @@ import scipy
 from paraflex.errors import StiffnessWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators.forms import OdeForm
+from paraflex.integrators.method import Method
 from paraflex.integrators.run import Problem
 
-# How far on the imaginary axis a method is stable, |omega h|. Runge-Kutta: the root of |R(iy)| = 1 of Dormand and
-# Prince's polynomial. Adams: what steps of orders up to 12 come to on RAParM-I; the order follows the frequencies.
-LIMITS = {"rk45": 0.997, "adams": 0.75}
 # Steps that are worth a warning.
 MANY_STEPS = 20_000
 # Unknowns up to which all eigenvalues are found; beyond, the largest by Arnoldi's method.
@@ -38,10 +36,12 @@ def largest_rate(form: OdeForm, problem: Problem) -> float:
     return float(np.max(np.abs(values)))
 
 
-def warn_if_stiff(form: OdeForm, problem: Problem, method: str) -> None:
+def warn_if_stiff(form: OdeForm, problem: Problem, method: Method) -> None:
     """Say once how many steps stability alone will take, where these are many."""
+    if not method.explicit or method.stability_limit is None:
+        return
     rate = largest_rate(form, problem)
-    step = LIMITS[method] / rate if rate > 0.0 else math.inf
+    step = method.stability_limit / rate if rate > 0.0 else math.inf
     steps = problem.span / step
     if steps > MANY_STEPS:
         text = (

@@ -14,6 +14,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.integrators.forms import DescriptorForm, OdeForm
+from paraflex.integrators.guests import Guest
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PAUSED
 
@@ -112,9 +113,9 @@ class SundialsStepper:
 class CvodeStepper(SundialsStepper):
     """CVODE on the ODE form."""
 
-    def __init__(self, method: str, form: OdeForm, *arguments: Any) -> None:
+    def __init__(self, method: Guest, form: OdeForm, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.form, self._method = form, {"adams": "Adams", "bdf": "BDF"}[method]
+        self.form, self._method = form, method.solver
 
     def _create(self, options: dict[str, Any]) -> Any:
         return self._package.cvode.CVODE(self._rates, method=self._method, jacfn=self._jacobian, **options)

@@ -103,12 +103,12 @@ def check_differentiable(options: IntegrationOptions) -> None:
     InputError
         Another family of methods, treatment of constraints, or events.
     """
-    if options.description.family != Family.ESDIRK:
+    if options.method.family != Family.ESDIRK:
         able = [name for name, method in METHODS.items() if method.family == Family.ESDIRK]
         raise InputError(
             "derivatives need another method",
             field="method",
-            value=options.method,
+            value=options.method.name,
             remedy=f"choose from {', '.join(able)}",
         )
     if options.treatment != Treatment.BAUMGARTE:

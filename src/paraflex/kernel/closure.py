@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, copy, fill, largest
 from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.compiling import lasting, routine, seldom
+from paraflex.kernel.compiling import by_reference, lasting, routine, seldom
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.dense import factor_dense, solve_factored
 from paraflex.kernel.joints import (
@@ -21,7 +21,6 @@ from paraflex.kernel.joints import (
     start_rows,
 )
 from paraflex.kernel.packed import INDEX_1, PackedSystem, Scratch, make_scratch
-from paraflex.kernel.records import by_reference
 
 MAX_ITERATIONS = 20
 # So many of them with the factors of the instant before.

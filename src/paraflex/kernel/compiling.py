@@ -1,73 +1,42 @@
-"""How kernels are compiled: cached on disk, free to reorder sums, and without counting references.
-
-Numba counts the references to every array that a local name stands for, one field of a workspace and all of its others
-with it, by atomic operations that cost more than the arithmetic. Kernels make no arrays: their caller owns them all.
-"""
+"""How kernels are compiled: cached on disk, free to reorder sums; by our own changes to Numba, or without them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import update_wrapper
 from types import FunctionType
 from typing import Any
 
-from numba import njit, types
+from numba import types
 from numba.extending import typeof_impl
 
-from paraflex.kernel.disk_cache import KernelCache
-from paraflex.kernel.machine_code import QuickCode, SeparateCode
+from paraflex.kernel.plain import PLAIN
+
+if PLAIN:
+    from paraflex.kernel.plain import by_reference, compiled
+else:
+    from paraflex.kernel.machine_code import compiled
+    from paraflex.kernel.records import by_reference
+
+__all__ = ["FAST_MATH", "Kernel", "by_reference", "inlined", "kernel", "lasting", "routine", "seldom"]
 
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
 
-_OPTIONS: dict[str, Any] = {
-    "error_model": "numpy",
-    "fastmath": FAST_MATH,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": SeparateCode,
-    "_nrt": False,
-}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FAST_MATH}
 
 # Without the entry from Python.
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True}
 
 
-class _Cache:
-    """Where a kernel is kept on disk, looked for when it is first asked for.
-
-    What is found there is loaded without all that Numba declares for compiling, which takes longer than loading.
-    """
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
-
-    @cached_property
-    def _on_disk(self) -> Any:
-        return KernelCache(self._function)
-
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        """What has been compiled for a signature, or None."""
-        with self._on_disk._guard_against_spurious_io_errors():
-            return self._on_disk._load_overload(signature, context)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._on_disk, name)
-
-
-def _compiled(function: Callable[..., Any], **options: Any) -> Any:
-    found: Any = njit(**{**_OPTIONS, **options})(function)
-    found._cache = _Cache(function)
-    return found
-
-
 def routine(function: Callable[..., Any]) -> Any:
     """Make what is called from kernels only: called from Python it would crash the process."""
-    return _compiled(function, **_INNER)
+    return compiled(function, **_OPTIONS, **_INNER)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """Make what is called once a body in a hot loop, from kernels only."""
-    return _compiled(function, **_INNER, forceinline=True)
+    return compiled(function, **_OPTIONS, **_INNER, forceinline=True)
 
 
 class Kernel:
@@ -84,7 +53,7 @@ class Kernel:
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         # The cache goes by this name.
         entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
-        self.from_python = _compiled(entry, **options)
+        self.from_python = compiled(entry, **_OPTIONS, **options)
         self.inner = routine(function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -127,4 +96,4 @@ def lasting(function: Callable[..., Any]) -> Kernel:
 
 def seldom(function: Callable[..., Any]) -> Kernel:
     """Make a kernel of what Python calls a few times a run: compiled in half the time, and not fast."""
-    return Kernel(function, pipeline_class=QuickCode)
+    return Kernel(function, quick=True)

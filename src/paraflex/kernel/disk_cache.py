@@ -9,31 +9,19 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import llvmlite
-import numba
-import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from paraflex.kernel.plain import STATE
 
 # States kept in one place: a checkout may be used by several environments, a cache in a home by several machines.
 KEPT = 3
 
 _PREFIX = "paraflex-kernels-"
 
-
-def _state() -> str:
-    """A digest of what the machine code of any kernel may depend on, but for the processor: Numba tells these apart."""
-    digest = sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(sha256(source.read_bytes()).digest())
-    return digest.hexdigest()[:16]
-
-
-# Taken when kernels are imported: a source that is edited later is not what this process compiles.
-FOLDER = _PREFIX + _state()
+FOLDER = _PREFIX + STATE
 
 
 class KernelCache(FunctionCache):

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, fill
-from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
 from paraflex.kernel.linear import right_hand_side, solve_system
-from paraflex.kernel.records import by_reference
 from paraflex.kernel.tangent import residual_tangent
 
 # Vectors of a basis, and the part of its right-hand side to which a system is solved with one.

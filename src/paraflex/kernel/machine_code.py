@@ -3,19 +3,24 @@
 Numba makes machine code of every function and lets the first copy of a function that a process has loaded stand in for
 all others. But copies are fitted to where they are called, and sums may be reordered there: what a kernel computes
 would depend, in the last bits, on what was loaded before it.
+
+And Numba counts the references to every array that a local name stands for, one field of a workspace and all of its
+others with it, by atomic operations that cost more than the arithmetic. Kernels make no arrays: their caller owns them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 from llvmlite import binding
+from numba import njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager
 
+from paraflex.kernel.disk_cache import KernelCache
 from paraflex.kernel.notice import announce_compiling
 from paraflex.kernel.passes import kernel_passes, remembered_signatures
 
@@ -105,6 +110,36 @@ class QuickCode(SeparateCode):
     """For what is called so seldom that compiling it would take longer than all calls."""
 
     library = _QuickLibrary
+
+
+class _Cache:
+    """Where a kernel is kept on disk, looked for when it is first asked for.
+
+    What is found there is loaded without all that Numba declares for compiling, which takes longer than loading.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    @cached_property
+    def _on_disk(self) -> Any:
+        return KernelCache(self._function)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """What has been compiled for a signature, or None."""
+        with self._on_disk._guard_against_spurious_io_errors():
+            return self._on_disk._load_overload(signature, context)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._on_disk, name)
+
+
+def compiled(function: Callable[..., Any], *, quick: bool = False, **options: Any) -> Any:
+    """A function compiled in this way; `quick` where compiling it would take longer than all calls."""
+    own = {"no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": QuickCode if quick else SeparateCode}
+    found: Any = njit(**options, **own)(function)
+    found._cache = _Cache(function)
+    return found
 
 
 def _relink(module: Any, old: binding.Linkage, new: binding.Linkage) -> None:

@@ -64,8 +64,6 @@ ENTRY = 100.0
 LEAST_PACE = 3e-3
 # There a step with an error so small, as part of what is allowed, may be twice as long.
 GROWING = 0.05
-# The smallest step, as a fraction of the time span.
-MIN_STEP = 1e-12
 # A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
 SMALLEST_PART = 1e-4
 
@@ -264,7 +262,6 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
         PAUSED, FINISHED, or why it cannot go on.
     """
     exponent = 1.0 / tableau.order
-    span = stops[stops.size - 1]
     for _ in range(max_steps):
         t = m.clock[TIME]
         while m.counts[STOP] < stops.size and stops[m.counts[STOP]] <= t:
@@ -333,6 +330,6 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
             m.clock[STEP] = h * max(MIN_FACTOR, SAFETY * (1.0 / error) ** exponent)
         else:
             m.clock[STEP] = h * MIN_FACTOR
-        if m.clock[STEP] < MIN_STEP * span:
+        if m.clock[STEP] < controls.least_step:
             return cause
     return PAUSED

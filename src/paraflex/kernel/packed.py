@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart
-from paraflex.kernel.records import by_reference
+from paraflex.kernel.compiling import by_reference
 from paraflex.kernel.vectors import padded
 
 # Rows of PackedSystem.modal.

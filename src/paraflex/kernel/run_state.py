@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart
-from paraflex.kernel.records import by_reference
+from paraflex.kernel.compiling import by_reference
 
 # Singular positions kept of a run.
 MOST_PASSAGES = 1000
@@ -76,6 +76,7 @@ class Controls(NamedTuple):
     beta: float
     gain: float  # where positive alpha and beta are this over the step
     treatment: int
+    least_step: float  # a run that needs shorter ones is given up [s]
     max_step: float
     fixed_step: float  # zero where steps are chosen by their errors
     near_error: float  # error allowed in a step near a singular position, where that is more [m]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from paraflex.kernel.arrays import add, apart, copy, largest
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import inlined, kernel, lasting, routine
+from paraflex.kernel.compiling import by_reference, inlined, kernel, lasting, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
@@ -18,7 +18,6 @@ from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.march import step_work, write_samples
 from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.records import by_reference
 from paraflex.kernel.run_state import SAMPLE, WORK
 from paraflex.kernel.stage import equations, place
 from paraflex.kernel.step import input_power, stage_start

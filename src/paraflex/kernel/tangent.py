@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import fill
-from paraflex.kernel.compiling import inlined, kernel, routine
+from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
 from paraflex.kernel.constraints import joint_rates
 from paraflex.kernel.joints import angle_row, apply_torque, line_end, marker_motion
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem
-from paraflex.kernel.records import by_reference
 from paraflex.kernel.tangent_axes import axes_tangent
 from paraflex.kernel.tangent_bodies import body_terms_tangent
 from paraflex.kernel.tangent_points import end_tangent, force_tangent, marker_tangent

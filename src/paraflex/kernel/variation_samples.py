@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, fill
-from paraflex.kernel.compiling import routine
+from paraflex.kernel.compiling import by_reference, routine
 from paraflex.kernel.march import interpolate
-from paraflex.kernel.records import by_reference
 
 # Central differences of fourth order over this part of a parameter's size, and their places and weights.
 STEP = 1e-3

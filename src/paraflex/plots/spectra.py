@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.integrators import METHODS
-from paraflex.integrators.spectra import MULTISTEP, Spectrum, spectrum
+from paraflex.integrators.spectra import Spectrum, spectrum
 from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.methods import method_look
 from paraflex.plots.scales import name_powers
@@ -44,7 +44,7 @@ def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figu
         method = METHODS[name]
         number = members[method.family.value] = members.get(method.family.value, -1) + 1
         look: dict[str, Any] = method_look(method.family.value, number) | {"marker": ""}
-        label = method.title if name not in MULTISTEP else f"{method.title.split(' ')[0]} {order}"
+        label = method.title if not method.multistep else f"{method.title.split(' ')[0]} {order}"
         low, high = (spectrum(name, frequency, order=order) for frequency in (_RESOLVED, _HIGH))
         axes[0, 0].plot(low.frequency, _shown(low, low.damping_ratio), label=label, **look)
         axes[0, 1].plot(low.frequency, _shown(low, np.abs(low.period_error)), label=label, **look)

@@ -8,7 +8,8 @@ import numpy as np
 
 from paraflex.display import facts, page, sentence, table, view
 from paraflex.dynamics.points import point_motion
-from paraflex.integrators import METHODS, Solution
+from paraflex.integrators import Solution
+from paraflex.integrators.methods import title_of
 from paraflex.motion import MotionRun
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import deflections
@@ -47,7 +48,7 @@ def motion_run_html(run: MotionRun) -> str:
     solution, system = run.solution, run.system
     k = solution.t.size
     title = f"{system.mechanism.name}: {_ended(solution)}"
-    method = METHODS[solution.method].title if solution.method in METHODS else solution.method
+    method = title_of(solution.method)
     energies: list[tuple[str, Any]] = []
     points: list[tuple] = []
     if k:

@@ -171,7 +171,7 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
 def provenance(mechanism: Mechanism, method: str, options: IntegrationOptions, parameters: dict | None) -> dict:
     """What results came from: mechanism, method, options of our own methods, the model as read, versions."""
     # Other models and engines integrate in ways of their own.
-    ours = options.to_dict() if method == options.description.title else {}
+    ours = options.to_dict() if method == options.method.title else {}
     effector = mechanism.end_effector
     return {
         "mechanism": mechanism.name,

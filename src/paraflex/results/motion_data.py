@@ -12,7 +12,8 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.dynamics.points import point_motion
 from paraflex.findings import Finding
-from paraflex.integrators import METHODS, IntegrationOptions
+from paraflex.integrators import IntegrationOptions
+from paraflex.integrators.methods import title_of
 from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.doubts import keep_findings, verdict_of
@@ -77,8 +78,7 @@ def motion_dataset(
     out = xr.Dataset(data, coords=coordinates)
     out["motor_power"] = out["motor_speed"] * out["applied_torque"]
     label(out, mechanism)
-    method = METHODS[solution.method].title
-    out.attrs = provenance(mechanism, method, options or IntegrationOptions(), parameters) | {
+    out.attrs = provenance(mechanism, title_of(solution.method), options or IntegrationOptions(), parameters) | {
         "kind": "motion",
         "singular_positions": json.dumps(solution.singular_positions),
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,8 +86,9 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
     ----------
     case : Case
         From `studies.tracking_case` or `studies.motion_case`.
-    methods : sequence of str or None
-        From `METHODS`; all where None. One that cannot run is listed with its reason and the others go on.
+    methods : sequence of Method or str, or None
+        From `METHODS`, with their default parameters; all where None. One that cannot run is listed with its
+        reason and the others go on.
     options : ComparisonOptions or None
         The defaults where None.
     parameters : dict or None
@@ -95,7 +96,7 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
     """
 
     case: Case
-    methods: Sequence[str] | None = None
+    methods: Sequence[Method | str] | None = None
     options: ComparisonOptions | None = None
     parameters: dict | None = None
 
@@ -113,13 +114,13 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
         Raises
         ------
         InputError
-            An unknown method, before anything runs.
+            An unknown method, or one with parameters of its own, before anything runs.
         IntegrationError
             No converged run to compare with.
         """
         no_workers(workers, "runs come one after the other")
         case, options = self.case, self.options or ComparisonOptions()
-        chosen = [find_method(name) for name in dict.fromkeys(METHODS if self.methods is None else self.methods)]
+        chosen = _chosen(METHODS if self.methods is None else self.methods)
         plans = {method.name: _plan(method, options) for method in chosen}
         total = sum(map(len, plans.values()))
         found: list[Measurement] = []
@@ -157,13 +158,25 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
 @checked_arguments()
 def compare_methods(
     case: Case,
-    methods: Sequence[str] | None = None,
+    methods: Sequence[Method | str] | None = None,
     *,
     options: ComparisonOptions | None = None,
     on_progress: OnProgress | None = None,
 ) -> MethodComparison:
     """Run a motion by every method at every tolerance: `ComparisonStudy(case, methods, options).run()` in one call."""
     return ComparisonStudy(case, methods, options).run(on_progress=on_progress)
+
+
+def _chosen(methods: Iterable[Method | str]) -> list[Method]:
+    """Methods, each once: their names tell runs apart."""
+    chosen = list(dict.fromkeys(map(find_method, methods)))
+    for method in chosen:
+        if method != METHODS.get(method.name):
+            raise InputError(
+                "methods are compared with their default parameters", field="methods", value=method,
+                remedy="choose from paraflex.METHODS",
+            )  # fmt: skip
+    return chosen
 
 
 @dataclass(frozen=True)

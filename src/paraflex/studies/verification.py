@@ -14,8 +14,8 @@ from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
 from paraflex.errors import InputError, IntegrationError, NumericalError, as_enum, suggestion
-from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions
-from paraflex.integrators.methods import find_method
+from paraflex.integrators import IntegrationOptions
+from paraflex.integrators.methods import MethodField
 from paraflex.mechanism import (
     ActuationMode,
     Geometry,
@@ -42,8 +42,8 @@ class VerificationOptions(CheckedFields):
         Of paraflex's own runs with error control [m].
     ked_step, exudyn_step, mujoco_step : float
         Of those with fixed steps [s].
-    method : str
-        Of paraflex's own runs with error control: see `paraflex.METHODS`.
+    method : Method or str
+        Of paraflex's own runs with error control: see `IntegrationOptions`.
     segments : int
         On the longest flexible beam; others get as many as their length takes.
     """
@@ -54,11 +54,7 @@ class VerificationOptions(CheckedFields):
     exudyn_step: float = 5e-5
     mujoco_step: float = 1.0 / 30000.0
     segments: int = 8
-    method: str = DEFAULT_METHOD
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "method", find_method(self.method).name)
+    method: MethodField = MethodField()  # noqa: RUF009 - a descriptor
 
 
 @dataclass(frozen=True)

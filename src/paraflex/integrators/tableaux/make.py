@@ -1,15 +1,37 @@
-"""A tableau from its rows."""
+"""What schemes with a Butcher tableau have in common, and how a tableau is made from its rows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import ClassVar
 
 import numpy as np
 
+from paraflex.integrators.method import INDEX_1, Family, NativeMethod, Treatment
 from paraflex.kernel.run_state import Tableau
 
 Number = str | float
+
+
+class ESDIRK(NativeMethod):
+    """A scheme with one diagonal, an explicit first stage and a last one that is the end of the step.
+
+    Attributes
+    ----------
+    tableau : Tableau
+        From `make_tableau`.
+    """
+
+    family = Family.ESDIRK
+    form = INDEX_1
+    treatments = (Treatment.BAUMGARTE, Treatment.PROJECTION, Treatment.GGL)
+    tableau: ClassVar[Tableau]
+
+    @property
+    def scheme(self) -> Tableau:
+        """As the kernel takes it."""
+        return self.tableau
 
 
 def make_tableau(

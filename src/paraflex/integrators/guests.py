@@ -1,0 +1,116 @@
+"""Methods of SciPy and SUNDIALS: what is known of each, and how its steps are taken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from paraflex.integrators.method import INDEX_1, ODE, Family, Method, Treatment, parameter
+
+
+class Guest(Method):
+    """A method that a solver of others runs.
+
+    Attributes
+    ----------
+    error_factor : float
+        What the estimated error of a step may be, of the tolerance: estimates say how far a solver errs in a step, not
+        how errors add up. Measured on RAParM-I, a soft arm and a falling platform, whose ends err by 0.01 to 2
+        tolerances.
+    solver : str
+        What its package calls it.
+    """
+
+    form = ODE
+    treatments = (Treatment.BAUMGARTE,)
+    error_factor: ClassVar[float] = 0.1
+    solver: ClassVar[str]
+
+
+class SciPyMethod(Guest):
+    """One of `scipy.integrate`.
+
+    Attributes
+    ----------
+    places, evaluations : int
+        At how many times of a step it evaluates, and how often in an iteration (none: explicit).
+    """
+
+    family = Family.SCIPY
+    order = 5
+    places: ClassVar[int]
+    evaluations: ClassVar[int]
+
+
+class RK45(SciPyMethod):
+    """The explicit pair of Dormand and Prince."""
+
+    name, title = "rk45", "Runge-Kutta 4(5)"
+    source = "Dormand and Prince (1980), through SciPy"
+    solver, places, evaluations = "RK45", 5, 0
+    # The root of |R(iy)| = 1 of its polynomial.
+    stability_limit = 0.997
+
+
+class Radau(SciPyMethod):
+    """Radau IIA of order 5."""
+
+    name, title = "radau", "Radau IIA"
+    source = "Hairer and Wanner (1996), IV.8, through SciPy"
+    error_factor, solver, places, evaluations = 5.0, "Radau", 3, 3
+
+
+class NDF(SciPyMethod):
+    """Numerical differentiation formulas of orders 1 to 5, which cannot be held at a lower one."""
+
+    name, title = "ndf", "NDF"
+    source = "Shampine and Reichelt (1997), SIAM J. Sci. Comput. 18, 1-22, through SciPy"
+    solver, places, evaluations = "BDF", 1, 1
+    multistep = True
+
+
+class SundialsMethod(Guest):
+    """One of SUNDIALS, all of several orders."""
+
+    family = Family.SUNDIALS
+    multistep = True
+
+
+@dataclass(frozen=True)
+class Adams(SundialsMethod):
+    """Adams-Moulton formulas of CVODE."""
+
+    name, title, order = "adams", "Adams", 12
+    source = "CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"
+    error_factor, solver = 0.5, "Adams"
+    # What steps of orders up to 12 come to on RAParM-I; the order follows the frequencies.
+    stability_limit = 0.75
+
+    max_order: int = parameter(12, 1, 12, "highest order; up to 2 stiffness limits no step")
+
+    @property
+    def explicit(self) -> bool:
+        """Formulas up to order 2 are solved by Newton's iteration and stable for any step."""
+        return self.max_order > 2
+
+
+@dataclass(frozen=True)
+class BDF(SundialsMethod):
+    """Gear's backward difference formulas, by CVODE."""
+
+    name, title, order = "bdf", "BDF (Gear)", 2
+    source = "CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"
+    solver = "BDF"
+
+    # Of these formulas only those of orders 1 and 2 are stable for undamped vibrations of any frequency.
+    max_order: int = parameter(2, 1, 5, "highest order; above 2 vibrations that hardly decay dictate the step")
+
+
+@dataclass(frozen=True)
+class IDA(BDF):
+    """Backward difference formulas on the equations as they are, multipliers among the unknowns."""
+
+    name, title = "ida", "IDA"
+    form = INDEX_1
+    treatments = (Treatment.BAUMGARTE, Treatment.GGL)
+    source = "IDA, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"

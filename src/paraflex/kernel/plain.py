@@ -1,0 +1,67 @@
+"""Kernels compiled as Numba does it for everybody: slower to compile, the same results but for rounding.
+
+What changes Numba (`machine_code`, `passes`, `records`, `disk_cache`) rests on interfaces that it does not promise to
+keep. None of it is loaded where the environment sets `PARAFLEX_PLAIN_NUMBA=1`, nor with a release of Numba that it has
+not been tested with, unless the variable is 0.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, MutableMapping
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+
+from paraflex.kernel.notice import LOG
+
+VARIABLE = "PARAFLEX_PLAIN_NUMBA"
+# First and last release that the changes are tested with; with those before no kernel compiles.
+TESTED = ("0.62", "0.68")
+
+
+def choose(release: str, environment: MutableMapping[str, str] = os.environ) -> bool:
+    """Whether kernels are compiled plainly; for a release that is not tested this is said once, and handed on."""
+    if not environment.get(VARIABLE):
+        if _numbers(TESTED[0]) <= _numbers(release) <= _numbers(TESTED[1]):
+            return False
+        environment[VARIABLE] = "1"
+        if multiprocessing.parent_process() is None:
+            tested = f"tested with Numba {TESTED[0]} to {TESTED[1]}, not with {release}"
+            LOG.warning("paraflex: %s: kernels are compiled without its own changes, which takes longer", tested)
+    return environment[VARIABLE] != "0"
+
+
+def _numbers(release: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in release.split(".")[:2])
+
+
+def state_of_kernels() -> str:
+    """A digest of what the machine code of any kernel may depend on, but for the processor: Numba tells these apart."""
+    digest = sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(sha256(source.read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+# Taken when kernels are imported: a source that is edited later is not what this process compiles.
+STATE = state_of_kernels()
+PLAIN = choose(numba.__version__)
+
+
+def compiled(function: Callable[..., Any], *, nogil: bool = False, **options: Any) -> Any:
+    """A function compiled plainly; what concerns our own way alone is left out."""
+    # The cache goes by this name, and looks at no other function's source.
+    function.__qualname__ = f"{function.__qualname__}_{STATE}"
+    wanted = {name: options[name] for name in ("error_model", "fastmath")}
+    return numba.njit(cache=True, nogil=nogil, **wanted)(function)
+
+
+def by_reference(record: type) -> type:
+    """Numba takes named tuples apart into their fields."""
+    return record
