@@ -42,6 +42,8 @@ from paraflex.motion import simulate_motion
 from paraflex.plots.marks import moving_marks
 from paraflex.plots.scene import scene
 from paraflex.plots.svg import sketch
+from paraflex.report.film import animation
+from paraflex.report.sweep import side_by_side
 from paraflex.results import motion_dataset
 from paraflex.results.drawing import assembled_data
 from paraflex.results.joint_loads import joint_loads
@@ -510,3 +512,17 @@ def test_pitch_circles_touch_and_move_with_their_wheels():
         low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
         assert np.all(low >= [shown.limits.left, shown.limits.bottom])
         assert np.all(high <= [shown.limits.right, shown.limits.top])
+
+
+def test_pages_of_designs_draw_the_wheels_of_each():
+    runs = []
+    for ratio in (-1.0, -0.8):
+        data, name = load_data("geared_five_bar")
+        data["gear"]["mesh"]["ratio"] = ratio
+        task = pf.plan(model_from(data, name), "stroke", duration=0.05, samples=6)
+        runs.append(pf.tracking_dataset([task.simulate("+-")]))
+    both = side_by_side(runs, ["a", "b"])
+    np.testing.assert_allclose(both["gear_radius"].values, [[[0.1, 0.1]], [[0.2 / 2.25, 0.25 / 2.25]]])
+    page = animation(both).to_dict()
+    assert page["looks"]["gear"].dashed
+    assert all([look for look, *_ in moving["pieces"]].count("gear") == 2 for _, moving in page["marks"])
