@@ -23,7 +23,7 @@ from paraflex.kernel.ode import (
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, OMEGA2
 from paraflex.kernel.stage import equations
 from paraflex.kernel.tangent import make_tangent, note_slopes, residual_tangent
-from paraflex.mechanism import AppliedTorque, Gear, Geometry, LinearSpring, PointForce, PointRef, raparm_i
+from paraflex.mechanism import AppliedTorque, Geometry, LinearSpring, PointForce, PointRef, raparm_i
 from test_axes import make_sliders
 
 TIME, ALPHA, BETA, PART = 0.37, 3.0, 7.0, 1e-7
@@ -46,17 +46,6 @@ def loaded_linkage(geometry):
     )
 
 
-def with_racks(sliders):
-    """Gears between travels and angles: two ends on one body, of one kind and of two."""
-    gears = (
-        Gear("lead", "guide", "slot", -0.4, 0.1),
-        Gear("rack", "O", "guide", 0.3, 0.05),
-        Gear("pinion", "bead", "O", 4.0, 0.2),
-        Gear("cable", "trolley", "pin", 0.7, 0.0),
-    )
-    return replace(sliders, gears=gears)
-
-
 def mechanism(name):
     kind, _, geometry = name.partition(" ")
     geometry = Geometry(geometry or "linear")
@@ -68,14 +57,12 @@ def mechanism(name):
         return replace(make_geared_linkage().with_geometry(geometry), gravity=(0.3, -9.81))
     if kind == "sliders":
         return make_sliders(geometry)
-    if kind == "racks":
-        return with_racks(make_sliders(geometry))
     return load(kind).mechanism
 
 
 NAMES = [
     "raparm linear", "raparm second-order", "linkage linear", "linkage second-order", "gears linear",
-    "gears second-order", "sliders linear", "sliders second-order", "racks linear", "racks second-order",
+    "gears second-order", "sliders linear", "sliders second-order",
     "slider_crank_flexible", "3prr", "andrews",
 ]  # fmt: skip
 
