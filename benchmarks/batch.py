@@ -28,7 +28,7 @@ from peers import MODE, TARGET, Tolerance, plan, run_paraflex
 
 from paraflex.compilation import compile_kernels
 from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, proportional_segments
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 DESIGNS, SAMPLE, CHECKED, SPREAD = 1000, 16, 3, 0.2
 # The golden section spreads any number of values evenly.

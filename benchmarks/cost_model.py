@@ -30,7 +30,7 @@ from paraflex.compilation import compile_kernels
 from paraflex.dynamics import build_system, start_state
 from paraflex.integrators import IntegrationOptions, Solution
 from paraflex.mechanism import Geometry, Start, chain_of_segments, four_bars_in_a_row, loops
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 MODE, METHOD, TOLERANCE = "++++", "tr-bdf2", 1e-4
 PAGE = Path(__file__).parents[1] / "docs" / "cost-model.md"

@@ -205,8 +205,7 @@ FIXED_AND_CONTROLLED = {
 
 def sensitivities() -> dict[str, Any]:
     """Exactness by the law of scale, and processor time of parameters in runs."""
-    from paraflex.studies import load_sensitivities
-    from paraflex.studies import sensitivities as differentiate
+    from paraflex.studies import load_sensitivities, sensitivities as differentiate
     from paraflex.studies.sweeps import Task, run_task
 
     head = 'mechanism = "raparm_i"\npaths = ["line"]\nmodes = ["++++"]\nduration = 0.06\nsamples = 61\n'

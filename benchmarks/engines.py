@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import State, System
 from paraflex.mechanism import Mechanism, PointRef
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 Array = NDArray[np.float64]
 

@@ -34,7 +34,7 @@ from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.run_state import FACTOR_B, TIME
 from paraflex.kernel.stage import equations
 from paraflex.mechanism import Geometry
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 MODE, METHOD, TOLERANCE, REPEATS, CALLS, GOAL = "++++", "tr-bdf2", 9e-5, 5, 2000, 5.0
 SIZES = (20, 40, 60, 80, 100)

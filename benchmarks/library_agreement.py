@@ -20,7 +20,7 @@ import paraflex as pf
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.integrators import IntegrationOptions
 from paraflex.results.record import record
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 MODES = {
     "raparm_ii": ("+-+-", "-+-+", "+--+", "+++-", "++-+", "++++"),

@@ -20,8 +20,8 @@ from models import LINEAR_PINNED, PAPER, SECOND_ORDER, SECOND_ORDER_CANTILEVER, 
 
 import paraflex as pf
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
-from paraflex.simulate import TrackingTask
 from paraflex.studies import Refinement, VerificationOptions, verify
+from paraflex.tracking import TrackingTask
 
 MODES = ("+-+-", "-+-+", "+--+", "+++-", "++-+", "++++")
 BEAMS = (PAPER, LINEAR_PINNED, SECOND_ORDER_CANTILEVER, SECOND_ORDER)

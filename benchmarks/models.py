@@ -10,7 +10,7 @@ from paraflex.fem import ReferenceCondition
 from paraflex.mechanism import Curvature, Geometry, Mechanism
 from paraflex.results import tracking_dataset
 from paraflex.results.record import Record
-from paraflex.simulate import TrackingRun, TrackingTask
+from paraflex.tracking import TrackingRun, TrackingTask
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.errors import IntegrationError
 from paraflex.integrators import IntegrationOptions
 from paraflex.results.record import Record
-from paraflex.simulate import TrackingRun, TrackingTask
+from paraflex.tracking import TrackingRun, TrackingTask
 
 PATHS = ("square", "line", "circle")
 # Of the paper's study; the paths themselves take 0.53, 0.13 and 0.24 s.

@@ -49,8 +49,8 @@ from paraflex.compilation import compile_kernels
 from paraflex.errors import NumericalError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, proportional_segments
-from paraflex.simulate import TrackingTask
 from paraflex.studies import tracking_case
+from paraflex.tracking import TrackingTask
 
 MODE, TARGET, DURATION, REPEATS = "++++", 1.2e-5, 0.7, 5
 README = Path(__file__).parents[1] / "README.md"

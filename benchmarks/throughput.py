@@ -28,8 +28,8 @@ from paraflex.dynamics.points import point_motion
 from paraflex.errors import IntegrationError
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.simulate import TrackingTask, plan_tracking
 from paraflex.studies import load_sweep, sweep
+from paraflex.tracking import TrackingTask, plan_tracking
 
 DEVIATION, CONVERGED = 1.5e-5, 1e-7
 SETTINGS = (

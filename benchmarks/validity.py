@@ -49,7 +49,7 @@ from paraflex.mechanism import (
 )
 from paraflex.motion import simulate_motion
 from paraflex.results.drawing import system_drawing
-from paraflex.simulate import plan_tracking, simulate
+from paraflex.tracking import plan_tracking, simulate
 from paraflex.validity import FOURTH_ORDER_LIMIT, fourth_order
 
 ROOT = Path(__file__).parents[1]

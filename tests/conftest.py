@@ -31,7 +31,7 @@ from paraflex.mechanism import (
     Section,
     raparm_i,
 )
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 SQUARE = ((0.050, 0.314), (-0.050, 0.314), (-0.050, 0.214), (0.050, 0.214))
 DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}

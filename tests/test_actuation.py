@@ -28,7 +28,7 @@ from paraflex.mechanism import (
     mode_of_signs,
     parse_mode,
 )
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 # Table 1 of the paper (published): signs of tau1, tau2, tau5, tau6.
 TABLE_1 = ("+-+-", "-+-+", "+--+", "-++-", "+++-", "++-+", "+-++", "-+++", "++++")

@@ -22,7 +22,7 @@ from paraflex.findings import Finding, Verdict
 from paraflex.mechanism import EndEffector, Mechanism, Motor, PointRef, RevoluteJoint, RigidBody, Start, WeldJoint
 from paraflex.motion import simulate_motion
 from paraflex.results.export import export, result_tables
-from paraflex.simulate import simulate
+from paraflex.tracking import simulate
 
 # A call, and how its error begins.
 SLIPS = [
@@ -101,11 +101,11 @@ SLIPS = [
     ("pf.Line(3,3,1)", "start: not a list of points"),
     ("pf.plan(model,'sqare')", "raparm_i.toml: path: unknown path"),
     ("pf.plan(mech,'square')", "path: a mechanism has no paths by name"),
-    ("pf.plan('raparm_i','square')", "mechanism: not a mechanism"),
+    ("pf.plan(3,'square')", "model: not a model, a mechanism or a text (got 3); give a model, the name or the file of"),
     ("pf.plan(mech,[(0,0.3),(0.1,0.3)])", "path: not a path"),
     ("pf.plan(mech,model)", "path: not a path"),
     ("pf.plan(mech,None)", "path: is not given"),
-    ("pf.plan(task,'square')", "mechanism: not a mechanism"),
+    ("pf.plan(task,'square')", "model: not a model, a mechanism or a text"),
     ("pf.plan(model,'square',duration='0.7')", "duration: not a number"),
     ("pf.plan(model,'square',duration=-1)", "duration: must be positive"),
     ("pf.plan(model,'square',samples=70.5)", "samples: not a whole number"),
@@ -360,7 +360,7 @@ def given(tmp_path_factory):
     data = pf.tracking_dataset(run)
     pf.save_results(data, tmp / "results.nc")
     public = [paraflex.mechanism, paraflex.dynamics, paraflex.results, paraflex.studies, paraflex.report]
-    names = {name: getattr(module, name) for module in public for name in module.__all__}
+    names = {name: getattr(module, name) for module in public for name in dir(module) if not name.startswith("_")}
     functions = [simulate, simulate_ked, simulate_motion, export, result_tables]
     return names | {each.__name__: each for each in functions} | {
         "pf": pf, "plots": pf.plots, "tmp": tmp, "model": model, "mech": model.mechanism, "pend": pend,
@@ -481,8 +481,8 @@ def test_a_warning_names_the_line_that_asked_for_the_run(given):
 def test_a_task_is_no_model(given):
     """It has a mechanism, and a path of its own that would be left out."""
     with pytest.raises(
-        InputError, match=r"^mechanism: not a mechanism \(got a TrackingTask\); give a Mechanism, or the"
+        InputError, match=r"^model: not a model, a mechanism or a text \(got a TrackingTask\); give a model, the"
     ):
         pf.plan(given["task"], given["model"].path("square"))
-    with pytest.raises(InputError, match=r"^mechanism: not a mechanism \(got namespace"):
+    with pytest.raises(InputError, match=r"^model: not a model, a mechanism or a text \(got namespace"):
         pf.plan(SimpleNamespace(mechanism=3, paths={}), "square")

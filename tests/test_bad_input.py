@@ -6,7 +6,7 @@ import pytest
 
 from paraflex.errors import InputError
 from paraflex.files import load
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 from shell import paraflex
 
 # A five-bar with everything in it that a file may say.

@@ -44,7 +44,7 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.motion import simulate_motion
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 from shell import paraflex
 
 SPEED, LENGTH, MODULUS, DENSITY, TIP = 60.0, 0.5, 70e9, 2700.0, 0.2

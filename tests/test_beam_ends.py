@@ -35,7 +35,7 @@ from paraflex.mechanism import (
 )
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, motion_summary, summary, tracking_dataset
-from paraflex.simulate import plan_tracking, simulate
+from paraflex.tracking import plan_tracking, simulate
 from shell import paraflex
 
 BASE, CRANK, LENGTH = 0.2, 0.1, 0.25

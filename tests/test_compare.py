@@ -14,7 +14,6 @@ from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import InputError, IntegrationError
 from paraflex.files import load
 from paraflex.integrators import METHODS, Solution
-from paraflex.simulate import plan_tracking
 from paraflex.studies import (
     Case,
     ComparisonOptions,
@@ -25,6 +24,7 @@ from paraflex.studies import (
     motion_case,
     tracking_case,
 )
+from paraflex.tracking import plan_tracking
 from shell import interrupted, paraflex
 from test_plots import stays_on_the_page
 

@@ -31,8 +31,8 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.results import summary, tracking_dataset
-from paraflex.simulate import Ending, plan_tracking
 from paraflex.studies import run_study, verify
+from paraflex.tracking import Ending, plan_tracking
 from shell import paraflex
 
 PAPER = raparm_i().with_geometry(Geometry.LINEAR)

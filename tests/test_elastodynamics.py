@@ -35,7 +35,7 @@ from paraflex.mechanism import (
     Section,
 )
 from paraflex.results import tracking_dataset
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 LENGTH, WIDTH, THICKNESS = 0.4, 0.02, 0.004
 ALUMINIUM = Material(youngs_modulus=70e9, density=2700.0)

@@ -36,7 +36,7 @@ from paraflex.mechanism import (
     TorsionalSpring,
 )
 from paraflex.results.record import record
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 TURN = 2 * np.pi
 

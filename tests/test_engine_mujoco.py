@@ -35,7 +35,7 @@ from paraflex.mechanism import (
 )
 from paraflex.results import tracking_dataset
 from paraflex.results.record import record
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 PAPER = {f"link{i}": 4 if i in (2, 6) else 8 for i in range(1, 9)}
 

@@ -26,11 +26,11 @@ from paraflex.mechanism import (
 )
 from paraflex.plots.layout import column_width
 from paraflex.plots.themes import theme
-from paraflex.simulate import plan_tracking, simulate
 from paraflex.studies import Refinement, VerificationOptions
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.study import Search
 from paraflex.studies.verification import ModelRuns
+from paraflex.tracking import plan_tracking, simulate
 
 
 def beam(**options):

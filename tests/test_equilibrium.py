@@ -34,7 +34,7 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.motion import simulate_motion
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 from test_loads import MASS, REACH, G, pendulum
 
 

@@ -38,7 +38,7 @@ from paraflex.mechanism import (
 from paraflex.motion import simulate_motion
 from paraflex.results import load_results, motion_dataset, motion_summary, save_results, summary, tracking_dataset
 from paraflex.results.outlines import deflections
-from paraflex.simulate import plan_tracking, simulate
+from paraflex.tracking import plan_tracking, simulate
 from test_integrator import parallelogram
 from test_loads import INERTIA, MASS, REACH, G, pendulum
 

@@ -21,7 +21,7 @@ from paraflex.mechanism import (
     Section,
 )
 from paraflex.motion import simulate_motion
-from paraflex.simulate import plan_tracking, simulate
+from paraflex.tracking import plan_tracking, simulate
 
 
 @pytest.fixture(scope="module")

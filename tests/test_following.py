@@ -36,8 +36,8 @@ from paraflex.results import load_results, save_results, summary, tracking_datas
 from paraflex.results.following import part_run
 from paraflex.results.formulas import drift_speed, vibration
 from paraflex.results.outlines import deflections, outlines
-from paraflex.simulate import plan_tracking
 from paraflex.studies import run_study
+from paraflex.tracking import plan_tracking
 from shell import paraflex
 
 SQUARE = Polygon(((0.05, 0.314), (-0.05, 0.314), (-0.05, 0.214), (0.05, 0.214)), 40.0)

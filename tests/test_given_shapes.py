@@ -53,8 +53,8 @@ from paraflex.mechanism import (
 from paraflex.motion import simulate_motion
 from paraflex.results import tracking_dataset
 from paraflex.results.record import record
-from paraflex.simulate import plan_tracking
 from paraflex.studies import verify
+from paraflex.tracking import plan_tracking
 from shell import paraflex
 from test_elastodynamics import SWING
 

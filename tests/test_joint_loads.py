@@ -40,7 +40,7 @@ from paraflex.mechanism import (
 )
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, tracking_dataset
-from paraflex.simulate import simulate
+from paraflex.tracking import simulate
 from test_axes import sliders_put_together
 
 G, MASS, REACH = 9.81, 2.0, 0.3

@@ -72,7 +72,7 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(copy):
 def test_every_kernel_is_kept_in_the_folder_of_this_state():
     import paraflex.dynamics.linearise
     import paraflex.kernel.ode
-    import paraflex.simulate  # noqa: F401
+    import paraflex.tracking  # noqa: F401
 
     kernels = [each for each in gc.get_objects() if isinstance(each, Kernel)]
     assert len(kernels) > 30

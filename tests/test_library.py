@@ -10,7 +10,7 @@ from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import PointRef, parse_mode
 from paraflex.results import tracking_dataset
-from paraflex.simulate import plan_tracking, simulate
+from paraflex.tracking import plan_tracking, simulate
 
 NAMES = ("raparm_ii", "3rrr", "4rrr")
 MODES = [(name, mode.name) for name in NAMES for mode in load(name).mechanism.modes]

@@ -5,9 +5,9 @@ import pytest
 
 from paraflex.files import load
 from paraflex.mechanism import Geometry
-from paraflex.simulate import plan_tracking
 from paraflex.studies import Refinement, VerificationOptions
 from paraflex.studies.verification import run_model
+from paraflex.tracking import plan_tracking
 
 OPTIONS = VerificationOptions(tolerance=5e-7)
 

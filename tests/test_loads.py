@@ -37,7 +37,7 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.results import tracking_dataset
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 from test_second_order import chain, random_state
 
 MASS, INERTIA, REACH, G = 1.3, 0.02, 0.4, 9.81

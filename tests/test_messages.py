@@ -31,8 +31,8 @@ from paraflex.mechanism import (
 )
 from paraflex.motion import simulate_motion
 from paraflex.results import open_results
-from paraflex.simulate import plan_tracking
 from paraflex.studies import ComparisonOptions, load_optimisation, load_sensitivities, load_sweep, sensitivities, sweep
+from paraflex.tracking import plan_tracking
 from paraflex.validity import to_blame
 from test_bad_input import broken
 

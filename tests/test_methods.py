@@ -15,8 +15,8 @@ from paraflex.integrators import METHODS, IntegrationOptions, integrate
 from paraflex.integrators.methods import BDF, HHT, Family, GeneralisedAlpha, Newmark, Wilson, find_method
 from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.mechanism import Geometry
-from paraflex.simulate import plan_tracking
 from paraflex.studies import tracking_case
+from paraflex.tracking import plan_tracking
 
 _SPEC = importlib.util.spec_from_file_location("orders", Path(__file__).parents[1] / "benchmarks" / "orders.py")
 assert _SPEC is not None

@@ -13,7 +13,7 @@ from paraflex.plots.labels import metric_name
 from paraflex.results import summary
 from paraflex.results.following import FOLLOWING, KEPT
 from paraflex.results.metrics import METRICS
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 METRIC = "motor_power_max"
 STUDY = f"""

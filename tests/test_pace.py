@@ -8,7 +8,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.pace import Pace
 from paraflex.kinematics import Line
 from paraflex.motion import simulate_motion
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 
 def test_links_thrown_about_at_a_base_pivot_are_given_up_within_seconds():

@@ -1,5 +1,6 @@
 """What a newcomer meets first: the package's names, and that the project stands alone."""
 
+import operator
 import subprocess
 import sys
 from pathlib import Path
@@ -38,3 +39,20 @@ def test_nothing_reads_outside_the_project():
         for file in (ROOT / folder).rglob("*"):
             if file.suffix in (".py", ".toml", ".md") and file != Path(__file__):
                 assert "../shared" not in file.read_text(encoding="utf-8"), file
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("plan_tracking", "plan"), ("sobol_indices", "indices"), ("raparm_i", "library.raparm_i"),
+     ("four_bars_in_a_row", "library.four_bars_in_a_row"), ("library_names", "library.names")],
+)  # fmt: skip
+def test_names_of_the_last_version_work_and_say_what_they_are_called_now(old, new):
+    with pytest.warns(DeprecationWarning, match=f"pf.{old} is called pf.{new} now"):
+        found = getattr(paraflex, old)
+    assert callable(found)
+    assert old == "plan_tracking" or found is operator.attrgetter(new)(paraflex)
+
+
+def test_every_public_name_is_offered_by_completion():
+    assert {"load", "plan", "simulate", "verify", "sweep", "RevoluteJoint", "methods", "library"} <= set(dir(paraflex))
+    assert paraflex.simulate is paraflex.tracking.simulate

@@ -24,9 +24,9 @@ from paraflex.motion import simulate_motion
 from paraflex.plots.designs import DesignTable
 from paraflex.plots.responses import pareto_front
 from paraflex.report.page import plotly_script
-from paraflex.simulate import simulate
 from paraflex.studies import load_sensitivities, load_sweep, motion_case, sensitivities, sweep
 from paraflex.studies.sweeps import Task, run_task
+from paraflex.tracking import simulate
 
 SWEEP = """
 mechanism = "five_bar"

@@ -9,7 +9,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Assembly, Mechanism, Motor, PointRef, PrismaticJoint, RigidBody, raparm_i
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, tracking_dataset
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 # Steps that damp the axial vibrations of links, which segments do not have.
 FINE = IntegrationOptions(method="tr-bdf2", tolerance=1e-4, step=5e-4)

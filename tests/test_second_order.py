@@ -33,7 +33,7 @@ from paraflex.mechanism import (
     Section,
     raparm_i,
 )
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 RUBBER = Material(youngs_modulus=5e6, density=1100.0)
 

@@ -24,10 +24,10 @@ from paraflex.integrators.variation import Direction, run_derivatives
 from paraflex.mechanism import Mechanism, PointRef, RevoluteJoint, RigidBody, TorsionalSpring, raparm_i
 from paraflex.plots import elasticities
 from paraflex.results.run_traces import run_traces
-from paraflex.simulate import simulate
 from paraflex.studies import load_sensitivities, metric_gradients, sensitivities
 from paraflex.studies.sensitivities import SMOOTH, nominal_values
 from paraflex.studies.sweeps import METRICS, Task, run_task
+from paraflex.tracking import simulate
 from shell import paraflex
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "sensitivity_study.toml"

@@ -12,7 +12,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Polygon, follow_path
 from paraflex.mechanism import Assembly, PrismaticJoint, RigidBody, Section
 from paraflex.motion import simulate_motion
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 FACTORS = [1e-4, 1e-2, 1e2, 1e4]
 NAMES = ["four_bar", "five_bar", "slider_crank", "raparm_i"]

@@ -9,7 +9,7 @@ from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
 from paraflex.results import tracking_dataset
-from paraflex.simulate import plan_tracking, simulate
+from paraflex.tracking import plan_tracking, simulate
 
 # Published at 0.1 s (IVP test set): angle of the rod, place of the slider.
 ROD, SLIDER = -0.3311734988, 0.1697373328

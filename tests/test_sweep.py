@@ -19,9 +19,9 @@ from paraflex.designs.overlay import find_place, number_places, overlaid
 from paraflex.errors import InputError, OutputError
 from paraflex.files import Model, load, load_data
 from paraflex.results import load_results, summary, tracking_dataset
-from paraflex.simulate import plan_tracking
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps import METRICS, Outcome, Task, run_task
+from paraflex.tracking import plan_tracking
 from shell import paraflex as shell
 
 STUDY = """

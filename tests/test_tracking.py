@@ -12,8 +12,8 @@ from paraflex.kinematics import Circle, Line, PointPath, Polygon
 from paraflex.mechanism import Curvature, FlexibleBeam, Material, raparm_i
 from paraflex.mechanism.raparm import TABLE_1
 from paraflex.results import tracking_dataset
-from paraflex.simulate import plan_tracking, simulate
 from paraflex.studies import run_study
+from paraflex.tracking import plan_tracking, simulate
 
 SQUARE = Polygon(((0.05, 0.314), (-0.05, 0.314), (-0.05, 0.214), (0.05, 0.214)), 40.0)
 

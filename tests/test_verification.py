@@ -13,7 +13,6 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Line
 from paraflex.mechanism import proportional_segments, raparm_i
 from paraflex.results import load_results, save_results, tracking_dataset
-from paraflex.simulate import plan_tracking
 from paraflex.studies import (
     FIDELITIES,
     Refinement,
@@ -22,6 +21,7 @@ from paraflex.studies import (
     reference_model,
     verify,
 )
+from paraflex.tracking import plan_tracking
 
 MODELS = (*FIDELITIES, "exudyn", "mujoco")
 

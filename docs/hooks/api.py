@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,14 @@ SOURCE = Path(__file__).parents[2] / "src" / "paraflex"
 
 # In the order of the theory; a name is told once, in the first of these that has it.
 PACKAGES = (
+    "library",
     "files",
     "checks",
     "findings",
     "mechanism",
     "kinematics",
     "actuation",
-    "simulate",
+    "tracking",
     "motion",
     "validity",
     "elastodynamics",
@@ -27,7 +29,9 @@ PACKAGES = (
     "dynamics",
     "fem",
     "results",
+    "results.export",
     "plots",
+    "plots.film",
     "report",
     "studies.sweeps",
     "studies.sensitivities",
@@ -54,48 +58,56 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def public_names(package: str) -> list[str]:
-    """`__all__` of a package; of a module without one its functions and classes that are not private."""
-    tree = _tree(package)
+    """Names that a package hands on (`name as name`), and its own functions and classes that are not private."""
+    tree, names = _tree(package), []
     for node in tree.body:
         if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__":
-            return ast.literal_eval(node.value)
-    return [
-        node.name
-        for node in tree.body
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
-    ]
+            with suppress(ValueError):  # of packages that read it from their stubs
+                return ast.literal_eval(node.value)
+        if isinstance(node, ast.ImportFrom):
+            names += [alias.name for alias in node.names if alias.asname == alias.name]
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            names.append(node.name)
+    return names
 
 
 def _page(package: str) -> str:
     return f"reference/api/{package}.md"
 
 
-def _tree(package: str) -> ast.Module:
+def _tree(package: str, kind: str = "pyi") -> ast.Module:
+    """A package as its stub has it where there is one, or its code; a module."""
     path = SOURCE / package.replace(".", "/")
-    file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    return ast.parse(file.read_text(encoding="utf-8"))
+    file = path / f"__init__.{kind}" if path.is_dir() else path.with_suffix(".py")
+    return ast.parse(file.read_text(encoding="utf-8")) if file.is_file() else _tree(package, "py")
+
+
+def _module(package: str, node: ast.ImportFrom) -> str:
+    """The module that a package imports from, below `paraflex`."""
+    if node.level:
+        return ".".join(part for part in (package, node.module) if part)
+    return (node.module or "").removeprefix("paraflex.")
 
 
 def _origin(package: str, name: str) -> str:
     """The module a package takes a name from, followed as far as packages hand it on; and the name."""
     for node in _tree(package).body:
         if isinstance(node, ast.ImportFrom) and any((alias.asname or alias.name) == name for alias in node.names):
-            module = (node.module or "").removeprefix("paraflex.")
+            module = _module(package, node)
             return _origin(module, name) if (SOURCE / module.replace(".", "/")).is_dir() else f"{module}.{name}"
     return f"{package}.{name}"
 
 
 def _package_page(package: str, names: list[str]) -> str:
-    about = ast.get_docstring(_tree(package)) or ""
+    about = ast.get_docstring(_tree(package, "py")) or ""
     names = sorted(names, key=str.isupper)  # constants last
     return f"# paraflex.{package}\n\n{about}\n\n" + "\n".join(f"::: paraflex.{package}.{name}\n" for name in names)
 
 
 def _index_page(homes: dict[str, str]) -> str:
-    tree = _tree("")
     names = public_names("")
     rows = [f"| `pf.{name}` | {_link(name, homes)} |" for name in names]
-    packages = [f"| [paraflex.{package}]({package}.md) | {_summary(_tree(package))} |" for package in PACKAGES]
+    packages = [f"| [paraflex.{package}]({package}.md) | {_about(package)} |" for package in PACKAGES]
     return "\n".join(
         [
             "# Python, name by name",
@@ -104,17 +116,18 @@ def _index_page(homes: dict[str, str]) -> str:
             "",
             *["| Name | Told under |", "|---|---|", *rows, ""],
             *["| Package | |", "|---|---|", *packages, ""],
-            _summary(tree),
+            _about(""),
         ]
     )
 
 
 def _link(name: str, homes: dict[str, str]) -> str:
-    modules = {"methods": "integrators.methods", "plots": "plots"}
+    modules = {"library": "library", "methods": "integrators.methods", "plots": "plots"}
     if name in modules:
         return f"[paraflex.{modules[name]}]({modules[name]}.md)"
     return f"[{homes[name]}][]"
 
 
-def _summary(tree: ast.Module) -> str:
-    return (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
+def _about(package: str) -> str:
+    """The first paragraph of a package's docstring."""
+    return (ast.get_docstring(_tree(package, "py")) or "").split("\n\n")[0].replace("\n", " ")

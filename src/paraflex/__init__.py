@@ -23,7 +23,7 @@ _RENAMED = {
     "chain_of_segments": ("mechanism", "library.chain_of_segments"),
     "four_bars_in_a_row": ("mechanism", "library.four_bars_in_a_row"),
     "library_names": ("files", "library.names"),
-    "plan_tracking": ("simulate", "plan"),
+    "plan_tracking": ("tracking", "plan"),
     "raparm_i": ("mechanism", "library.raparm_i"),
     "sobol_indices": ("studies.indices", "indices"),
 }

@@ -26,7 +26,7 @@ from paraflex.kernel.notice import LOG, announce_compiling
 from paraflex.kernel.plain import PLAIN, STATE
 from paraflex.kinematics import Line
 from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
-from paraflex.simulate import plan_tracking
+from paraflex.tracking import plan_tracking
 
 
 def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:

@@ -35,7 +35,7 @@ from paraflex.integrators.methods import GeneralisedAlpha
 from paraflex.kernel.bodies import motion_forces, system_energy
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode, Geometry, grouped
-from paraflex.simulate import TrackingRun, TrackingTask
+from paraflex.tracking import TrackingRun, TrackingTask
 
 # A sample spacing may be this much longer than a whole number of steps: rounding of the division.
 _ROUNDING = 1e-9

@@ -21,30 +21,6 @@ E = TypeVar("E", bound=Enum)
 
 _PACKAGE = os.path.dirname(__file__) + os.sep
 
-__all__ = [
-    "ActuationError",
-    "AssemblyError",
-    "ConstraintDriftError",
-    "InconsistentConstraintsError",
-    "InputError",
-    "IntegrationError",
-    "ModelWarning",
-    "NumericalError",
-    "OutputError",
-    "ParaflexError",
-    "ParaflexWarning",
-    "ResultWarning",
-    "SingularActuationError",
-    "SingularPositionError",
-    "SliderOffBeamError",
-    "StiffnessWarning",
-    "UnreachablePathError",
-    "ValidityWarning",
-    "as_enum",
-    "suggestion",
-    "warn_user",
-]
-
 
 class ParaflexError(Exception):
     """Root of every error that paraflex raises on purpose."""

@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.findings import Finding, Verdict
 from paraflex.mechanism import ActuationMode, Mechanism
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 from paraflex.validity.numbers import doubtful_numbers
 
 

@@ -14,7 +14,7 @@ from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import GRAVITY, mechanism_mass, mechanism_size
 from paraflex.validity.plausibility import doubtful_efforts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from paraflex.errors import InputError
 from paraflex.report import Page, motion_page, save_page, tracking_page, verification_page
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
+from paraflex.writing import read_json
 
 
 def report_command(request: ReportRequest) -> None:
@@ -64,10 +64,7 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
 
 
 def _beside(file: Path) -> dict[str, Any]:
-    try:
-        figures = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError("cannot be read", field=str(file), remedy="run the command again") from error
-    if not isinstance(figures.get("modes") if isinstance(figures, dict) else None, dict):
-        raise InputError("is not a summary that paraflex wrote", field=str(file), remedy="run the command again")
-    return figures
+    numbers = read_json(file)
+    if not isinstance(numbers.get("modes"), dict):
+        raise InputError("is no summary that paraflex wrote", field=str(file), remedy="run the command again")
+    return numbers

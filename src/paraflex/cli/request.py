@@ -13,7 +13,7 @@ from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.files import Model, load_path
 from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, Mechanism
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 from paraflex.validity import to_blame
 from paraflex.writing import unwritable
 

@@ -37,8 +37,8 @@ from paraflex.files import Model, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, finite_segments, proportional_segments
 from paraflex.results.doubts import keep_findings, verdict_of
-from paraflex.simulate import TrackingRun, TrackingTask, simulate
 from paraflex.studies import Simulator, TrackingStudy
+from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 
 def run_command(request: RunRequest) -> int:

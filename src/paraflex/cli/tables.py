@@ -14,8 +14,8 @@ from paraflex.findings import Finding
 
 if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
-    from paraflex.simulate import TrackingTask
     from paraflex.studies import StudyResult
+    from paraflex.tracking import TrackingTask
 
 # How a run ends that did what was asked.
 FINISHED = ("complete", "stopped")

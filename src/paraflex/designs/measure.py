@@ -13,7 +13,7 @@ from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.metrics import METRICS, VALIDITY, Metric
 from paraflex.results.run_traces import run_traces
 from paraflex.results.traces import Traces
-from paraflex.simulate import TrackingRun
+from paraflex.tracking import TrackingRun
 
 # Metrics that have derivatives.
 SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)

@@ -17,7 +17,7 @@ from paraflex.designs.samples import Varied
 from paraflex.designs.setting import Setting, digest, versions
 from paraflex.errors import InputError
 from paraflex.results import tracking_dataset
-from paraflex.simulate import simulate
+from paraflex.tracking import simulate
 
 _AGAIN = "run the study again, in a new folder"
 

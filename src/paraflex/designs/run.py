@@ -18,7 +18,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.results import tracking_dataset
 from paraflex.results.metrics import METRICS
-from paraflex.simulate import TrackingRun, TrackingTask, simulate
+from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -11,7 +11,7 @@ from paraflex.arrays import Array
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError
 from paraflex.mechanism import FlexibleBeam, Mechanism, given_shapes, grouped
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 # Names of the engines as users and Python's packages know them, and in print.
 _PRINTED = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}

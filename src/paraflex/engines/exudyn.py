@@ -28,7 +28,7 @@ from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechani
 from paraflex.results.drawing import Drawing, drawing
 from paraflex.results.outlines import outlines
 from paraflex.results.record import Record
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 # Newton's residual, a norm over all coordinates, is as good as zero at this many times the rounding of one inner force.
 _FLOOR = 100.0

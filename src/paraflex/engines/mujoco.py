@@ -27,7 +27,7 @@ from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import GROUND, ActuationMode, Gear, Joint, Mechanism, proportional_segments
 from paraflex.results.record import Record, record
-from paraflex.simulate import TrackingRun, TrackingTask
+from paraflex.tracking import TrackingRun, TrackingTask
 
 # Shares of a step in the work of the motors, stage by stage.
 _RK4 = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)

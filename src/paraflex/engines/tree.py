@@ -10,7 +10,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Joint, Mechanism, PointRef
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from paraflex.files.tables import model_tables
 from paraflex.findings import warn_of
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode
-from paraflex.simulate import Ending, TrackingTask, plan_tracking
+from paraflex.tracking import Ending, TrackingTask, plan_tracking
 from paraflex.validity import doubtful_numbers
 from paraflex.writing import write_text
 
@@ -140,7 +140,7 @@ class Model(CheckedFields):
         mechanism : Mechanism, optional
             Another form of the model's own: rigid, or of another geometry.
         duration, samples, assembly, orientation, after, warning
-            See `simulate.plan_tracking`.
+            See `tracking.plan_tracking`.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class Model(CheckedFields):
         write_text(path, document_text(data, self.text), remedy="choose another file")
 
 
-@checked_arguments()
+@checked_arguments(model="give a model, the name or the file of one, or a mechanism")
 def plan(
     model: Model | Mechanism | str,
     path: Path | str | None = None,
@@ -220,20 +220,21 @@ def plan(
     model : Model, Mechanism or str
         A model, whose [study] says what is not given; or the name or file of one; or a mechanism.
     path, duration, samples, assembly, orientation, after, warning
-        See `Model.plan` and `simulate.plan_tracking`.
+        See `Model.plan` and `tracking.plan_tracking`.
 
     Raises
     ------
     InputError, AssemblyError, UnreachablePathError
         See there.
     """
-    if isinstance(model, str):
-        model = load(model)
-    model = model if isinstance(model, Model) else Model(model)
-    return model.plan(
-        path, duration=duration, samples=samples, assembly=assembly, orientation=orientation, after=after,
-        warning=warning,
-    )  # fmt: skip
+    asked = {
+        "duration": duration, "samples": samples, "assembly": assembly, "orientation": orientation, "after": after,
+        "warning": warning,
+    }  # fmt: skip
+    if isinstance(model, Mechanism):
+        given = {name: value for name, value in asked.items() if value is not None}
+        return plan_tracking(model, path, **given)  # type: ignore[arg-type]  # refused where it is no path
+    return (load(model) if isinstance(model, str) else model).plan(path, **asked)
 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")

@@ -1,27 +1,24 @@
 """Time integration: methods as objects, our own schemes as tableaux and numbers, SciPy's and SUNDIALS' as guests."""
 
-from paraflex.integrators.events import DeflectionLimit, Event, JointLimit, SingularDistance, check_events
-from paraflex.integrators.integrate import integrate
-from paraflex.integrators.methods import DEFAULT_METHOD, METHODS, Method, Treatment, find_method
-from paraflex.integrators.options import IntegrationOptions, check_times, choose
-from paraflex.integrators.run import make_problem
-from paraflex.integrators.solution import Solution
-
-__all__ = [
-    "DEFAULT_METHOD",
-    "METHODS",
-    "DeflectionLimit",
-    "Event",
-    "IntegrationOptions",
-    "JointLimit",
-    "Method",
-    "SingularDistance",
-    "Solution",
-    "Treatment",
-    "check_events",
-    "check_times",
-    "choose",
-    "find_method",
-    "integrate",
-    "make_problem",
-]
+from paraflex.integrators.events import (
+    DeflectionLimit as DeflectionLimit,
+    Event as Event,
+    JointLimit as JointLimit,
+    SingularDistance as SingularDistance,
+    check_events as check_events,
+)
+from paraflex.integrators.integrate import integrate as integrate
+from paraflex.integrators.methods import (
+    DEFAULT_METHOD as DEFAULT_METHOD,
+    METHODS as METHODS,
+    Method as Method,
+    Treatment as Treatment,
+    find_method as find_method,
+)
+from paraflex.integrators.options import (
+    IntegrationOptions as IntegrationOptions,
+    check_times as check_times,
+    choose as choose,
+)
+from paraflex.integrators.run import make_problem as make_problem
+from paraflex.integrators.solution import Solution as Solution

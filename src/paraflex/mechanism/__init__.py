@@ -1,143 +1,88 @@
 """What the user means: frozen descriptions of bodies, joints, motors and the mechanism they form."""
 
-from paraflex.fem import Polynomial, ShapeFunction, Sine
-from paraflex.mechanism.actuation_modes import mode_of_motors, mode_of_signs, parse_mode
+from paraflex.fem import Polynomial as Polynomial, ShapeFunction as ShapeFunction, Sine as Sine
+from paraflex.mechanism.actuation_modes import (
+    mode_of_motors as mode_of_motors,
+    mode_of_signs as mode_of_signs,
+    parse_mode as parse_mode,
+)
 from paraflex.mechanism.bodies import (
-    AssumedModesBeam,
-    Body,
-    Curvature,
-    FlexibleBeam,
-    LumpedMass,
-    Material,
-    RigidBody,
-    Section,
-    given_shapes,
+    AssumedModesBeam as AssumedModesBeam,
+    Body as Body,
+    Curvature as Curvature,
+    FlexibleBeam as FlexibleBeam,
+    LumpedMass as LumpedMass,
+    Material as Material,
+    RigidBody as RigidBody,
+    Section as Section,
+    given_shapes as given_shapes,
 )
-from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping, stiffness_proportional
-from paraflex.mechanism.gears import Gear
-from paraflex.mechanism.groups import Group, grouped, groups_of
+from paraflex.mechanism.checks import check_mechanism as check_mechanism
+from paraflex.mechanism.damping import (
+    Damping as Damping,
+    LossFactor as LossFactor,
+    ModalDamping as ModalDamping,
+    RayleighDamping as RayleighDamping,
+    stiffness_proportional as stiffness_proportional,
+)
+from paraflex.mechanism.gears import Gear as Gear
+from paraflex.mechanism.groups import Group as Group, grouped as grouped, groups_of as groups_of
 from paraflex.mechanism.joints import (
-    GROUND,
-    JOINT_KINDS,
-    AngleLaw,
-    AtEnd,
-    Joint,
-    Motor,
-    PointRef,
-    PrescribedAngle,
-    PrismaticJoint,
-    RevoluteJoint,
-    SampledAngle,
-    SlidingJoint,
-    SlotJoint,
-    WeldJoint,
-    points_named,
+    GROUND as GROUND,
+    JOINT_KINDS as JOINT_KINDS,
+    AngleLaw as AngleLaw,
+    AtEnd as AtEnd,
+    Joint as Joint,
+    Motor as Motor,
+    PointRef as PointRef,
+    PrescribedAngle as PrescribedAngle,
+    PrismaticJoint as PrismaticJoint,
+    RevoluteJoint as RevoluteJoint,
+    SampledAngle as SampledAngle,
+    SlidingJoint as SlidingJoint,
+    SlotJoint as SlotJoint,
+    WeldJoint as WeldJoint,
+    points_named as points_named,
 )
-from paraflex.mechanism.laws import ConstantSpeed, PiecewiseLaw, TabulatedLaw
+from paraflex.mechanism.laws import (
+    ConstantSpeed as ConstantSpeed,
+    PiecewiseLaw as PiecewiseLaw,
+    TabulatedLaw as TabulatedLaw,
+)
 from paraflex.mechanism.loads import (
-    AppliedTorque,
-    JointFriction,
-    LinearSpring,
-    Load,
-    PointForce,
-    TorsionalDamper,
-    TorsionalSpring,
+    AppliedTorque as AppliedTorque,
+    JointFriction as JointFriction,
+    LinearSpring as LinearSpring,
+    Load as Load,
+    PointForce as PointForce,
+    TorsionalDamper as TorsionalDamper,
+    TorsionalSpring as TorsionalSpring,
 )
-from paraflex.mechanism.loops import loops
-from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.members import ActuationMode, Assembly, EndEffector, Geometry
-from paraflex.mechanism.modal import ModalBody, ModalPoint
-from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
-from paraflex.mechanism.quantities import joints_named
-from paraflex.mechanism.raparm import raparm_i
-from paraflex.mechanism.rows import chain_of_segments, four_bars_in_a_row
+from paraflex.mechanism.loops import loops as loops
+from paraflex.mechanism.mechanism import Mechanism as Mechanism
+from paraflex.mechanism.members import (
+    ActuationMode as ActuationMode,
+    Assembly as Assembly,
+    EndEffector as EndEffector,
+    Geometry as Geometry,
+)
+from paraflex.mechanism.modal import ModalBody as ModalBody, ModalPoint as ModalPoint
+from paraflex.mechanism.poses import Pose as Pose, approximate_poses as approximate_poses, placed_poses as placed_poses
+from paraflex.mechanism.quantities import joints_named as joints_named
+from paraflex.mechanism.raparm import raparm_i as raparm_i
+from paraflex.mechanism.rows import chain_of_segments as chain_of_segments, four_bars_in_a_row as four_bars_in_a_row
 from paraflex.mechanism.segments import (
-    FIRST_END,
-    LAST_END,
-    Segmented,
-    check_segmentable,
-    finite_segments,
-    is_hinge,
-    proportional_segments,
+    FIRST_END as FIRST_END,
+    LAST_END as LAST_END,
+    Segmented as Segmented,
+    check_segmentable as check_segmentable,
+    finite_segments as finite_segments,
+    is_hinge as is_hinge,
+    proportional_segments as proportional_segments,
 )
-from paraflex.mechanism.start import BodyValues, Deflection, Start, check_start
-
-__all__ = [
-    "FIRST_END",
-    "GROUND",
-    "JOINT_KINDS",
-    "LAST_END",
-    "ActuationMode",
-    "AngleLaw",
-    "AppliedTorque",
-    "Assembly",
-    "AssumedModesBeam",
-    "AtEnd",
-    "Body",
-    "BodyValues",
-    "ConstantSpeed",
-    "Curvature",
-    "Damping",
-    "Deflection",
-    "EndEffector",
-    "FlexibleBeam",
-    "Gear",
-    "Geometry",
-    "Group",
-    "Joint",
-    "JointFriction",
-    "LinearSpring",
-    "Load",
-    "LossFactor",
-    "LumpedMass",
-    "Material",
-    "Mechanism",
-    "ModalBody",
-    "ModalDamping",
-    "ModalPoint",
-    "Motor",
-    "PiecewiseLaw",
-    "PointForce",
-    "PointRef",
-    "Polynomial",
-    "Pose",
-    "PrescribedAngle",
-    "PrismaticJoint",
-    "RayleighDamping",
-    "RevoluteJoint",
-    "RigidBody",
-    "SampledAngle",
-    "Section",
-    "Segmented",
-    "ShapeFunction",
-    "Sine",
-    "SlidingJoint",
-    "SlotJoint",
-    "Start",
-    "TabulatedLaw",
-    "TorsionalDamper",
-    "TorsionalSpring",
-    "WeldJoint",
-    "approximate_poses",
-    "chain_of_segments",
-    "check_mechanism",
-    "check_segmentable",
-    "check_start",
-    "finite_segments",
-    "four_bars_in_a_row",
-    "given_shapes",
-    "grouped",
-    "groups_of",
-    "is_hinge",
-    "joints_named",
-    "loops",
-    "mode_of_motors",
-    "mode_of_signs",
-    "parse_mode",
-    "placed_poses",
-    "points_named",
-    "proportional_segments",
-    "raparm_i",
-    "stiffness_proportional",
-]
+from paraflex.mechanism.start import (
+    BodyValues as BodyValues,
+    Deflection as Deflection,
+    Start as Start,
+    check_start as check_start,
+)

@@ -17,7 +17,7 @@ from paraflex.results.following import KEPT, ErrorSpan, Part, metric_variables, 
 from paraflex.results.labelled import Variables, label, link_coordinates, link_variables, padded, provenance
 from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
 from paraflex.results.validity import validity_variables
-from paraflex.simulate import TrackingRun
+from paraflex.tracking import TrackingRun
 from paraflex.validity import doubtful_numbers
 
 

@@ -14,7 +14,7 @@ from paraflex.motion import MotionRun
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import deflections
 from paraflex.results.run_traces import run_traces
-from paraflex.simulate import TrackingRun
+from paraflex.tracking import TrackingRun
 
 # Points listed one by one.
 _MOST = 20

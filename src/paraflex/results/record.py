@@ -13,7 +13,7 @@ from paraflex.arguments import given_as
 from paraflex.dynamics.points import PointMotion, point_motion
 from paraflex.findings import Finding
 from paraflex.results.links import Links, system_links
-from paraflex.simulate import TrackingRun, TrackingTask
+from paraflex.tracking import TrackingRun, TrackingTask
 from paraflex.validity import Validity
 
 # How a run went: names of the figures every record has.

@@ -12,7 +12,7 @@ from paraflex.dynamics.points import point_motion
 from paraflex.results.formulas import length
 from paraflex.results.outlines import deflections
 from paraflex.results.traces import Trace, Traces
-from paraflex.simulate import TrackingRun
+from paraflex.tracking import TrackingRun
 
 
 @dataclass(frozen=True)

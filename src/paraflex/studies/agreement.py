@@ -22,7 +22,7 @@ from paraflex.results.formulas import rms
 from paraflex.results.metrics import METRICS
 from paraflex.results.record import Record
 from paraflex.results.traces import Traces
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 from paraflex.validity import doubtful_numbers
 
 

@@ -16,7 +16,7 @@ from paraflex.errors import IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution, check_times
 from paraflex.mechanism import ActuationMode, Mechanism, PointRef
 from paraflex.motion import MotionRun, simulate_motion
-from paraflex.simulate import TrackingRun, TrackingTask, simulate
+from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 Progress = Callable[[float], None]
 

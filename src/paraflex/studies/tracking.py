@@ -21,7 +21,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import summary, tracking_dataset
 from paraflex.results.following import ErrorSpan
-from paraflex.simulate import TrackingRun, TrackingTask, simulate
+from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 
 class Simulator(Protocol):

@@ -26,8 +26,8 @@ from paraflex.mechanism import (
 )
 from paraflex.results.following import ErrorSpan
 from paraflex.results.record import Record, record
-from paraflex.simulate import TrackingTask, simulate
 from paraflex.studies.agreement import ModelRuns, Refinement, Verification
+from paraflex.tracking import TrackingTask, simulate
 
 FIDELITIES = ("rigid", "ked", "linear", "second-order", "segments")
 

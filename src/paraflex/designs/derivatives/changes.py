@@ -37,7 +37,7 @@ from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
 from paraflex.kinematics.variation import MotionChange, Nearby, vary_motion
 from paraflex.mechanism import Mechanism, RigidBody
-from paraflex.simulate import TrackingTask, path_knots
+from paraflex.tracking import TrackingTask, path_knots
 
 Array = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ from paraflex.integrators.variation import (
 )
 from paraflex.results.run_traces import run_traces
 from paraflex.results.traces import Traces
-from paraflex.simulate import TrackingRun, simulate
+from paraflex.tracking import TrackingRun, simulate
 
 Array = NDArray[np.float64]
 

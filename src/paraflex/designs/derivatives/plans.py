@@ -18,7 +18,7 @@ from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
 from paraflex.integrators.variation import check_differentiable
-from paraflex.simulate import TrackingTask
+from paraflex.tracking import TrackingTask
 
 Array = NDArray[np.float64]
 
