@@ -145,12 +145,13 @@ def apply_axes(p, q, v, a, lam, weights, torques, f, rows):
         if axis.row < 0:
             force = -torques[axis.signal]
         else:
-            force = lam[axis.row]
+            force = axis.weight * lam[axis.row]
             kind = p.rows[axis.row].kind
             if kind == CONSTRAINT:
-                rows[axis.row] += weights[0] * acceleration + weights[1] * rate + weights[2] * value
+                part = weights[0] * acceleration + weights[1] * rate + weights[2] * value
             else:
-                rows[axis.row] += value if kind == SPRING else rate
+                part = value if kind == SPRING else rate
+            rows[axis.row] += axis.weight * part
         apply_axis(p, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f)
 
 
@@ -158,23 +159,23 @@ def apply_axes(p, q, v, a, lam, weights, torques, f, rows):
 def axis_values(p, q, v, phi, dphi):
     """Add value and rate of the axes that are constraints to phi and dphi."""
     for k in range(p.axes.size):
-        row = p.axes[k].row
+        row, weight = p.axes[k].row, p.axes[k].weight
         if row >= 0:
             if p.rows[row].kind == CONSTRAINT:
                 value, rate, _, _, _, _, _, _, _, _, _ = axis_motion(p, k, q, v, v)
-                phi[row] += value
-                dphi[row] += rate
+                phi[row] += weight * value
+                dphi[row] += weight * rate
 
 
 @routine
 def fill_axis_rows(p, q, jacobian):
     """Rows of the axes that are constraints into a dense Jacobian."""
     for k in range(p.axes.size):
-        row = p.axes[k].row
+        row, weight = p.axes[k].row, p.axes[k].weight
         if row >= 0:
             if p.rows[row].kind == CONSTRAINT:
                 _, _, _, ex, ey, lever, rax, ray, rbx, rby, x = axis_motion(p, k, q, q, q)
-                apply_axis(p, k, q, 1.0, ex, ey, lever, rax, ray, rbx, rby, x, jacobian[row])
+                apply_axis(p, k, q, weight, ex, ey, lever, rax, ray, rbx, rby, x, jacobian[row])
 
 
 @routine

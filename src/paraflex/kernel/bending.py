@@ -225,9 +225,9 @@ def note_axial_forces(p, i, q, v, a, lam, ws, points, geometric):
         if port.kind == ANGLE or bending < 0:
             continue
         if port.kind == AXIS:
-            force = port.sign * lam[port.row] * (c * ws.axes[port.axis, 0] + s * ws.axes[port.axis, 1])
+            force = port.weight * lam[port.row] * (c * ws.axes[port.axis, 0] + s * ws.axes[port.axis, 1])
         else:
-            force = port.sign * (c * lam[port.row] + s * lam[port.row + 1])
+            force = port.weight * (c * lam[port.row] + s * lam[port.row + 1])
         for l in range(n):
             for d in range(n):
                 geometric[at + l * n + d] -= force * p.bending[bending + l * body.stride + d]

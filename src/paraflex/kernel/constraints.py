@@ -39,19 +39,19 @@ def constraint_values(p, signals, t, q, v, scratch, phi, dphi):
         body_sums(p, i, q, v, v, scratch)
         for k in range(p.bodies[i].port, p.bodies[i].port_end):
             port = p.ports[k]
-            r, sign = port.row, port.sign
+            r, weight = port.row, port.weight
             if p.rows[r].kind != CONSTRAINT or port.kind == AXIS:
                 continue
             if port.kind == ANGLE:
                 angle, rate, _ = angle_by_sums(p, p.markers[port.marker], q, v, v, scratch)
-                phi[r] += sign * angle
-                dphi[r] += sign * rate
+                phi[r] += weight * angle
+                dphi[r] += weight * rate
             else:
                 px, py, vx, vy, _, _, _, _ = motion_by_sums(p, p.markers[port.marker], q, v, v, scratch)
-                phi[r] += sign * px
-                phi[r + 1] += sign * py
-                dphi[r] += sign * vx
-                dphi[r + 1] += sign * vy
+                phi[r] += weight * px
+                phi[r + 1] += weight * py
+                dphi[r] += weight * vx
+                dphi[r + 1] += weight * vy
     axis_values(p, q, v, phi, dphi)
 
 
@@ -66,11 +66,11 @@ def fill_jacobian(p, q, jacobian):
         if p.rows[port.row].kind != CONSTRAINT:
             continue
         if port.kind == ANGLE:
-            apply_torque(p, marker, port.sign, jacobian[port.row])
+            apply_torque(p, marker, port.weight, jacobian[port.row])
         elif port.kind != AXIS:
             _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
-            apply_force(p, marker, q, port.sign, 0.0, rx, ry, jacobian[port.row])
-            apply_force(p, marker, q, 0.0, port.sign, rx, ry, jacobian[port.row + 1])
+            apply_force(p, marker, q, port.weight, 0.0, rx, ry, jacobian[port.row])
+            apply_force(p, marker, q, 0.0, port.weight, rx, ry, jacobian[port.row + 1])
     fill_axis_rows(p, q, jacobian)
 
 
@@ -92,12 +92,12 @@ def joint_rates(p, q, v, rates):
     for k in range(p.ports.size):
         port = p.ports[k]
         if port.kind == ANGLE and damped(p.rows[port.row].kind):
-            rates[port.row] += port.sign * marker_angle(p, p.markers[port.marker], v)
+            rates[port.row] += port.weight * marker_angle(p, p.markers[port.marker], v)
     for k in range(p.axes.size):
         row = p.axes[k].row
         if row >= 0:
             if damped(p.rows[row].kind):
-                rates[row] = axis_motion(p, k, q, v, v)[1]
+                rates[row] += p.axes[k].weight * axis_motion(p, k, q, v, v)[1]
     return True
 
 

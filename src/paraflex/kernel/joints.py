@@ -352,15 +352,15 @@ def add_joints(p, i, q, v, a, lam, weights, scratch, f, rows):
     for k in range(body.port, body.port_end):
         port = p.ports[k]
         marker = p.markers[port.marker]
-        r, sign, x = port.row, port.sign, marker.column
+        r, weight, x = port.row, port.weight, marker.column
         if port.kind == ANGLE:
-            rows[r] += sign * angle_part(p.rows[r].kind, weights, angle_by_sums(p, marker, q, v, a, scratch))
-            share_torque(p, marker, sign * lam[r], scratch, f)
+            rows[r] += weight * angle_part(p.rows[r].kind, weights, angle_by_sums(p, marker, q, v, a, scratch))
+            share_torque(p, marker, weight * lam[r], scratch, f)
         elif port.kind != AXIS:
             px, py, vx, vy, ax, ay, rx, ry = motion_by_sums(p, marker, q, v, a, scratch)
-            rows[r] += sign * (weights[0] * ax + weights[1] * vx + weights[2] * px)
-            rows[r + 1] += sign * (weights[0] * ay + weights[1] * vy + weights[2] * py)
-            fx, fy = sign * lam[r], sign * lam[r + 1]
+            rows[r] += weight * (weights[0] * ax + weights[1] * vx + weights[2] * px)
+            rows[r + 1] += weight * (weights[0] * ay + weights[1] * vy + weights[2] * py)
+            fx, fy = weight * lam[r], weight * lam[r + 1]
             bx, by = c * fx + s * fy, c * fy - s * fx
             f[o] += fx
             f[o + 1] += fy

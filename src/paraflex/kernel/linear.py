@@ -29,17 +29,18 @@ INDEPENDENT = 1e-3
 def share(ws, port, r, part, c, s):
     """What one part of a port, in the body frame, gives to its constraint row r; c and s turn that frame."""
     if port.kind == ANGLE:
-        return port.sign
+        return port.weight
     if port.kind == POINT:
         if r == part:
-            return port.sign * c
-        return port.sign * s if r == 1 else -port.sign * s
+            return port.weight * c
+        return port.weight * s if r == 1 else -port.weight * s
     ex, ey = ws.axes[port.axis, 0], ws.axes[port.axis, 1]
     if part == 0:
-        return port.sign * (c * ex + s * ey)
+        return port.weight * (c * ex + s * ey)
     if part == 1:
-        return port.sign * (c * ey - s * ex)
-    return ws.axes[port.axis, 2] if part == 2 else -1.0
+        return port.weight * (c * ey - s * ex)
+    # Only the end that carries the axis has more parts; its weight is that of the axis, less.
+    return -port.weight * ws.axes[port.axis, 2] if part == 2 else port.weight
 
 
 @inlined
@@ -47,6 +48,12 @@ def add_entry(p, ws, row, column, value):
     """Add to an entry of the Schur complement, by its lower half."""
     high, low = max(row, column), min(row, column)
     ws.schur[p.rows[high].start + low - p.rows[high].first] += value
+
+
+@inlined
+def add_pair_entry(p, ws, row, column, same, value):
+    """Add what two ports give to an entry; to a diagonal one two ports that are not the same give it both ways."""
+    add_entry(p, ws, row, column, value if same or row != column else 2.0 * value)
 
 
 @routine
@@ -59,7 +66,7 @@ def add_axis_pair(p, ws, body, port, other, same, c, s):
                 for y in range(other.parts):
                     at = body.block + (port.local + x) * body.lanes + other.local + y
                     value += share(ws, port, r, x, c, s) * ws.blocks[at] * share(ws, other, q, y, c, s)
-            add_entry(p, ws, port.row + r, other.row + q, value)
+            add_pair_entry(p, ws, port.row + r, other.row + q, same, value)
 
 
 @inlined
@@ -74,7 +81,7 @@ def add_schur(p, i, ws):
             if port.kind == AXIS or other.kind == AXIS:
                 add_axis_pair(p, ws, body, port, other, l == k, c, s)
                 continue
-            sign = port.sign * other.sign
+            weight = port.weight * other.weight
             at = body.block + port.local * body.lanes + other.local
             # A 2 x 2 block, of which an angle's row or column is missing.
             b00, b01, b10, b11 = ws.blocks[at], 0.0, 0.0, 0.0
@@ -92,7 +99,7 @@ def add_schur(p, i, ws):
             for r in range(port.rows):
                 for q in range(other.rows if l < k else r + 1):
                     value = (b00 if q == 0 else b01) if r == 0 else (b10 if q == 0 else b11)
-                    add_entry(p, ws, port.row + r, other.row + q, sign * value)
+                    add_pair_entry(p, ws, port.row + r, other.row + q, l == k, weight * value)
 
 
 @routine
@@ -216,7 +223,7 @@ def add_lanes(p, i, ws, scale, spring_scale, damper_scale, rows):
         port = p.ports[k]
         kind, x = p.rows[port.row].kind, port.local
         kind_scale = scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else damper_scale)
-        factor = port.sign * kind_scale
+        factor = port.weight * kind_scale
         if port.kind == ANGLE:
             rows[port.row] += factor * lanes[x]
         elif port.kind == AXIS:
@@ -243,12 +250,12 @@ def reactions(p, i, ws, mu):
         port = p.ports[k]
         x = port.local
         if port.kind == ANGLE:
-            lanes[x] = -port.sign * mu[port.row]
+            lanes[x] = -port.weight * mu[port.row]
         elif port.kind == AXIS:
             for part in range(port.parts):
                 lanes[x + part] = -mu[port.row] * share(ws, port, 0, part, c, s)
         else:
-            fx, fy = port.sign * mu[port.row], port.sign * mu[port.row + 1]
+            fx, fy = port.weight * mu[port.row], port.weight * mu[port.row + 1]
             lanes[x], lanes[x + 1] = -(c * fx + s * fy), s * fx - c * fy
     for x in range(body.parts, body.lanes):
         lanes[x] = 0.0

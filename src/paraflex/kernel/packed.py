@@ -1,8 +1,8 @@
 """Layout of what the kernels read (`PackedSystem`, `Signals`) and write (`Workspace`).
 
 One record a body, port, marker, effort and constraint row; flat arrays for what has a length of its own. A *marker*
-is a material point of a body with its shape rows; a *port* is one side of a joint on a moving body; an *effort* is
-one side of a motor.
+is a material point of a body with its shape rows; a constraint row is a weighted sum over *ports*, each an end on a
+moving body, of which several may be on one body; an *effort* is one side of a motor.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ PORT = np.dtype(
         ("parts", np.int64),
         ("local", np.int64),  # first of them among those of its body
         ("axis", np.int64),  # which axis it is an end of, -1 for none
-        ("sign", np.float64),  # +1 on side b of the joint, -1 on side a
+        # What its contribution to the row is multiplied by: of a joint +1 on side b, -1 on side a.
+        ("weight", np.float64),
     ],
     align=True,
 )
@@ -137,6 +138,7 @@ AXIS_RECORD = np.dtype(
         ("by", np.float64),
         ("angle", np.float64),  # of the axis against the marker that carries it
         ("row", np.int64),  # -1 for a motor's
+        ("weight", np.float64),  # what its value is multiplied by in that row
         ("signal", np.int64),  # of the motor, else -1
         ("track", np.int64),  # the deflection that a sliding point follows, -1 for none
     ],

@@ -53,17 +53,17 @@ def joints_tangent(p, i, weights, q, v, a, lam, d):
     for k in range(body.port, body.port_end):
         port = p.ports[k]
         marker = p.markers[port.marker]
-        r, sign = port.row, port.sign
+        r, weight = port.row, port.weight
         if port.kind == ANGLE:
-            d.rows[r] += sign * angle_row(p, marker, p.rows[r].kind, weights, d.q, d.v, d.a)
-            apply_torque(p, marker, sign * d.lam[r], d.f)
+            d.rows[r] += weight * angle_row(p, marker, p.rows[r].kind, weights, d.q, d.v, d.a)
+            apply_torque(p, marker, weight * d.lam[r], d.f)
         elif port.kind != AXIS:
             _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, v, a)
             px, py, vx, vy, ax, ay, d_rx, d_ry = marker_tangent(p, marker, q, v, a, d)
-            d.rows[r] += sign * (weights[0] * ax + weights[1] * vx + weights[2] * px)
-            d.rows[r + 1] += sign * (weights[0] * ay + weights[1] * vy + weights[2] * py)
-            force = (sign * lam[r], sign * lam[r + 1])
-            change = (sign * d.lam[r], sign * d.lam[r + 1])
+            d.rows[r] += weight * (weights[0] * ax + weights[1] * vx + weights[2] * px)
+            d.rows[r + 1] += weight * (weights[0] * ay + weights[1] * vy + weights[2] * py)
+            force = (weight * lam[r], weight * lam[r + 1])
+            change = (weight * d.lam[r], weight * d.lam[r + 1])
             force_tangent(p, marker, q, force, change, (rx, ry), (d_rx, d_ry), d)
 
 

@@ -124,12 +124,13 @@ def axes_tangent(p, weights, q, v, a, lam, torques, d):
         if axis.row < 0:
             force = -torques[axis.signal]
         else:
-            force, d_force = lam[axis.row], d.lam[axis.row]
+            force, d_force = axis.weight * lam[axis.row], axis.weight * d.lam[axis.row]
             kind = p.rows[axis.row].kind
             if kind == CONSTRAINT:
-                d.rows[axis.row] += weights[0] * acceleration + weights[1] * rate + weights[2] * value
+                part = weights[0] * acceleration + weights[1] * rate + weights[2] * value
             else:
-                d.rows[axis.row] += value if kind == SPRING else rate
+                part = value if kind == SPRING else rate
+            d.rows[axis.row] += axis.weight * part
         fx, fy = force * ex, force * ey
         d_fx, d_fy = d_force * ex + force * d_ex, d_force * ey + force * d_ey
         if axis.b >= 0:

@@ -14,6 +14,7 @@ from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
+from paraflex.mechanism.phases import with_phases
 from paraflex.mechanism.quantities import known
 
 
@@ -39,6 +40,8 @@ class Mechanism(Members, Shown):
     frictions : tuple of JointFriction
     linear_springs : tuple of LinearSpring
     loads : tuple of PointForce or AppliedTorque
+    gears : tuple of Gear
+        Each with its phase.
     gravity : (x, y)
         Acceleration of free fall in the ground frame [m/s^2]; none by default.
     end_effector : EndEffector, optional
@@ -60,6 +63,7 @@ class Mechanism(Members, Shown):
         super().__post_init__()
         object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
+        object.__setattr__(self, "gears", with_phases(self))
 
     def save(self, path: str | Path) -> None:
         """Write the model file of this mechanism, from which `load` reads an equal one; see `Model.save`."""

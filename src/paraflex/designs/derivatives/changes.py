@@ -248,8 +248,7 @@ class Change:
             times=part(sampled.times), gains=gains,
         )  # fmt: skip
         system = replace(self.system, packed=problem.system.packed)
-        motion = replace(sampled.motion, path=sampled.path, t=sampled.times)
-        task = replace(self.planned, mechanism=self.planned.mechanism, system=system, motion=motion)
+        task = replace(self.planned, mechanism=self.planned.mechanism, system=system, motion=sampled.with_step())
         error = max(self.stepped.error, _relative(signals, numbers_of(problem.signals)))
         condition = _condition(nominal.condition, sampled, nominal.torques)
         return ModeChange(direction, task, torques, condition, error)
@@ -325,6 +324,11 @@ class _Planned:
     path: KnownPath
     times: NDArray
     change: MotionChange
+
+    def with_step(self) -> RigidMotion:
+        """The motion with a complex step: what of it is no task coordinate is desired as it comes."""
+        changes = {name: stepped(getattr(self.motion, name), getattr(self.change, name)) for name in ("q", "v", "a")}
+        return replace(self.motion, system=self.owner.rigid, path=self.path, t=self.times, **changes)
 
     @cached_property
     def d_effort(self) -> tuple[Array, Array]:
