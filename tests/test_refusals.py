@@ -13,8 +13,8 @@ import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.fem import mesh_beam
 from paraflex.integrators.run import make_problem
+from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
-from paraflex.integrators.variation import check_differentiable
 from paraflex.motion import simulate_motion
 from paraflex.plots.designs import read_designs
 from paraflex.plots.driving import mode_conditions

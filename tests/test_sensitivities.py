@@ -20,7 +20,7 @@ from paraflex.dynamics import State, build_system, constant_signals, numbers_of,
 from paraflex.errors import InputError, NumericalError
 from paraflex.fem import modal_basis
 from paraflex.integrators import IntegrationOptions, make_problem
-from paraflex.integrators.variation import Direction, run_derivatives
+from paraflex.integrators.sensitivity import Direction, run_derivatives
 from paraflex.mechanism import Mechanism, PointRef, RevoluteJoint, RigidBody, TorsionalSpring, raparm_i
 from paraflex.plots import elasticities
 from paraflex.results.run_traces import run_traces

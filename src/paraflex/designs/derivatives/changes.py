@@ -29,13 +29,13 @@ from paraflex.dynamics import (
 )
 from paraflex.errors import InputError, ParaflexError
 from paraflex.integrators.run import make_problem
-from paraflex.integrators.variation import Direction
+from paraflex.integrators.sensitivity import Direction
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
 from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
-from paraflex.kinematics.variation import MotionChange, Nearby, vary_motion
+from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
 from paraflex.mechanism import Mechanism, RigidBody
 from paraflex.tracking import TrackingTask, path_knots
 
@@ -192,7 +192,7 @@ class Change:
     def plan(self, motion: RigidMotion, effort: Effort, d_times: Array) -> _Planned:
         """A planned motion whose times move."""
         path = self.known_path(stepped(motion.t, d_times))
-        change = vary_motion(self.closure, motion, self._nearby(motion, d_times, path))
+        change = motion_sensitivity(self.closure, motion, self._nearby(motion, d_times, path))
         return _Planned(self, motion, effort, path, stepped(motion.t, d_times), change)
 
     def known_path(self, times: NDArray) -> KnownPath:

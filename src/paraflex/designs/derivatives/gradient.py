@@ -17,8 +17,7 @@ from paraflex.designs.run import Task, plan_task
 from paraflex.designs.setting import Setting
 from paraflex.dynamics import numbers_of, with_numbers
 from paraflex.errors import InputError, Moment, NumericalError
-from paraflex.integrators.solution import Solution
-from paraflex.integrators.variation import (
+from paraflex.integrators.sensitivity import (
     Direction,
     Motion,
     RunDerivatives,
@@ -26,6 +25,7 @@ from paraflex.integrators.variation import (
     energies,
     run_derivatives,
 )
+from paraflex.integrators.solution import Solution
 from paraflex.results.run_traces import run_traces
 from paraflex.results.traces import Traces
 from paraflex.tracking import TrackingRun, simulate
