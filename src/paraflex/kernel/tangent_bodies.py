@@ -13,6 +13,24 @@ W0, W1, W2, AXIAL, DW0, DW1, DW2, DAXIAL = range(8)
 
 
 @inlined
+def plane_sums(shapes, x, y, first, n, e, u, d_u):
+    """Sums of n coordinates from e on by rows x and y of a table of shapes, from column `first` on: of u and of d_u.
+
+    Returns
+    -------
+    (x, y), (d_x, d_y) : floats
+    """
+    along, across, d_along, d_across = 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        Nx, Ny = shapes[x, first + j], shapes[y, first + j]
+        along += Nx * u[e + j]
+        across += Ny * u[e + j]
+        d_along += Nx * d_u[e + j]
+        d_across += Ny * d_u[e + j]
+    return (along, across), (d_along, d_across)
+
+
+@inlined
 def body_tangent(system, i, q, v, a, direction):
     """Change of M q'' + h + D u' + K u of body i, less its weight, into d.f: see `bodies.body_equations`."""
     body = system.bodies[i]
@@ -25,24 +43,15 @@ def body_tangent(system, i, q, v, a, direction):
     ax, ay = c * gx + s * gy, c * gy - s * gx
     d_ax = c * direction.a[o] + s * direction.a[o + 1] + turn * ay
     d_ay = c * direction.a[o + 1] - s * direction.a[o] - turn * ax
-    sx, sy, vx, vy, fx, fy, i1u, i1v = body.S1x, body.S1y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    d_sx, d_sy, d_vx, d_vy, d_fx, d_fy, d_i1u, d_i1v = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    (ux, uy), (d_sx, d_sy) = plane_sums(system.modal, S2X, S2Y, k, n, e, q, direction.q)
+    (vx, vy), (d_vx, d_vy) = plane_sums(system.modal, S2X, S2Y, k, n, e, v, direction.v)
+    (fx, fy), (d_fx, d_fy) = plane_sums(system.modal, S2X, S2Y, k, n, e, a, direction.a)
+    sx, sy = body.S1x + ux, body.S1y + uy
+    i1u, i1v, d_i1u, d_i1v = 0.0, 0.0, 0.0, 0.0
     for j in range(n):
-        S2x, S2y, i1 = system.modal[S2X, k + j], system.modal[S2Y, k + j], system.modal[I1, k + j]
-        sx += S2x * q[e + j]
-        sy += S2y * q[e + j]
-        vx += S2x * v[e + j]
-        vy += S2y * v[e + j]
-        fx += S2x * a[e + j]
-        fy += S2y * a[e + j]
+        i1 = system.modal[I1, k + j]
         i1u += i1 * q[e + j]
         i1v += i1 * v[e + j]
-        d_sx += S2x * direction.q[e + j]
-        d_sy += S2y * direction.q[e + j]
-        d_vx += S2x * direction.v[e + j]
-        d_vy += S2y * direction.v[e + j]
-        d_fx += S2x * direction.a[e + j]
-        d_fy += S2y * direction.a[e + j]
         d_i1u += i1 * direction.q[e + j]
         d_i1v += i1 * direction.v[e + j]
     uI2u, d_uI2u, d_uI2v, uI2v, d_mpf_a = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -128,22 +137,10 @@ def second_order_tangent(system, i, q, v, a, direction, points):
     for k in range(body.mass, body.mass_end):
         point = system.masses[k]
         h = point.shape
-        sx, sy, vx, vy, bx, by = point.x, 0.0, 0.0, 0.0, 0.0, 0.0
-        d_sx, d_sy, d_vx, d_vy, d_bx, d_by = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for l in range(n):
-            Nx, Ny = system.mass_shape[NX, h + l], system.mass_shape[NY, h + l]
-            sx += Nx * q[e + l]
-            sy += Ny * q[e + l]
-            vx += Nx * v[e + l]
-            vy += Ny * v[e + l]
-            bx += Nx * a[e + l]
-            by += Ny * a[e + l]
-            d_sx += Nx * direction.q[e + l]
-            d_sy += Ny * direction.q[e + l]
-            d_vx += Nx * direction.v[e + l]
-            d_vy += Ny * direction.v[e + l]
-            d_bx += Nx * direction.a[e + l]
-            d_by += Ny * direction.a[e + l]
+        (ux, sy), (d_sx, d_sy) = plane_sums(system.mass_shape, NX, NY, h, n, e, q, direction.q)
+        (vx, vy), (d_vx, d_vy) = plane_sums(system.mass_shape, NX, NY, h, n, e, v, direction.v)
+        (bx, by), (d_bx, d_by) = plane_sums(system.mass_shape, NX, NY, h, n, e, a, direction.a)
+        sx = point.x + ux
         for j in range(point.reach):
             weight = system.mass_weights[point.weights + j]
             s0, s1, s2 = points[W0, j], points[W1, j], points[W2, j]
