@@ -15,6 +15,7 @@ from paraflex.actuation import feed_forward
 from paraflex.campaign import Workers
 from paraflex.checks import check_planned
 from paraflex.designs.derivatives import changes, gradient
+from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import State, build_system
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.files.library import library_text
@@ -25,7 +26,6 @@ from paraflex.plots.designs import DesignTable
 from paraflex.plots.responses import pareto_front
 from paraflex.report.page import plotly_script
 from paraflex.studies import load_sensitivities, load_sweep, motion_case, sensitivities, sweep
-from paraflex.studies.sweeps import Task, run_task
 from paraflex.tracking import simulate
 
 SWEEP = """
