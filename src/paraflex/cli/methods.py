@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
-from rich import box
-from rich.table import Table
-
 from paraflex.cli.commands.models import MethodsRequest
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import plain_console, plain_table
 from paraflex.integrators import DEFAULT_METHOD, METHODS, Method
 
 
@@ -21,14 +17,16 @@ def methods_command(request: MethodsRequest) -> None:
         print(json.dumps([_figures(method) for method in METHODS.values()], indent=2))
         return
     out = plain_console()
-    out.print(_table("methods of integration", ("name", "title", "form", "order", "steps", "constraints"),
-                     map(_row, METHODS.values())))  # fmt: skip
+    heads = ("name", "title", "form", "order", "steps", "constraints")
+    rows = map(_row, METHODS.values())
+    out.print(plain_table(*heads, rows=rows, title="methods of integration", wrapped=("title", "form")))
     parameters = (
         [method.name, name, f"{one.default:g}", f"{one.low:.4g} to {one.high:.4g}", one.meaning]
         for method in METHODS.values()
         for name, one in method.parameters.items()
     )
-    out.print(_table("their parameters", ("method", "parameter", "default", "range", "meaning"), parameters))
+    heads = ("method", "parameter", "default", "range", "meaning")
+    out.print(plain_table(*heads, rows=parameters, title="their parameters", wrapped=heads[2:]))
     out.print(f"The default is {DEFAULT_METHOD}; of what keeps the constraints, the first.")
 
 
@@ -42,15 +40,6 @@ def _row(method: Method) -> list[str]:
         "\n".join(how for how, possible in steps.items() if possible),
         "\n".join(treatment.value for treatment in method.treatments),
     ]
-
-
-def _table(title: str, headings: tuple[str, ...], rows: Iterable[list[str]]) -> Table:
-    table = Table(title=title, title_justify="left", box=box.SIMPLE, pad_edge=False, collapse_padding=True)
-    for heading in headings:
-        table.add_column(heading, no_wrap=heading in ("name", "method", "parameter", "constraints"))
-    for row in rows:
-        table.add_row(*row)
-    return table
 
 
 def _figures(method: Method) -> dict[str, Any]:

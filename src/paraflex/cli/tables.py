@@ -85,12 +85,16 @@ def _after_table(figures: dict[str, Any], task: TrackingTask) -> Table:
 
 
 def plain_table(
-    *texts: str, numbers: Iterable[str] = (), rows: Iterable[Iterable[str]] = (), title: str | None = None
+    *texts: str,
+    numbers: Iterable[str] = (),
+    rows: Iterable[Iterable[str]] = (),
+    title: str | None = None,
+    wrapped: Iterable[str] = (),
 ) -> Table:
-    """A table without frames: columns of text, then of numbers."""
+    """A table without frames: columns of text, of which some may be broken, then of numbers."""
     table = Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
     for heading in texts:
-        table.add_column(heading, no_wrap=True)
+        table.add_column(heading, no_wrap=heading not in wrapped)
     for heading in numbers:
         table.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
