@@ -106,7 +106,7 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
     return q
 
 
-def point_position(system: System, q: Array, ref) -> Array:
+def point_position(system: System, q: Array, ref: PointRef) -> Array:
     """Ground-frame position (2,) of a named point at q [m]."""
     marker = system.marker(ref)
     if ref.on_ground:
