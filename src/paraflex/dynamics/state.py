@@ -210,7 +210,7 @@ def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Ar
 @checked_arguments()
 def consistent_state(
     system: System,
-    assembly: Assembly | str | None,
+    assembly: str | Assembly | None,
     *,
     deflection: Mapping[str, Array] | None = None,
     velocity: Array | None = None,
