@@ -205,8 +205,8 @@ FIXED_AND_CONTROLLED = {
 
 def sensitivities() -> dict[str, Any]:
     """Exactness by the law of scale, and processor time of parameters in runs."""
+    from paraflex.designs.run import Task, run_task
     from paraflex.studies import load_sensitivities, sensitivities as differentiate
-    from paraflex.studies.sweeps import Task, run_task
 
     head = 'mechanism = "raparm_i"\npaths = ["line"]\nmodes = ["++++"]\nduration = 0.06\nsamples = 61\n'
     head += 'metrics = ["tracking_rms", "tracking_max"]\n[integration]\n'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from paraflex.mechanism import (
     Curvature,
     EndEffector,
     FlexibleBeam,
+    Gear,
     Geometry,
     LumpedMass,
     Material,
@@ -123,10 +125,24 @@ def linkage(condition):
     return build_system(make_linkage(condition))
 
 
-@pytest.fixture(scope="session", params=["RAParM-I", "linkage"])
-def system(request, raparm_system, linkage):
-    """Each of the two above."""
-    return {"RAParM-I": raparm_system, "linkage": linkage}[request.param]
+def make_geared_linkage(condition=ReferenceCondition.CANTILEVER):
+    """The linkage with gears: their rows have two ends on the crank, two on the coupler, and one each on two bodies."""
+    gears = (Gear("mesh", "O", "P", -1.7, 0.3), Gear("belt", "P", "R", 0.6, -0.2), Gear("far", "O", "S", 2.3, 0.1))
+    linkage = make_linkage(condition)
+    # With both prescribed angles the rows would depend on one another.
+    return replace(linkage, prescribed=linkage.prescribed[:1], gears=gears)
+
+
+@pytest.fixture(scope="session")
+def geared_linkage(condition):
+    """That of `make_geared_linkage` as a system, under each reference condition."""
+    return build_system(make_geared_linkage(condition))
+
+
+@pytest.fixture(scope="session", params=["RAParM-I", "linkage", "geared linkage"])
+def system(request, raparm_system, linkage, geared_linkage):
+    """Each of the three above."""
+    return {"RAParM-I": raparm_system, "linkage": linkage, "geared linkage": geared_linkage}[request.param]
 
 
 def make_five_bar(base=0.1, proximal=0.25, distal=0.25):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from paraflex.designs.run import FAILED, lost
-from paraflex.studies.sweeps import Outcome
+from paraflex.designs.run import FAILED, Outcome, lost
 
 STUDY = """
 mechanism = "raparm_i"

@@ -31,6 +31,7 @@ from paraflex.mechanism import (
     AtEnd,
     Curvature,
     FlexibleBeam,
+    Gear,
     Geometry,
     JointFriction,
     LossFactor,
@@ -112,6 +113,13 @@ def make_sliders(geometry=Geometry.LINEAR):
         springs=(TorsionalSpring("soft", "guide", 30.0, 0.1), TorsionalSpring("twist", "O", 3.0, 0.2)),
         dampers=(TorsionalDamper("oil", "rail", 2.0),),
         frictions=(JointFriction("dry", "pin", 4.0, 0.5), JointFriction("rub", "O", 0.3, 0.8)),
+        # Of travels and angles, with two ends on one body, of one kind and of two.
+        gears=(
+            Gear("lead", "guide", "slot", -0.4, 0.1),
+            Gear("rack", "O", "guide", 0.3, 0.05),
+            Gear("pinion", "bead", "O", 4.0, 0.2),
+            Gear("cable", "trolley", "pin", 0.7, 0.0),
+        ),
         geometry=geometry,
     )
 
@@ -185,6 +193,9 @@ def row_values(system, t, q):
         if hasattr(member, "law"):
             value = value - member.law.evaluate(np.array([t]))[0][0]
         out[f"{member.name} travel"] = out[f"{member.name} angle"] = value
+    for gear in mechanism.gears:
+        first, second = (coordinate(system, name, q) for name in gear.joints)
+        out[f"{gear.name} travel"] = out[f"{gear.name} angle"] = second - gear.ratio * first - gear.phase
     return np.array([out[row] for row in system.rows])
 
 
@@ -226,7 +237,8 @@ def test_rows_are_named_by_joint_and_what_they_hold(sliders):
     joints = ["O x", "O y", "guide normal", "guide angle", "slot normal", "weld x", "weld y", "weld angle"]
     joints += ["rail normal", "pin normal", "bead normal", "trolley normal"]
     others = ["drive travel", "soft travel", "twist angle", "oil travel", "dry travel", "rub angle"]
-    assert sorted(sliders.rows) == sorted(joints + others)
+    gears = ["lead travel", "rack travel", "pinion angle", "cable travel"]
+    assert sorted(sliders.rows) == sorted(joints + others + gears)
 
 
 def test_constraints_their_rate_and_jacobian(sliders):
@@ -572,19 +584,26 @@ def test_a_damped_cantilever_decays_by_its_ratio():
     assert run.solution.energy_balance_max < 2e-3 * np.max(run.solution.kinetic_energy)
 
 
-def test_everything_at_once_keeps_its_energy_balance():
-    mechanism = make_sliders()
+def sliders_put_together(geometry=Geometry.LINEAR):
+    """The sliders, their beams of nylon, in a closed pose in motion, with one gear that holds there."""
+    mechanism = make_sliders(geometry)
     nylon = Material(youngs_modulus=2e9, density=1100.0)
     mechanism = mechanism.with_bodies(replace(mechanism.body(name), material=nylon) for name in ("crank", "rod"))
+    free = build_system(replace(mechanism, gears=()))
+    q = np.zeros(free.n)
+    for name, turn in {"crank": 0.9, "rod": -0.4, "block": 1.1, "plate": -0.1}.items():
+        q[free.body(name).angle] = turn
+    q = project_position(free, twins.still_signals(free), 0.0, q)
+    phase = coordinate(free, "guide", q) - 0.3 * coordinate(free, "O", q)
+    mechanism = replace(mechanism, gears=(Gear("rack", "O", "guide", 0.3, phase),))
     system = build_system(mechanism)
-    q = np.zeros(system.n)
-    signals = twins.still_signals(system)
-    pose = {"crank": 0.9, "rod": -0.4, "block": 1.1, "plate": -0.1}
-    for name, turn in pose.items():
-        q[system.body(name).angle] = turn
-    q = project_position(system, signals, 0.0, q)
-    v = project_velocity(system, signals, 0.0, q, np.zeros(system.n), 1e3)
-    torques, start = {"screw": 0.5, "turn": 0.05, "push": 0.3}, State(0.0, q, v)
+    v = project_velocity(system, twins.still_signals(system), 0.0, q, np.zeros(system.n), 1e3)
+    return mechanism, State(0.0, q, v)
+
+
+def test_everything_at_once_keeps_its_energy_balance():
+    mechanism, start = sliders_put_together()
+    torques = {"screw": 0.5, "turn": 0.05, "push": 0.3}
     run = simulate_motion(mechanism, 0.2, samples=11, torques=torques, start=start, options=EXACT)
     solution = run.solution
     scale = np.max(solution.kinetic_energy + solution.strain_energy)

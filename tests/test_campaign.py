@@ -13,9 +13,9 @@ import pytest
 from journals import rows_in
 from paraflex.campaign import held, open_engine, outcomes, read_table, tables_of
 from paraflex.campaign.journal import JOURNAL, read_journal, write_journal
+from paraflex.designs.run import run_task
 from paraflex.errors import InputError, OutputError, ResultWarning
 from paraflex.studies import load_sweep, sweep
-from paraflex.studies.sweeps import run_task
 from paraflex.studies.sweeps.report import study_page
 
 STUDY = """
@@ -43,7 +43,7 @@ SLOWLY = """
 import sys, time
 
 from paraflex.studies import load_sweep, sweep
-from paraflex.studies.sweeps import run_task
+from paraflex.designs.run import run_task
 
 
 def slow(setting, task, watch=None):

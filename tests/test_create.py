@@ -70,6 +70,7 @@ def test_every_library_mechanism_is_sound_and_makes_a_template(name, tmp_path):
         "4rrr": 3,
         "andrews": 1,
         "four_bar": 0,
+        "geared_five_bar": 1,
         "pendulum": 1,
         "slider_crank": 1,
         "slider_crank_flexible": 0,

@@ -8,7 +8,7 @@ from paraflex.designs.derivatives.changes import Change
 from paraflex.designs.derivatives.plans import given, nominal_values, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
 from paraflex.designs.derivatives.steps import STEP, complex_step, part, with_fields
-from paraflex.designs.run import plan_task
+from paraflex.designs.run import Task, plan_task
 from paraflex.dynamics import build_system, numbers_of
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition, SpanProperties, beam_integrals, mesh_beam, modal_basis
@@ -17,7 +17,6 @@ from paraflex.fem.eigen import eigen_derivatives, eigenpairs
 from paraflex.kinematics import Circle, Line, Polygon
 from paraflex.mechanism import AssumedModesBeam, Material, Section, raparm_i
 from paraflex.studies import load_sensitivities, sensitivities
-from paraflex.studies.sweeps import Task
 
 STENCIL = STENCILS[0]
 SCALES = ("density", "modulus", "joint_mass", "joint_inertia", "end_mass", "end_inertia")

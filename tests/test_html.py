@@ -13,6 +13,7 @@ import xarray as xr
 
 import paraflex as pf
 from made_up import STUDY, made_up, write_study
+from paraflex.designs.sweep import SweepResult
 from paraflex.display import facts, table, written
 from paraflex.errors import IntegrationError
 from paraflex.integrators import IntegrationOptions
@@ -34,8 +35,9 @@ from paraflex.studies import (
     verify,
 )
 from paraflex.studies.html import identification_html, indices_html
-from paraflex.studies.optimisation import IdentificationResult, IndicesResult, Reached, Target
-from paraflex.studies.sweeps import SweepResult
+from paraflex.studies.optimisation.identify import IdentificationResult, Reached
+from paraflex.studies.optimisation.indices import IndicesResult
+from paraflex.studies.optimisation.objective import Target
 
 _EMPTY = {"circle", "path", "rect", "br", "polygon", "polyline"}
 EVIL = '<script>alert("x")</script> & co'

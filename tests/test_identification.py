@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from made_up import STUDY, made_up, write_study
+from paraflex.designs.run import Task, run_task
 from paraflex.errors import InputError
 from paraflex.plots import targets_reached
 from paraflex.studies import identify, load_identification
 from paraflex.studies.optimisation.confidence import confidence
 from paraflex.studies.optimisation.fit import residual_slopes
-from paraflex.studies.sweeps import Task, run_task
 from shell import paraflex
 
 TARGET = """

@@ -14,8 +14,6 @@ from paraflex.dynamics import (
     State,
     build_system,
     consistent_state,
-    project_position,
-    project_velocity,
     static_equilibrium,
 )
 from paraflex.fem import ReferenceCondition
@@ -26,7 +24,6 @@ from paraflex.mechanism import (
     Geometry,
     JointFriction,
     LinearSpring,
-    Material,
     Mechanism,
     Motor,
     PointForce,
@@ -44,7 +41,7 @@ from paraflex.mechanism import (
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, tracking_dataset
 from paraflex.tracking import simulate
-from test_axes import make_sliders
+from test_axes import sliders_put_together
 
 G, MASS, REACH = 9.81, 2.0, 0.3
 
@@ -138,15 +135,8 @@ def test_damper_and_friction_along_a_rail_brake_its_slider():
 @pytest.mark.parametrize("geometry", list(Geometry))
 def test_joint_loads_are_all_that_moves_rigid_bodies(geometry):
     """Newton's and Euler's laws for every rigid body in a mechanism with one of everything that slides."""
-    mechanism = make_sliders(geometry)
-    nylon = Material(youngs_modulus=2e9, density=1100.0)
-    mechanism = mechanism.with_bodies(replace(mechanism.body(name), material=nylon) for name in ("crank", "rod"))
+    mechanism, start = sliders_put_together(geometry)
     system = build_system(mechanism)
-    q, signals = np.zeros(system.n), twins.still_signals(system)
-    for name, turn in {"crank": 0.9, "rod": -0.4, "block": 1.1, "plate": -0.1}.items():
-        q[system.body(name).angle] = turn
-    q = project_position(system, signals, 0.0, q)
-    start = State(0.0, q, project_velocity(system, signals, 0.0, q, np.zeros(system.n), 1e3))
     run = simulate_motion(
         # At both ends accelerations are not interpolated; at the last, Newton's iteration has left a residual.
         mechanism, 0.02, samples=2, torques={"screw": 0.5, "turn": 0.05, "push": 0.3, "pull": 0.2}, start=start,

@@ -39,6 +39,7 @@ def law_of_rows(system, t):
 def test_every_joint_and_prescribed_angle_has_its_rows(system):
     expected = [f"{joint.name} {axis}" for joint in system.mechanism.joints for axis in "xy"]
     expected += [f"{prescribed.name} angle" for prescribed in system.mechanism.prescribed]
+    expected += [f"{gear.name} angle" for gear in system.mechanism.gears]
     assert sorted(system.rows) == sorted(expected)
 
 

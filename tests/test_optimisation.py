@@ -15,7 +15,9 @@ import pytest
 import paraflex as pf
 from journals import rows_in
 from made_up import STUDY, made_up, write_study
+from paraflex.campaign import open_engine
 from paraflex.campaign.journal import write_journal
+from paraflex.designs.run import run_task
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_names, load_data
 from paraflex.files.document import document_text
@@ -24,7 +26,6 @@ from paraflex.studies import load_optimisation, optimise
 from paraflex.studies.optimisation.evaluate import Evaluate
 from paraflex.studies.optimisation.problem import DesignProblem
 from paraflex.studies.optimisation.slopes import differences, slopes_of
-from paraflex.studies.sweeps import open_engine, run_task
 from shell import paraflex
 
 OBJECTIVE = """

@@ -58,7 +58,7 @@ def test_a_run_that_collapses_is_given_up_and_one_that_recovers_is_not():
 @pytest.mark.parametrize("name", ["andrews", "spin_up", "pendulum"])
 def test_healthy_motions_end(name):
     model = load(name)
-    solution = simulate_motion(model.mechanism, model.study.duration, samples=11, warning=False).solution
+    solution = simulate_motion(model.mechanism, model.study.duration, samples=11).solution
     assert solution.status == "complete"
     # Not even a tenth of what a run's pace is taken of.
     assert solution.steps < 5_000

@@ -15,17 +15,17 @@ from paraflex.actuation import feed_forward
 from paraflex.campaign import Workers
 from paraflex.checks import check_planned
 from paraflex.designs.derivatives import changes, gradient
+from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import State, build_system
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.files.library import library_text
-from paraflex.integrators import variation
+from paraflex.integrators import sensitivity
 from paraflex.mechanism import Material, ModalBody, ModalPoint, PointRef, RigidBody, SlidingJoint, parse_mode
 from paraflex.motion import simulate_motion
 from paraflex.plots.designs import DesignTable
 from paraflex.plots.responses import pareto_front
 from paraflex.report.page import plotly_script
 from paraflex.studies import load_sensitivities, load_sweep, motion_case, sensitivities, sweep
-from paraflex.studies.sweeps import Task, run_task
 from paraflex.tracking import simulate
 
 SWEEP = """
@@ -97,7 +97,7 @@ def differentiated(tmp_path):
 
 
 def test_derivatives_where_there_are_none(differentiated, monkeypatch):
-    monkeypatch.setattr(variation, "_LARGEST_RESIDUAL", -1.0)
+    monkeypatch.setattr(sensitivity, "_LARGEST_RESIDUAL", -1.0)
     with pytest.raises(IntegrationError, match="the equations of a step cannot be solved to rounding") as caught:
         sensitivities(differentiated)
     assert caught.value.remedy == "choose a finer tolerance, or take derivatives by differences"

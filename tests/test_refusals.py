@@ -13,8 +13,8 @@ import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.fem import mesh_beam
 from paraflex.integrators.run import make_problem
+from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
-from paraflex.integrators.variation import check_differentiable
 from paraflex.motion import simulate_motion
 from paraflex.plots.designs import read_designs
 from paraflex.plots.driving import mode_conditions
@@ -145,7 +145,7 @@ def test_a_mesh_needs_a_length():
 def test_modules_name_what_they_do_not_have(module):
     from importlib import import_module
 
-    with pytest.raises(AttributeError, match=f"module '{module}' has no attribute 'animals'"):
+    with pytest.raises(AttributeError, match=f"(?i)(module '|no ){module}'? (has no )?attribute '?animals"):
         _ = import_module(module).animals
 
 

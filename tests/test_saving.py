@@ -372,3 +372,12 @@ def test_an_expression_law_names_what_is_wrong():
     with pytest.raises(InputError, match=r'^angle: unknown parameter "w" .*choose from v'):
         ExpressionLaw("sin(w * t)", {"v": 1.0})
     assert ExpressionLaw("v * t + pi", {"v": 1.0, "unused": 2.0}).evaluate(np.ones(1))[0] == 1.0 + pi
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_mechanism_saves_itself_and_is_read_as_an_equal_one(name, tmp_path):
+    mechanism = library(name).mechanism
+    mechanism.save(tmp_path / "model.toml")
+    again = read(tmp_path / "model.toml").mechanism
+    assert again == mechanism
+    assert repr(again) == repr(mechanism)

@@ -106,7 +106,7 @@ def test_runs_are_the_same_to_scale(name, s):
         options = IntegrationOptions(tolerance=1e-7 * factor)
         mechanism = of_library(name, factor)
         if name == "four_bar":
-            return simulate_motion(mechanism, 0.2, samples=21, options=options, warning=False).solution
+            return simulate_motion(mechanism, 0.2, samples=21, options=options).solution
         task = plan_tracking(mechanism, path_of(name, factor), duration=0.2, samples=21)
         return task.simulate(task.mechanism.modes[-1].name, options=options, warning=False).solution
 

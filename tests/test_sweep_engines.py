@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from journals import rows_in
-from paraflex.campaign import Workers
+from paraflex.campaign import LostCluster, Workers
+from paraflex.designs.run import Outcome, run_task
 from paraflex.errors import InputError
 from paraflex.studies import load_sweep, sweep
-from paraflex.studies.sweeps import LostCluster, Outcome, run_task
 
 distributed = pytest.importorskip("distributed")
 

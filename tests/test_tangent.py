@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import twins
-from conftest import make_linkage
+from conftest import make_geared_linkage, make_linkage
 from paraflex.dynamics import build_system, constant_signals, pack_signals
 from paraflex.files import load
 from paraflex.kernel.constraints import note_friction
@@ -53,14 +53,17 @@ def mechanism(name):
         return raparm_i().with_geometry(geometry)
     if kind == "linkage":
         return loaded_linkage(geometry)
+    if kind == "gears":
+        return replace(make_geared_linkage().with_geometry(geometry), gravity=(0.3, -9.81))
     if kind == "sliders":
         return make_sliders(geometry)
     return load(kind).mechanism
 
 
 NAMES = [
-    "raparm linear", "raparm second-order", "linkage linear", "linkage second-order", "sliders linear",
-    "sliders second-order", "slider_crank_flexible", "3prr", "andrews",
+    "raparm linear", "raparm second-order", "linkage linear", "linkage second-order", "gears linear",
+    "gears second-order", "sliders linear", "sliders second-order",
+    "slider_crank_flexible", "3prr", "andrews",
 ]  # fmt: skip
 
 

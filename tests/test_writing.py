@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paraflex import load, plan_tracking
+from paraflex import load
 from paraflex.errors import InputError, OutputError
 from paraflex.files import StudyDefaults
 from paraflex.mechanism import Start
+from paraflex.tracking import plan_tracking
 from paraflex.writing import whole_file, whole_folder, write_json, write_text
 
 

@@ -203,7 +203,7 @@ def _sides(joint):
 
 
 def constraints(system, t, q):
-    """Phi (m,) in the order of system.rows: p_b - p_a of a joint, angle_b - angle_a - law of a prescribed angle."""
+    """Phi (m,) in the order of system.rows: p_b - p_a of a joint, angle_b - angle_a - law; of gears."""
     values = {}
     for joint in system.mechanism.joints:
         gap = np.zeros(2, dtype=np.result_type(q, float))
@@ -214,6 +214,9 @@ def constraints(system, t, q):
     for prescribed in system.mechanism.prescribed:
         angle = joint_angle(system, prescribed.joint, q)
         values[f"{prescribed.name} angle"] = angle - prescribed.law.evaluate(np.array([t]))[0][0]
+    for gear in system.mechanism.gears:
+        first, second = (joint_angle(system, joint, q) for joint in gear.joints)
+        values[f"{gear.name} angle"] = second - gear.ratio * first - gear.phase
     return np.array([values[row] for row in system.rows])
 
 
@@ -243,6 +246,9 @@ def constraint_jacobian(system, q):
         rows[f"{joint.name} x"], rows[f"{joint.name} y"] = block
     for prescribed in system.mechanism.prescribed:
         rows[f"{prescribed.name} angle"] = joint_angle_row(system, prescribed.joint)
+    for gear in system.mechanism.gears:
+        first, second = (joint_angle_row(system, joint) for joint in gear.joints)
+        rows[f"{gear.name} angle"] = second - gear.ratio * first
     return np.array([rows[row] for row in system.rows])
 
 

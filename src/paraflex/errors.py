@@ -13,7 +13,7 @@ import sys
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from enum import Enum
 from typing import Any, TypeVar
 
@@ -103,10 +103,11 @@ def warn_user(warning: ParaflexWarning) -> None:
 
 
 def suggestion(name: object, known: Iterable[str]) -> str:
-    """A remedy for an unknown name: the nearest known one, or all of them."""
+    """A remedy for an unknown name: the nearest known one, or all of them where several are as near."""
     known = list(known)
-    near = get_close_matches(str(name), known, n=1)
-    if near:
+    near = get_close_matches(str(name), known, n=2)
+    alike = [SequenceMatcher(None, str(name), each).ratio() for each in near]
+    if near and len(set(alike)) == len(alike):
         return f'did you mean "{near[0]}"?'
     return f"choose from {', '.join(known)}" if known else "there is none to choose from"
 

@@ -90,10 +90,12 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("degrees of freedom (3 bodies - rank)", "degrees_of_freedom"),
         ("total mass [kg]", "total_mass"),
         ("assemblies", "assemblies"),
+        ("gears", "gears"),
         ("modes", "modes"),
         ("paths", "paths"),
     ):
-        if key in facts:
+        # Most mechanisms have no gears.
+        if key in facts and (facts[key] or key != "gears"):
             value = facts[key]
             table.add_row(label, (_some(value) or "none") if isinstance(value, list) else f"{value:g}")
     return table

@@ -14,8 +14,8 @@ from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits
+from paraflex.designs.sweep import SweepStudy
 from paraflex.studies import SweepResult, load_sweep
-from paraflex.studies.sweeps import SweepStudy
 
 REPORT = "report.html"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,23 +10,48 @@ import numpy as np
 import scipy
 
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
-from paraflex.mechanism import Joint, Mechanism, PointRef
+from paraflex.mechanism import Gear, Joint, Mechanism, PointRef
+
+
+@dataclass(frozen=True)
+class Term:
+    """What a joint contributes to a constraint: a quantity of point b less that of point a, times a weight.
+
+    Attributes
+    ----------
+    joint : str
+    kind : int
+        The quantity: POINT, both coordinates; ANGLE; or AXIS, the place of b along an axis that a carries.
+    a, b : PointRef
+    weight : float
+    direction : float
+        Of an axis against body a [rad].
+    carrier : str
+        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
+        origin on.
+    """
+
+    joint: str
+    kind: int
+    a: PointRef
+    b: PointRef
+    weight: float = 1.0
+    direction: float = 0.0
+    carrier: str = "material"
 
 
 @dataclass(frozen=True)
 class Constraint:
     """A joint or part of one, a prescribed motion, a spring, damper or friction before packing.
 
-    A spring is a compliant constraint: value - rest = compliance * multiplier; so is a damper, of the value's rate.
+    Its value is a sum of terms. A spring is a compliant constraint: value - rest = compliance * multiplier; so is a
+    damper, of the value's rate.
 
     Attributes
     ----------
     name : str
-    joint : str
-        The joint that it is of or acts in.
-    kind : int
-        Of its ports: POINT, ANGLE or AXIS.
-    a, b : PointRef
+    terms : tuple of Term
+        The first says what the value is: a length or an angle.
     labels : tuple of str
         One a row.
     signal : int
@@ -35,36 +61,32 @@ class Constraint:
     compliance, limit : float
     rest : float
         What the value is compared with: of a spring at rest, of an angle held.
-    direction : float
-        Of an axis against body a [rad].
-    carrier : str
-        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
-        origin on.
     """
 
     name: str
-    joint: str
-    kind: int
-    a: PointRef
-    b: PointRef
+    terms: tuple[Term, ...]
     labels: tuple[str, ...]
     signal: int = -1
     row: int = CONSTRAINT
     compliance: float = 0.0
     limit: float = 0.0
     rest: float = 0.0
-    direction: float = 0.0
-    carrier: str = "material"
+
+    @property
+    def points(self) -> Iterator[PointRef]:
+        """Of all terms."""
+        return (ref for term in self.terms for ref in (term.a, term.b))
 
 
 def _joint_constraints(joint: Joint) -> list[Constraint]:
     """What a joint holds."""
     name, a, b = joint.name, joint.a, joint.b
     normal, carrier = joint.direction + 0.5 * np.pi, "track" if joint.follows_beam else "material"
+    axis = Term(name, AXIS, a, b, direction=normal, carrier=carrier)
     parts = {
-        "points": Constraint(name, name, POINT, a, b, (f"{name} x", f"{name} y")),
-        "axis": Constraint(name, name, AXIS, a, b, (f"{name} normal",), direction=normal, carrier=carrier),
-        "angle": Constraint(name, name, ANGLE, a, b, (f"{name} angle",), rest=joint.angle),
+        "points": Constraint(name, (Term(name, POINT, a, b),), (f"{name} x", f"{name} y")),
+        "axis": Constraint(name, (axis,), (f"{name} normal",)),
+        "angle": Constraint(name, (Term(name, ANGLE, a, b),), (f"{name} angle",), rest=joint.angle),
     }
     return [parts[held] for held in joint.holds]
 
@@ -74,12 +96,21 @@ def axis_of(joint: Joint) -> dict[str, Any]:
     return {"direction": joint.direction, "carrier": "frame" if joint.follows_beam else "material"}
 
 
+def _coordinate(joint: Joint, weight: float = 1.0) -> Term:
+    """A joint's coordinate times a weight."""
+    if joint.slides:
+        return Term(joint.name, AXIS, joint.a, joint.b, weight, **axis_of(joint))
+    return Term(joint.name, ANGLE, joint.a, joint.b, weight)
+
+
+def _what(joint: Joint) -> str:
+    """What a joint's coordinate is."""
+    return "travel" if joint.slides else "angle"
+
+
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    if joint.slides:
-        keywords |= axis_of(joint)
-        return Constraint(name, joint.name, AXIS, joint.a, joint.b, (f"{name} travel",), **keywords)
-    return Constraint(name, joint.name, ANGLE, joint.a, joint.b, (f"{name} angle",), **keywords)
+    return Constraint(name, (_coordinate(joint),), (f"{name} {_what(joint)}",), **keywords)
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
@@ -92,11 +123,20 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
         *((one, {"row": FRICTION, "compliance": 1.0 / (one.limit / one.speed), "limit": one.limit})
           for one in mechanism.frictions),
     ]  # fmt: skip
-    return constraints + [_along(mechanism.joint(one.joint), one.name, **keywords) for one, keywords in at_joints]
+    constraints += [_along(mechanism.joint(one.joint), one.name, **keywords) for one, keywords in at_joints]
+    return constraints + [_gear_constraint(mechanism, gear) for gear in mechanism.gears]
+
+
+def _gear_constraint(mechanism: Mechanism, gear: Gear) -> Constraint:
+    """Coordinate of the second joint less ratio times that of the first, less the phase."""
+    first, second = (mechanism.joint(name) for name in gear.joints)
+    assert gear.phase is not None
+    terms = (_coordinate(second), _coordinate(first, -gear.ratio))
+    return Constraint(gear.name, terms, (f"{gear.name} {_what(second)}",), rest=gear.phase)
 
 
 def constraint_count(mechanism: Mechanism) -> int:
-    """How many constraints joints and prescribed motions are, redundant ones included."""
+    """How many constraints joints, prescribed motions and gears are, redundant ones included."""
     return sum(len(one.labels) for one in _constraints(mechanism) if one.row == CONSTRAINT)
 
 
@@ -108,7 +148,7 @@ def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
     touched = [
         (i, index[ref.body])
         for i, constraint in enumerate(constraints)
-        for ref in (constraint.a, constraint.b)
+        for ref in constraint.points
         if not ref.on_ground
     ]
     rows, columns = zip(*touched, strict=True)

@@ -8,8 +8,8 @@ deformation is described in. Its points are held as its joints hold them, the bo
 - a pin in another body's slot or on another beam is held across the body, and in both directions if prescribed;
 - only the first of several points held in both directions is held along the line to the others: joints are not so far
   apart by force that a bar could not stretch;
-- nothing is held by what slides along the body itself, by motors, springs or dampers, or by a joint to bodies that
-  reach the ground through this body alone: what hangs on it.
+- nothing is held by what slides along the body itself, by motors, springs, dampers or gears, or by a joint to bodies
+  that reach the ground through this body alone: what hangs on it.
 
 With the mass-normalised modes psi_k of the body so held, at rest and undeformed, their frequencies omega_k and damping
 coefficients d_k,

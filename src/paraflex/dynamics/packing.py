@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics.constraints import Constraint, axis_of
+from paraflex.dynamics.constraints import Constraint, Term, axis_of
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
 from paraflex.dynamics.scale import mechanism_size
 from paraflex.kernel.packed import (
@@ -118,48 +118,61 @@ class _Packer:
         return {end: self.add_marker(ref), f"{end}x": 0.0, f"{end}y": 0.0}
 
     def add_constraint(self, constraint: Constraint) -> None:
-        row = len(self.rows)
+        first = len(self.rows)
         self.labels += constraint.labels
         record = {
             "kind": constraint.row,
             "signal": constraint.signal,
             "compliance": constraint.compliance,
             "limit": constraint.limit,
-            "unit": 1.0 if constraint.kind == ANGLE else self.size,
+            "unit": 1.0 if constraint.terms[0].kind == ANGLE else self.size,
             "ground": -constraint.rest,
         }
         self.rows += [dict(record) for _ in constraint.labels]
-        axis = -1
-        if constraint.kind == AXIS:
+        for term in constraint.terms:
+            self.add_term(term, first)
+
+    def add_term(self, term: Term, row: int) -> None:
+        """The ports of a term, and what its ends on the ground give to its rows."""
+        axis, rows = -1, 2 if term.kind == POINT else 1
+        if term.kind == AXIS:
             axis = self.add_axis(
-                constraint.a, constraint.b, direction=constraint.direction, carrier=constraint.carrier, row=row
+                term.a, term.b, direction=term.direction, carrier=term.carrier, row=row, weight=term.weight
             )
-        for ref, sign in ((constraint.a, -1.0), (constraint.b, 1.0)):
+        for ref, weight in ((term.a, -term.weight), (term.b, term.weight)):
             if ref.on_ground:
-                if constraint.kind == POINT:
+                if term.kind == POINT:
                     for coordinate in range(2):
-                        self.rows[row + coordinate]["ground"] += sign * self.mechanism.ground[ref.point][coordinate]
+                        self.rows[row + coordinate]["ground"] += weight * self.mechanism.ground[ref.point][coordinate]
                 continue
             if axis < 0:
-                marker, parts = self.add_marker(ref), len(constraint.labels)
-            else:
+                marker, parts = self.add_marker(ref), rows
+            elif ref is term.b:
                 marker, parts = self.axes[axis]["b"], 2
-                if sign < 0.0:
-                    marker, parts = self.axes[axis]["a"], 3 if self.axes[axis]["track"] < 0 else 4
+            else:
+                marker, parts = self.axes[axis]["a"], 3 if self.axes[axis]["track"] < 0 else 4
             self.ports[self.index[ref.body]].append(
                 {
                     "marker": marker,
-                    "kind": constraint.kind,
+                    "kind": term.kind,
                     "row": row,
-                    "rows": len(constraint.labels),
+                    "rows": rows,
                     "parts": parts,
                     "axis": axis,
-                    "sign": sign,
+                    "weight": weight,
                 }
             )
 
     def add_axis(
-        self, a: PointRef, b: PointRef, *, direction: float, carrier: str, row: int = -1, signal: int = -1
+        self,
+        a: PointRef,
+        b: PointRef,
+        *,
+        direction: float,
+        carrier: str,
+        row: int = -1,
+        weight: float = 1.0,
+        signal: int = -1,
     ) -> int:
         ends = self.end(a, "a") | self.end(b, "b")
         track = -1
@@ -170,7 +183,8 @@ class _Packer:
         if carrier == "track":
             self.tracks.append(self.index[a.body])
             track = len(self.tracks) - 1
-        self.axes.append(ends | {"angle": direction, "row": row, "signal": signal, "track": track})
+        record = {"angle": direction, "row": row, "weight": weight, "signal": signal, "track": track}
+        self.axes.append(ends | record)
         return len(self.axes) - 1
 
     def add_motor(self, joint: Joint, signal: int) -> None:

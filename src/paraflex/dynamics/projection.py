@@ -33,7 +33,7 @@ _PROJECTIONS = 2
 NAMED = 6
 _UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
 # What helps where constraints contradict one another.
-AGREE = "leave one of these joints or prescribed motions out, or choose places and laws that agree"
+AGREE = "leave one of these joints, gears or prescribed motions out, or choose places and laws that agree"
 # What constraints may leave of each other's rates (sizes of the mechanism, rad; s), as a fraction of what they ask for.
 _CONFLICT = 1e-6
 
@@ -158,7 +158,7 @@ def second_rates(system: System, signals: Signals, t: float, q: Array, v: Array,
 
 
 def joint_gaps(system: System, phi: Array) -> dict[str, float]:
-    """What is left open at joints and prescribed motions by name [m, rad]: the largest first, down to a tenth of it."""
+    """What is left open at joints, gears and prescribed motions by name [m, rad], the largest first, to its tenth."""
     gaps: dict[str, float] = {}
     for row, value in zip(system.rows, phi.tolist(), strict=True):
         gaps[joint_of_row(row)] = math.hypot(gaps.get(joint_of_row(row), 0.0), value)
@@ -177,7 +177,7 @@ def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array
     Raises
     ------
     InconsistentConstraintsError
-        It names joints and prescribed motions that depend on one another.
+        It names joints, gears and prescribed motions that depend on one another.
     """
     if not system.gap(left) > _CONFLICT * max(1.0, system.gap(wanted)):
         return

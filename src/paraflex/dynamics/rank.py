@@ -131,7 +131,7 @@ def redundant_rows(system: System, q: Array, threshold: float = DEPENDENT) -> li
 
 
 def involved(system: System, found: Dependence, k: int) -> list[str]:
-    """Joints and prescribed motions that the k-th dropped row is of or follows from; prescribed motions first."""
+    """Joints, gears and prescribed motions, these first, that the k-th dropped row is of or follows from."""
     rows = [found.dropped[k], *found.sources(k)]
     names = dict.fromkeys(joint_of_row(system.rows[row]) for row in rows)
     prescribed = {motion.name for motion in system.mechanism.prescribed}

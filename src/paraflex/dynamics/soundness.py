@@ -40,7 +40,7 @@ class Closure:
     gap : float
         Largest that remains where the loops do not close [m, rad]; zero where they do.
     where : tuple of str
-        Joints and prescribed motions with such gaps.
+        Joints, gears and prescribed motions with such gaps.
     problem : str
         Why there is no start; empty for none.
     state : State or None
@@ -100,7 +100,7 @@ class Redundancy:
     joint : str
         Whose it is.
     among : tuple of str
-        All joints and prescribed motions that depend on one another there, this one included.
+        All joints, gears and prescribed motions that depend on one another there, this one included.
     """
 
     row: str
@@ -116,7 +116,7 @@ class Mobility:
     ----------
     bodies : int
     constraints : int
-        Constraint rows, of joints and prescribed motions.
+        Constraint rows, of joints, gears and prescribed motions.
     rank : int
         Of the constraint Jacobian at the pose.
     redundant : tuple of Redundancy

@@ -53,8 +53,13 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     for what, fields in beyond.items():
         if fields:
             refuse(_PRINTED[name], what, fields[0])
+    if name == "exudyn" and mechanism.gears:
+        refuse("Exudyn", "a gear", f"gear.{mechanism.gears[0].name}")
     if name == "mujoco":
         closing = {joint.name for joint in spanning_tree(mechanism).closing}
+        for gear in mechanism.gears:
+            if closing.intersection(gear.joints):
+                refuse("MuJoCo", "a gear where a loop closes", f"gear.{gear.name}")
         for spring in mechanism.springs:
             if spring.joint in closing:
                 refuse("MuJoCo", "a spring where a loop closes", f"spring.{spring.name}")

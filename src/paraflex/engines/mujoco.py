@@ -24,7 +24,7 @@ from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
-from paraflex.mechanism import GROUND, ActuationMode, Joint, Mechanism, proportional_segments
+from paraflex.mechanism import GROUND, ActuationMode, Gear, Joint, Mechanism, proportional_segments
 from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun, TrackingTask
 
@@ -126,6 +126,8 @@ def _model(mujoco: Any, system: System, tree: Tree, step: float) -> Any:
     _add_springs(spec, system.mechanism, tree)
     for joint in tree.closing:
         _close(mujoco, spec, system, joint, bodies, step)
+    for gear in system.mechanism.gears:
+        _add_gear(mujoco, spec, gear, tree, step)
     return spec.compile()
 
 
@@ -137,6 +139,22 @@ def _add_springs(spec: Any, mechanism: Mechanism, tree: Tree) -> None:
         # Linear, quadratic and cubic stiffness.
         joint.stiffness = [spring.stiffness, 0.0, 0.0]
         joint.springref = link.sign * spring.rest
+
+
+def _add_gear(mujoco: Any, spec: Any, gear: Gear, tree: Tree, step: float) -> None:
+    """The hinge of the second joint follows that of the first, as a polynomial of degree one."""
+    hinge = {link.joint.name: link for link in tree.links}
+    first, second = (hinge[name] for name in gear.joints)
+    equality = spec.add_equality(
+        name=gear.name,
+        type=mujoco.mjtEq.mjEQ_JOINT,
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
+        name1=second.name,
+        name2=first.name,
+    )
+    assert gear.phase is not None
+    equality.data[:2] = second.sign * gear.phase, second.sign * gear.ratio * first.sign
+    _stiffen(equality, step)
 
 
 def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, step: float) -> None:
@@ -152,6 +170,10 @@ def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, s
         name1=sites[0],
         name2=sites[1],
     )
+    _stiffen(equality, step)
+
+
+def _stiffen(equality: Any, step: float) -> None:
     equality.solref = [_TIME_CONSTANT * step, 1.0]
     equality.solimp = [_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0]
 

@@ -65,16 +65,16 @@ class Tree:
 
 
 def spanning_tree(mechanism: Mechanism) -> Tree:
-    """Hang all bodies on the ground, by joints with springs first and then by those with motors.
+    """Hang all bodies on the ground, by joints with springs or gears first and then by those with motors.
 
     Raises
     ------
     InputError
         A body that nothing joins to the ground.
     """
-    sprung = {spring.joint for spring in mechanism.springs}
+    held = {spring.joint for spring in mechanism.springs} | {name for gear in mechanism.gears for name in gear.joints}
     driven = {motor.joint for motor in mechanism.motors}
-    ranked = sorted(mechanism.joints, key=lambda joint: (joint.name not in sprung, joint.name not in driven))
+    ranked = sorted(mechanism.joints, key=lambda joint: (joint.name not in held, joint.name not in driven))
     kept, closing = _split(ranked)
     links: list[Link] = []
     hung, left = {GROUND}, [body.name for body in mechanism.bodies]

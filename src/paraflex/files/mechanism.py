@@ -113,7 +113,7 @@ def _member(group: Group, name: str, said: dict[str, Any]) -> Any:
     kinds = {getattr(kind, "kind", None): kind for kind in group.kinds}
     kind = kinds[said.pop("type")] if "type" in said else group.kinds[0]
     points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in said.pop("points", ())]
-    return kind(name, *points, **said)
+    return kind(name, *points, *said.pop("joints", ()), **said)
 
 
 def read_path(table: PathTable) -> Path:

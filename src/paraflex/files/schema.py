@@ -12,6 +12,7 @@ from dataclasses import MISSING, fields
 from enum import Enum
 from functools import reduce
 from operator import or_
+from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo, create_model
@@ -19,6 +20,7 @@ from pydantic_core import PydanticCustomError
 
 from paraflex.files.expressions import ExpressionError, check_in_time, evaluate
 from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
+from paraflex.mechanism.quantities import joint_pair
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -72,11 +74,11 @@ class _Table(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
 
 
-TwoPoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
+TwoPoints = TwoJoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
 Yes = Annotated[bool, Field(strict=True)]
 # How files write what a field of a member is.
 _WRITTEN: dict[Any, Any] = {
-    float: Number, int: Count, str: Text, bool: Yes, PointRef: Text, tuple[float, float]: Pair,
+    float: Number, int: Count, str: Text, bool: Yes, PointRef: Text, tuple[float, float]: Pair, NoneType: NoneType,
 }  # fmt: skip
 
 
@@ -85,16 +87,23 @@ def _written(hint: Any) -> Any:
         return Literal[tuple(member.value for member in hint)]
     if get_origin(hint) is tuple and get_args(hint)[1:] == (...,):
         return list[_written(get_args(hint)[0])]
+    if isinstance(hint, UnionType):
+        return reduce(or_, map(_written, get_args(hint)))
     return _WRITTEN[hint]
 
 
 def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
-    """Fields of the table of a member from those of its class, needed or not; the points a and b are `points`."""
+    """Fields of the table of a member from those of its class, needed or not; two points or joints stand together."""
     hints, found = get_type_hints(member), {}
+    together = ["name"]
     if hints.get("a") is PointRef:
         found["points"] = (TwoPoints, Field(description='["body.point", "body.point"]'))
+        together += ["a", "b"]
+    if joints := joint_pair(member):
+        found["joints"] = (TwoJoints, Field(description='["first joint", "second joint"]'))
+        together += joints
     for each in fields(member):
-        if each.name != "name" and not ("points" in found and each.name in ("a", "b")):
+        if each.name not in together:
             missing = ... if needed else None
             default = missing if each.default is MISSING else getattr(each.default, "value", each.default)
             description = each.metadata.get("description", f"its {each.name}")

@@ -32,6 +32,7 @@ from paraflex.mechanism import (
     Start,
     grouped,
 )
+from paraflex.mechanism.quantities import joint_pair
 
 _BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
 # What all beams of a file may have in common at its top, and what they have where it says nothing.
@@ -105,9 +106,10 @@ def _forces(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def _member(member: Any) -> dict[str, Any]:
-    """The fields of a member; its points a and b together."""
-    told = _fields(member, "name", "a", "b")
-    return {"points": [member.a, member.b], **told} if hasattr(member, "a") else told
+    """The fields of a member; its points a and b together, and so two joints."""
+    together = {"points": ["a", "b"] if hasattr(member, "a") else [], "joints": joint_pair(member)}
+    pairs = {key: [getattr(member, name) for name in names] for key, names in together.items() if names}
+    return pairs | _fields(member, "name", *(name for names in together.values() for name in names))
 
 
 def _fields(given: Any, *left_out: str) -> dict[str, Any]:

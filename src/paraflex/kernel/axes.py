@@ -16,23 +16,23 @@ from paraflex.kernel.packed import CONSTRAINT, SPRING
 
 
 @inlined
-def axis_end(p, marker, x, y, q, v, a):
+def axis_end(system, marker, x, y, q, v, a):
     """Position, velocity and acceleration of one end of an axis, and R s there: zero on the ground."""
     if marker < 0:
         return x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    return marker_motion(p, p.markers[marker], q, v, a)
+    return marker_motion(system, system.markers[marker], q, v, a)
 
 
 @inlined
-def axis_frame(p, axis, q, v, a):
+def axis_frame(system, axis, q, v, a):
     """Of an axis: d and its two derivatives, the angle theta and its two, and R s of both ends."""
-    pax, pay, vax, vay, aax, aay, rax, ray = axis_end(p, axis.a, axis.ax, axis.ay, q, v, a)
-    pbx, pby, vbx, vby, abx, aby, rbx, rby = axis_end(p, axis.b, axis.bx, axis.by, q, v, a)
+    pax, pay, vax, vay, aax, aay, rax, ray = axis_end(system, axis.a, axis.ax, axis.ay, q, v, a)
+    pbx, pby, vbx, vby, abx, aby, rbx, rby = axis_end(system, axis.b, axis.bx, axis.by, q, v, a)
     theta, w, dw = axis.angle, 0.0, 0.0
     if axis.a >= 0:
-        marker = p.markers[axis.a]
-        theta += marker_angle(p, marker, q)
-        w, dw = marker_angle(p, marker, v), marker_angle(p, marker, a)
+        marker = system.markers[axis.a]
+        theta += marker_angle(system, marker, q)
+        w, dw = marker_angle(system, marker, v), marker_angle(system, marker, a)
     d = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
     return d, theta, w, dw, rax, ray, rbx, rby
 
@@ -48,23 +48,23 @@ def component(ex, ey, d, w, dw):
 
 
 @routine
-def axis_motion(p, k, q, v, a):
+def axis_motion(system, k, q, v, a):
     """Of axis k: value, rate and acceleration, e, n . d, R s of both ends, and where a point slides on its track.
 
     On a track the value is that of the normal less the deflection W(x) u where the point stands: to first order
     e becomes e + (W' u) E e, and the flexible coordinates take -W.
     """
-    axis = p.axes[k]
-    d, theta, w, dw, rax, ray, rbx, rby = axis_frame(p, axis, q, v, a)
+    axis = system.axes[k]
+    d, theta, w, dw, rax, ray, rbx, rby = axis_frame(system, axis, q, v, a)
     ex, ey = cos(theta), sin(theta)
     value, rate, acceleration, lever = component(ex, ey, d, w, dw)
     x = 0.0
     if axis.track >= 0:
         # e is the normal of the beam's axis, (ey, -ex) points along it.
         x, dx, ddx, across = component(ey, -ex, d, w, dw)
-        W_u, slope, bend = track_deflection(p, axis, x, q)
-        W_v, slope_v, _ = track_deflection(p, axis, x, v)
-        W_a, _, _ = track_deflection(p, axis, x, a)
+        W_u, slope, bend = track_deflection(system, axis, x, q)
+        W_v, slope_v, _ = track_deflection(system, axis, x, v)
+        W_a, _, _ = track_deflection(system, axis, x, a)
         value -= W_u
         rate -= slope * dx + W_v
         acceleration -= slope * ddx + bend * dx * dx + 2.0 * slope_v * dx + W_a
@@ -74,35 +74,35 @@ def axis_motion(p, k, q, v, a):
 
 
 @inlined
-def track_piece(p, track, x):
+def track_piece(system, track, x):
     """Which piece of a track x lies on, and how far from the piece's start; the end pieces reach beyond the ends."""
     piece = 0
-    while piece < track.pieces - 1 and x > p.track_breaks[track.first + piece + 1]:
+    while piece < track.pieces - 1 and x > system.track_breaks[track.first + piece + 1]:
         piece += 1
-    return piece, x - p.track_breaks[track.first + piece]
+    return piece, x - system.track_breaks[track.first + piece]
 
 
 @inlined
-def track_row(p, at, stride, z):
+def track_row(system, at, stride, z):
     """One entry of W, W' and W'': a polynomial of degree five in z, coefficients `stride` apart."""
     value, slope, bend = 0.0, 0.0, 0.0
     for power in range(5, -1, -1):
         bend = bend * z + 2.0 * slope
         slope = slope * z + value
-        value = value * z + p.track_coefficients[at + power * stride]
+        value = value * z + system.track_coefficients[at + power * stride]
     return value, slope, bend
 
 
 @routine
-def track_deflection(p, axis, x, vector):
+def track_deflection(system, axis, x, vector):
     """W(x), W'(x) and W''(x) of a track times the flexible part of a system vector."""
-    track = p.tracks[axis.track]
-    body = p.bodies[p.markers[axis.a].body]
-    piece, z = track_piece(p, track, x)
+    track = system.tracks[axis.track]
+    body = system.bodies[system.markers[axis.a].body]
+    piece, z = track_piece(system, track, x)
     at = track.coefficients + piece * 6 * body.nf
     total, slope, bend = 0.0, 0.0, 0.0
     for j in range(body.nf):
-        w0, w1, w2 = track_row(p, at + j, body.nf, z)
+        w0, w1, w2 = track_row(system, at + j, body.nf, z)
         u = vector[body.offset + 3 + j]
         total += w0 * u
         slope += w1 * u
@@ -111,86 +111,87 @@ def track_deflection(p, axis, x, vector):
 
 
 @routine
-def add_track(p, k, x, scale, row, at):
+def add_track(system, k, x, scale, row, at):
     """Add scale W(x) of axis k to row[at:]."""
-    axis = p.axes[k]
-    track = p.tracks[axis.track]
-    nf = p.bodies[p.markers[axis.a].body].nf
-    piece, z = track_piece(p, track, x)
+    axis = system.axes[k]
+    track = system.tracks[axis.track]
+    nf = system.bodies[system.markers[axis.a].body].nf
+    piece, z = track_piece(system, track, x)
     start = track.coefficients + piece * 6 * nf
     for j in range(nf):
-        row[at + j] += scale * track_row(p, start + j, nf, z)[0]
+        row[at + j] += scale * track_row(system, start + j, nf, z)[0]
 
 
 @routine
-def apply_axis(p, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f):
+def apply_axis(system, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f):
     """Add to f the generalised force J^T force of axis k."""
-    axis = p.axes[k]
+    axis = system.axes[k]
     if axis.b >= 0:
-        apply_force(p, p.markers[axis.b], q, force * ex, force * ey, rbx, rby, f)
+        apply_force(system, system.markers[axis.b], q, force * ex, force * ey, rbx, rby, f)
     if axis.a >= 0:
-        marker = p.markers[axis.a]
-        apply_force(p, marker, q, -force * ex, -force * ey, rax, ray, f)
-        apply_torque(p, marker, force * lever, f)
+        marker = system.markers[axis.a]
+        apply_force(system, marker, q, -force * ex, -force * ey, rax, ray, f)
+        apply_torque(system, marker, force * lever, f)
         if axis.track >= 0:
-            add_track(p, k, x, -force, f, p.bodies[marker.body].offset + 3)
+            add_track(system, k, x, -force, f, system.bodies[marker.body].offset + 3)
 
 
 @kernel
-def apply_axes(p, q, v, a, lam, weights, torques, f, rows):
+def apply_axes(system, q, v, a, lam, weights, torques, f, rows):
     """Add the rows of all axes and their forces to rows and f, and subtract the forces of motors along them from f."""
-    for k in range(p.axes.size):
-        axis = p.axes[k]
-        value, rate, acceleration, ex, ey, lever, rax, ray, rbx, rby, x = axis_motion(p, k, q, v, a)
+    for k in range(system.axes.size):
+        axis = system.axes[k]
+        value, rate, acceleration, ex, ey, lever, rax, ray, rbx, rby, x = axis_motion(system, k, q, v, a)
         if axis.row < 0:
             force = -torques[axis.signal]
         else:
-            force = lam[axis.row]
-            kind = p.rows[axis.row].kind
+            force = axis.weight * lam[axis.row]
+            kind = system.rows[axis.row].kind
             if kind == CONSTRAINT:
-                rows[axis.row] += weights[0] * acceleration + weights[1] * rate + weights[2] * value
+                part = weights[0] * acceleration + weights[1] * rate + weights[2] * value
             else:
-                rows[axis.row] += value if kind == SPRING else rate
-        apply_axis(p, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f)
+                part = value if kind == SPRING else rate
+            rows[axis.row] += axis.weight * part
+        apply_axis(system, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f)
 
 
 @routine
-def axis_values(p, q, v, phi, dphi):
+def axis_values(system, q, v, phi, dphi):
     """Add value and rate of the axes that are constraints to phi and dphi."""
-    for k in range(p.axes.size):
-        row = p.axes[k].row
+    for k in range(system.axes.size):
+        row, weight = system.axes[k].row, system.axes[k].weight
         if row >= 0:
-            if p.rows[row].kind == CONSTRAINT:
-                value, rate, _, _, _, _, _, _, _, _, _ = axis_motion(p, k, q, v, v)
-                phi[row] += value
-                dphi[row] += rate
+            if system.rows[row].kind == CONSTRAINT:
+                value, rate, _, _, _, _, _, _, _, _, _ = axis_motion(system, k, q, v, v)
+                phi[row] += weight * value
+                dphi[row] += weight * rate
 
 
 @routine
-def fill_axis_rows(p, q, jacobian):
+def fill_axis_rows(system, q, jacobian):
     """Rows of the axes that are constraints into a dense Jacobian."""
-    for k in range(p.axes.size):
-        row = p.axes[k].row
+    for k in range(system.axes.size):
+        row, weight = system.axes[k].row, system.axes[k].weight
         if row >= 0:
-            if p.rows[row].kind == CONSTRAINT:
-                _, _, _, ex, ey, lever, rax, ray, rbx, rby, x = axis_motion(p, k, q, q, q)
-                apply_axis(p, k, q, 1.0, ex, ey, lever, rax, ray, rbx, rby, x, jacobian[row])
+            if system.rows[row].kind == CONSTRAINT:
+                _, _, _, ex, ey, lever, rax, ray, rbx, rby, x = axis_motion(system, k, q, q, q)
+                apply_axis(system, k, q, weight, ex, ey, lever, rax, ray, rbx, rby, x, jacobian[row])
 
 
 @routine
-def turn_axes(p, q, axes):
+def turn_axes(system, q, axes):
     """Direction and lever of every axis at q, for the iteration matrix, and where sliding points stand."""
-    for k in range(p.axes.size):
-        _, _, _, ex, ey, lever, _, _, _, _, x = axis_motion(p, k, q, q, q)
+    for k in range(system.axes.size):
+        _, _, _, ex, ey, lever, _, _, _, _, x = axis_motion(system, k, q, q, q)
         axes[k, 0], axes[k, 1], axes[k, 2], axes[k, 3] = ex, ey, lever, x
 
 
 @routine
-def axis_power(p, q, v, torques):
+def axis_power(system, q, v, torques):
     """Power of the motors along axes."""
     power = 0.0
-    for k in range(p.axes.size):
-        if p.axes[k].row < 0:
-            _, rate, _, _, _, _, _, _, _, _, _ = axis_motion(p, k, q, v, v)
-            power += torques[p.axes[k].signal] * rate
+    for k in range(system.axes.size):
+        if system.axes[k].row < 0:
+            _, rate, _, _, _, _, _, _, _, _, _ = axis_motion(system, k, q, v, v)
+            power += torques[system.axes[k].signal] * rate
     return power

@@ -16,33 +16,33 @@ from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, padded
 
 
 @inlined
-def place_sums(p, i, q, v, a, points):
+def place_sums(system, i, q, v, a, points):
     """Nx u, Ny u and slopes of all mass points of body i, and the same of u' and u''."""
-    body = p.bodies[i]
-    column_sums(p.places, body.places, 3 * body.pitch, body.nf, body.offset + 3, q, v, a, points)
+    body = system.bodies[i]
+    column_sums(system.places, body.places, 3 * body.pitch, body.nf, body.offset + 3, q, v, a, points)
 
 
 @inlined
-def bent_equations(p, i, q, v, a, f, points):
+def second_order_equations(system, i, q, v, a, f, points):
     """M q'' + h + K u of body i, less its weight, into f; axial inertia forces at Gauss points into points.axial."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     o, n, pitch = body.offset, body.nf, body.pitch
     e = o + 3
     c, s = cos(q[o + 2]), sin(q[o + 2])
     w, dw = v[o + 2], a[o + 2]
-    gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
+    gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
-    place_sums(p, i, q, v, a, points)
+    place_sums(system, i, q, v, a, points)
     fx, fy, lever_y, lever_x, turning = zeros(), zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
-        y, slope, mass = pitch + block, 2 * pitch + block, load(p.inertias, body.inertias + pitch + block)
-        sx, vx, bx = shortened(p, i, block, points)
+        y, slope, mass = pitch + block, 2 * pitch + block, load(system.inertias, body.inertias + pitch + block)
+        sx, vx, bx = shortened(system, i, block, points)
         sy, vy, by = load(points.q, y), load(points.v, y), load(points.a, y)
         relative = add_scaled(add_scaled(add_scaled(bx, sy, -dw), sx, -w * w), vy, -2.0 * w)
         mx = add_product(add_scaled(zeros(), mass, ax), mass, relative)
         relative = add_scaled(add_scaled(add_scaled(by, sx, dw), sy, -w * w), vx, 2.0 * w)
         my = add_product(add_scaled(zeros(), mass, ay), mass, relative)
-        inertia = load(p.inertias, body.inertias + 2 * pitch + block)
+        inertia = load(system.inertias, body.inertias + 2 * pitch + block)
         turn = add_product(add_scaled(zeros(), inertia, dw), inertia, load(points.a, slope))
         store(points.shares, block, mx)
         store(points.shares, y, my)
@@ -50,26 +50,26 @@ def bent_equations(p, i, q, v, a, f, points):
         fx, fy, turning = add_scaled(fx, mx, 1.0), add_scaled(fy, my, 1.0), add_scaled(turning, turn, 1.0)
         lever_x, lever_y = add_product(lever_x, sx, my), add_product(lever_y, sy, mx)
     for j in range(body.slopes):
-        points.axial[j] = row_product(p.spans, body.spans + j * pitch, pitch, points.shares)
+        points.axial[j] = row_product(system.spans, body.spans + j * pitch, pitch, points.shares)
         points.shares[2 * pitch + j] -= points.q[2 * pitch + j] * points.axial[j]
     for j in range(n):
-        f[e + j] = p.modal[OMEGA2, body.flex + j] * q[e + j] + p.modal[DAMPING, body.flex + j] * v[e + j]
-        f[e + j] += row_product(p.places, body.places + 3 * pitch * j, 3 * pitch, points.shares)
+        f[e + j] = system.modal[OMEGA2, body.flex + j] * q[e + j] + system.modal[DAMPING, body.flex + j] * v[e + j]
+        f[e + j] += row_product(system.places, body.places + 3 * pitch * j, 3 * pitch, points.shares)
     f[o] = c * summed(fx) - s * summed(fy)
     f[o + 1] = s * summed(fx) + c * summed(fy)
     f[o + 2] = summed(lever_x) - summed(lever_y) + summed(turning)
 
 
 @inlined
-def shortened(p, i, block, points):
+def shortened(system, i, block, points):
     """Eight mass points' s_x with two derivatives in the body frame, less what bending takes, by their sums."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     pitch = body.pitch
-    sx = add_scaled(load(p.inertias, body.inertias + block), load(points.q, block), 1.0)
+    sx = add_scaled(load(system.inertias, body.inertias + block), load(points.q, block), 1.0)
     vx, bx, at = load(points.v, block), load(points.a, block), body.spans + block
     for j in range(2 * pitch, 2 * pitch + body.slopes):
         s0, s1 = points.q[j], points.v[j]
-        weight = load(p.spans, at)
+        weight = load(system.spans, at)
         sx = add_scaled(sx, weight, -0.5 * s0 * s0)
         vx = add_scaled(vx, weight, -s0 * s1)
         bx = add_scaled(bx, weight, -s1 * s1 - s0 * points.a[j])
@@ -78,36 +78,36 @@ def shortened(p, i, block, points):
 
 
 @routine
-def bent_shortening(p, i, q, points):
+def second_order_shortening(system, i, q, points):
     """Sum of m f/2 over the mass points of body i: by how much bending shifts its first moment along it."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     pitch, total = body.pitch, 0.0
-    place_sums(p, i, q, q, q, points)
+    place_sums(system, i, q, q, q, points)
     for j in range(body.slopes):
         weight = zeros()
         for block in range(0, pitch, LANES):
-            mass = load(p.inertias, body.inertias + pitch + block)
-            weight = add_product(weight, load(p.spans, body.spans + j * pitch + block), mass)
+            mass = load(system.inertias, body.inertias + pitch + block)
+            weight = add_product(weight, load(system.spans, body.spans + j * pitch + block), mass)
         total += 0.5 * summed(weight) * points.q[2 * pitch + j] * points.q[2 * pitch + j]
     return total
 
 
 @inlined
-def bent_energy(p, i, q, v, points):
+def second_order_energy(system, i, q, v, points):
     """Kinetic and strain energy of body i."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     o, n, pitch = body.offset, body.nf, body.pitch
     e = o + 3
     c, s = cos(q[o + 2]), sin(q[o + 2])
     w = v[o + 2]
     rx, ry = c * v[o] + s * v[o + 1], c * v[o + 1] - s * v[o]
-    place_sums(p, i, q, v, v, points)
+    place_sums(system, i, q, v, v, points)
     # Twice the energy: of the origin's motion, of motion against it, and of the two together.
     total, together_x, together_y, square = zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
         y, slope, at = pitch + block, 2 * pitch + block, body.inertias + block
-        mass, inertia = load(p.inertias, at + pitch), load(p.inertias, at + 2 * pitch)
-        sx, vx, _ = shortened(p, i, block, points)
+        mass, inertia = load(system.inertias, at + pitch), load(system.inertias, at + 2 * pitch)
+        sx, vx, _ = shortened(system, i, block, points)
         vx, vy = add_scaled(vx, load(points.q, y), -w), add_scaled(load(points.v, y), sx, w)
         square = add_product(add_product(zeros(), vx, vx), vy, vy)
         total = add_product(total, mass, square)
@@ -118,26 +118,26 @@ def bent_energy(p, i, q, v, points):
     kinetic = summed(total) + 2.0 * (rx * summed(together_x) + ry * summed(together_y))
     strain = 0.0
     for l in range(n):
-        strain += p.modal[OMEGA2, body.flex + l] * q[e + l] * q[e + l]
+        strain += system.modal[OMEGA2, body.flex + l] * q[e + l] * q[e + l]
     return 0.5 * kinetic, 0.5 * strain
 
 
 @routine
-def bent_mass(p, i, q, ws, points):
+def second_order_mass(system, i, q, work, points):
     """Mass matrix of body i in its own frame into ws.mass, all of it: the sum of m J^T J, J = [1, E s, ds/du].
 
     `points` is ws.scratch.points.
     """
-    body = p.bodies[i]
+    body = system.bodies[i]
     n, width, at, pitch = body.nf, 3 + body.nf, body.dense, body.pitch
-    place_sums(p, i, q, q, q, points)
+    place_sums(system, i, q, q, q, points)
     m, first_x, first_y, second = zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
         mass, inertia = (
-            load(p.inertias, body.inertias + pitch + block),
-            load(p.inertias, body.inertias + 2 * pitch + block),
+            load(system.inertias, body.inertias + pitch + block),
+            load(system.inertias, body.inertias + 2 * pitch + block),
         )
-        sx, _, _ = shortened(p, i, block, points)
+        sx, _, _ = shortened(system, i, block, points)
         sy = load(points.q, pitch + block)
         store(points.shares, block, sx)
         m = add_scaled(m, mass, 1.0)
@@ -145,32 +145,32 @@ def bent_mass(p, i, q, ws, points):
         second = add_product(second, mass, add_product(add_product(zeros(), sx, sx), sy, sy))
         second = add_scaled(second, inertia, 1.0)
     for j in range(width * width):
-        ws.mass[at + j] = 0.0
-    ws.mass[at] = ws.mass[at + width + 1] = summed(m)
-    ws.mass[at + 2 * width], ws.mass[at + 2 * width + 1] = -summed(first_y), summed(first_x)
-    ws.mass[at + 2 * width + 2] = summed(second)
+        work.mass[at + j] = 0.0
+    work.mass[at] = work.mass[at + width + 1] = summed(m)
+    work.mass[at + 2 * width], work.mass[at + 2 * width + 1] = -summed(first_y), summed(first_x)
+    work.mass[at + 2 * width + 2] = summed(second)
     for l in range(n):
-        bent_mass_row(p, i, l, ws.mass, points)
+        second_order_mass_row(system, i, l, work.mass, points)
     for r in range(width):
         for d in range(r):
-            ws.mass[at + d * width + r] = ws.mass[at + r * width + d]
+            work.mass[at + d * width + r] = work.mass[at + r * width + d]
 
 
 @inlined
-def bent_mass_row(p, i, l, mass, points):
+def second_order_mass_row(system, i, l, mass, points):
     """The row of flexible coordinate l up to its diagonal; s_x of the points is in points.shares, s_y in points.q."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     pitch, width = body.pitch, 3 + body.nf
     row, place = body.dense + (3 + l) * width, body.places + 3 * pitch * l
     mx, my, lever = zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
-        x, y = load(p.places, place + block), load(p.places, place + pitch + block)
+        x, y = load(system.places, place + block), load(system.places, place + pitch + block)
         for j in range(body.slopes):
-            scale = -points.q[2 * pitch + j] * p.places[place + 2 * pitch + j]
-            x = add_scaled(x, load(p.spans, body.spans + j * pitch + block), scale)
+            scale = -points.q[2 * pitch + j] * system.places[place + 2 * pitch + j]
+            x = add_scaled(x, load(system.spans, body.spans + j * pitch + block), scale)
         m, inertia = (
-            load(p.inertias, body.inertias + pitch + block),
-            load(p.inertias, body.inertias + 2 * pitch + block),
+            load(system.inertias, body.inertias + pitch + block),
+            load(system.inertias, body.inertias + 2 * pitch + block),
         )
         store(points.rows, 2 * pitch * l + block, x)
         m_x, m_y = add_product(zeros(), m, x), add_product(zeros(), m, y)
@@ -179,35 +179,35 @@ def bent_mass_row(p, i, l, mass, points):
         lever = add_product(lever, load(points.shares, block), m_y)
         against = add_product(zeros(), load(points.q, pitch + block), m_x)
         lever = add_scaled(lever, against, -1.0)
-        lever = add_product(lever, inertia, load(p.places, place + 2 * pitch + block))
+        lever = add_product(lever, inertia, load(system.places, place + 2 * pitch + block))
     mass[row], mass[row + 1], mass[row + 2] = summed(mx), summed(my), summed(lever)
     for d in range(l + 1):
         total, other = zeros(), body.places + 3 * pitch * d
         for block in range(0, pitch, LANES):
             m, inertia = (
-                load(p.inertias, body.inertias + pitch + block),
-                load(p.inertias, body.inertias + 2 * pitch + block),
+                load(system.inertias, body.inertias + pitch + block),
+                load(system.inertias, body.inertias + 2 * pitch + block),
             )
             total = add_product(
                 total, load(points.rows, 2 * pitch * l + pitch + block), load(points.rows, 2 * pitch * d + block)
             )
-            m_y = add_product(zeros(), m, load(p.places, place + pitch + block))
-            total = add_product(total, m_y, load(p.places, other + pitch + block))
-            turn = add_product(zeros(), inertia, load(p.places, place + 2 * pitch + block))
-            total = add_product(total, turn, load(p.places, other + 2 * pitch + block))
+            m_y = add_product(zeros(), m, load(system.places, place + pitch + block))
+            total = add_product(total, m_y, load(system.places, other + pitch + block))
+            turn = add_product(zeros(), inertia, load(system.places, place + 2 * pitch + block))
+            total = add_product(total, turn, load(system.places, other + 2 * pitch + block))
         mass[row + 3 + d] = summed(total)
 
 
 @routine
-def note_axial_forces(p, i, q, v, a, lam, ws, points, geometric):
+def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
     """Geometric stiffness of body i into ws.geometric: of its inertia forces and of its joints' forces along it.
 
     `points` and `geometric` are those of ws.
     """
-    body = p.bodies[i]
+    body = system.bodies[i]
     n, at, pitch = body.nf, body.square, body.pitch
     # Only the axial forces at the Gauss points are wanted.
-    bent_equations(p, i, q, v, a, ws.f, points)
+    second_order_equations(system, i, q, v, a, work.f, points)
     for j in range(body.slopes, pitch):
         points.axial[j] = 0.0
     for l in range(n):
@@ -215,40 +215,40 @@ def note_axial_forces(p, i, q, v, a, lam, ws, points, geometric):
         for d in range(n):
             total, other = zeros(), body.places + 3 * pitch * d + 2 * pitch
             for block in range(0, pitch, LANES):
-                bent = add_product(zeros(), load(p.places, slopes + block), load(p.places, other + block))
+                bent = add_product(zeros(), load(system.places, slopes + block), load(system.places, other + block))
                 total = add_product(total, load(points.axial, block), bent)
             geometric[at + l * n + d] = -summed(total)
     c, s = cos(q[body.offset + 2]), sin(q[body.offset + 2])
     for k in range(body.port, body.port_end):
-        port = p.ports[k]
-        bending = p.markers[port.marker].bending
+        port = system.ports[k]
+        bending = system.markers[port.marker].bending
         if port.kind == ANGLE or bending < 0:
             continue
         if port.kind == AXIS:
-            force = port.sign * lam[port.row] * (c * ws.axes[port.axis, 0] + s * ws.axes[port.axis, 1])
+            force = port.weight * lam[port.row] * (c * work.axes[port.axis, 0] + s * work.axes[port.axis, 1])
         else:
-            force = port.sign * (c * lam[port.row] + s * lam[port.row + 1])
+            force = port.weight * (c * lam[port.row] + s * lam[port.row + 1])
         for l in range(n):
             for d in range(n):
-                geometric[at + l * n + d] -= force * p.bending[bending + l * body.stride + d]
+                geometric[at + l * n + d] -= force * system.bending[bending + l * body.stride + d]
 
 
 @kernel
-def note_all_axial_forces(p, q, v, a, lam, ws, geometric):
+def note_all_axial_forces(system, q, v, a, lam, work, geometric):
     """Geometric stiffness of every body for the next factor; `geometric` is ws.geometric, None for linear geometry."""
     if geometric is None:
         return
-    for i in range(p.bodies.size):
-        if p.bodies[i].slopes > 0:
-            note_axial_forces(p, i, q, v, a, lam, ws, ws.scratch.points, geometric)
+    for i in range(system.bodies.size):
+        if system.bodies[i].slopes > 0:
+            note_axial_forces(system, i, q, v, a, lam, work, work.scratch.points, geometric)
 
 
 @routine
-def subtract_geometric(p, i, geometric, scale, u, x):
+def subtract_geometric(system, i, geometric, scale, u, x):
     """Subtract scale K_g u of body i from x; `geometric` as for `note_all_axial_forces`."""
     if geometric is None:
         return
-    body = p.bodies[i]
+    body = system.bodies[i]
     if body.slopes > 0:
         e, n = body.offset + 3, body.nf
         for j in range(n):
@@ -257,26 +257,26 @@ def subtract_geometric(p, i, geometric, scale, u, x):
 
 
 @routine
-def linear_mass(p, i, ws):
+def linear_mass(system, i, work):
     """Mass matrix of body i of linear geometry into ws.mass, by what `factor.factor_body` noted."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     n, k, width, at = body.nf, body.flex, 3 + body.nf, body.dense
-    sx, sy, inertia = ws.frame[i, 2], ws.frame[i, 3], ws.frame[i, 4]
+    sx, sy, inertia = work.frame[i, 2], work.frame[i, 3], work.frame[i, 4]
     for j in range(width * width):
-        ws.mass[at + j] = 0.0
-    ws.mass[at] = ws.mass[at + width + 1] = body.m
-    ws.mass[at + 2], ws.mass[at + width + 2], ws.mass[at + 2 * width + 2] = -sy, sx, inertia
+        work.mass[at + j] = 0.0
+    work.mass[at] = work.mass[at + width + 1] = body.m
+    work.mass[at + 2], work.mass[at + width + 2], work.mass[at + 2 * width + 2] = -sy, sx, inertia
     for j in range(n):
-        ws.mass[at + 3 + j], ws.mass[at + width + 3 + j] = p.modal[S2X, k + j], p.modal[S2Y, k + j]
-        ws.mass[at + 2 * width + 3 + j] = ws.flex[MPF, k + j]
-        ws.mass[at + (3 + j) * (width + 1)] = 1.0
+        work.mass[at + 3 + j], work.mass[at + width + 3 + j] = system.modal[S2X, k + j], system.modal[S2Y, k + j]
+        work.mass[at + 2 * width + 3 + j] = work.flex[MPF, k + j]
+        work.mass[at + (3 + j) * (width + 1)] = 1.0
     for r in range(3):
         for d in range(r + 1, width):
-            ws.mass[at + d * width + r] = ws.mass[at + r * width + d]
+            work.mass[at + d * width + r] = work.mass[at + r * width + d]
 
 
 @routine
-def factor_dense_body(p, i, b, q, ws, dense):
+def factor_dense_body(system, i, b, q, work, dense):
     """Mass matrix of body i and Cholesky factor of M + g D + b (K + K_g), g^2 = b; without K_g if that is not definite.
 
     Diagonals of the factor hold reciprocals. Returns whether the body's matrix is dense; `dense` is ws.dense, None
@@ -284,49 +284,49 @@ def factor_dense_body(p, i, b, q, ws, dense):
     """
     if dense is None:
         return False
-    body = p.bodies[i]
+    body = system.bodies[i]
     if body.full == 0:
         return False
     n, width, at = body.nf, 3 + body.nf, body.dense
     g = sqrt(b)
     if body.slopes > 0:
-        bent_mass(p, i, q, ws, ws.scratch.points)
+        second_order_mass(system, i, q, work, work.scratch.points)
     else:
-        linear_mass(p, i, ws)
+        linear_mass(system, i, work)
     for attempt in range(2):
         for j in range(width * width):
-            ws.dense[at + j] = ws.mass[at + j]
+            work.dense[at + j] = work.mass[at + j]
         for l in range(n):
             r = at + (3 + l) * width + 3
-            ws.dense[r + l] += b * p.modal[OMEGA2, body.flex + l] + g * p.modal[DAMPING, body.flex + l]
+            work.dense[r + l] += b * system.modal[OMEGA2, body.flex + l] + g * system.modal[DAMPING, body.flex + l]
             if body.damping >= 0:
                 for d in range(l + 1):
-                    ws.dense[r + d] += g * p.damping[body.damping + l * body.stride + d]
+                    work.dense[r + d] += g * system.damping[body.damping + l * body.stride + d]
             if attempt == 0 and body.slopes > 0:
                 for d in range(l + 1):
-                    ws.dense[r + d] += b * ws.geometric[body.square + l * n + d]
+                    work.dense[r + d] += b * work.geometric[body.square + l * n + d]
         definite = True
         for r in range(width):
             for d in range(r + 1):
-                total = ws.dense[at + r * width + d]
+                total = work.dense[at + r * width + d]
                 for k in range(d):
-                    total -= ws.dense[at + r * width + k] * ws.dense[at + d * width + k]
+                    total -= work.dense[at + r * width + k] * work.dense[at + d * width + k]
                 if d < r:
-                    ws.dense[at + r * width + d] = total * ws.dense[at + d * width + d]
+                    work.dense[at + r * width + d] = total * work.dense[at + d * width + d]
                 elif total > 0.0:
-                    ws.dense[at + r * width + r] = 1.0 / sqrt(total)
+                    work.dense[at + r * width + r] = 1.0 / sqrt(total)
                 else:
                     definite = False
-                    ws.dense[at + r * width + r] = 0.0
+                    work.dense[at + r * width + r] = 0.0
         if definite:
             break
     return True
 
 
 @routine
-def solve_dense(p, i, dense, source, target, at, pitch):
+def solve_dense(system, i, dense, source, target, at, pitch):
     """(M + b (K + K_g))^-1 times eight columns of a matrix with rows `pitch` apart, from `at` on."""
-    width, first = 3 + p.bodies[i].nf, p.bodies[i].dense
+    width, first = 3 + system.bodies[i].nf, system.bodies[i].dense
     for r in range(width):
         total = load(source, at + r * pitch)
         for k in range(r):
@@ -340,34 +340,34 @@ def solve_dense(p, i, dense, source, target, at, pitch):
 
 
 @routine
-def respond_dense(p, i, ws, dense, inverse):
+def respond_dense(system, i, work, dense, inverse):
     """Response of body i to its constraint rows into ws.response, and the inverse of its iteration matrix.
 
     `dense` and `inverse` are those of ws, None where no body's matrix is dense.
     """
     if inverse is None:
         return
-    body = p.bodies[i]
+    body = system.bodies[i]
     for block in range(0, body.lanes, LANES):
-        solve_dense(p, i, dense, ws.jac, ws.response, body.jac + block, body.lanes)
+        solve_dense(system, i, dense, work.jac, work.response, body.jac + block, body.lanes)
     width = 3 + body.nf
     pitch = padded(width)
     for r in range(width):
         for l in range(pitch):
             inverse[body.inverse + r * pitch + l] = 1.0 if r == l else 0.0
     for block in range(0, pitch, LANES):
-        solve_dense(p, i, dense, inverse, inverse, body.inverse + block, pitch)
+        solve_dense(system, i, dense, inverse, inverse, body.inverse + block, pitch)
 
 
 @inlined
-def inverse_times(p, i, inverse, y, x):
+def inverse_times(system, i, inverse, y, x):
     """(M + b (K + K_g))^-1 x of body i in place, in its body frame; y is scratch.
 
     `inverse` is ws.inverse, None where no body's matrix is dense.
     """
     if inverse is None:
         return
-    body = p.bodies[i]
+    body = system.bodies[i]
     width, o = 3 + body.nf, body.offset
     pitch = padded(width)
     for j in range(pitch):
@@ -379,9 +379,9 @@ def inverse_times(p, i, inverse, y, x):
 
 
 @routine
-def bent_mass_times(p, i, mass, product, x):
+def second_order_mass_times(system, i, mass, product, x):
     """M x of body i in place, in its body frame."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     o, width = body.offset, 3 + body.nf
     for r in range(width):
         total = 0.0
@@ -393,9 +393,9 @@ def bent_mass_times(p, i, mass, product, x):
 
 
 @routine
-def bent_mass_square(p, i, mass, x, x0, x1):
+def second_order_mass_square(system, i, mass, x, x0, x1):
     """x^T M x of body i, with the translational part turned to its frame: x0, x1."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     o, width, at = body.offset, 3 + body.nf, body.dense
     square = 0.0
     for r in range(width):

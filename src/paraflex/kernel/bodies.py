@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from paraflex.kernel.bending import bent_energy, bent_equations, bent_shortening
+from paraflex.kernel.bending import second_order_energy, second_order_equations, second_order_shortening
 from paraflex.kernel.compiling import inlined, kernel
 from paraflex.kernel.joints import apply_lines, apply_loads
 from paraflex.kernel.packed import DAMPING, OMEGA2, S2X, S2Y
@@ -17,20 +17,20 @@ from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 
 @inlined
-def linear_terms(p, i, q, v, a, f, scratch):
+def linear_terms(system, i, q, v, a, f, scratch):
     """M q'' + h + D u' + K u of body i by its sums, but for the shares: see `begin_body`."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
     c, s = scratch.turn[0], scratch.turn[1]
     w, dw = v[o + 2], a[o + 2]
     # Gravity acts as a frame that is accelerated upwards.
-    gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
+    gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
     # First moments s; S2 u' and S2 u''.
     sx, sy = body.S1x + scratch.q[S2X_SUM], body.S1y + scratch.q[S2Y_SUM]
     vx, vy, fx, fy = scratch.v[S2X_SUM], scratch.v[S2Y_SUM], scratch.a[S2X_SUM], scratch.a[S2Y_SUM]
-    body_products(p, i, q, v, scratch)
+    body_products(system, i, q, v, scratch)
     uI2u, uI2v, mpf_a = 0.0, 0.0, scratch.a[GJ_SUM]
     for j in range(n):
         u, du, ddu, g_u, i_u = q[e + j], v[e + j], a[e + j], scratch.G2_q[j], scratch.I2_q[j]
@@ -42,8 +42,8 @@ def linear_terms(p, i, q, v, a, f, scratch):
             - g_u * dw
             - w * w * i_u
             - 2.0 * w * scratch.G2_v[j]
-            + p.modal[OMEGA2, k + j] * u
-            + p.modal[DAMPING, k + j] * du
+            + system.modal[OMEGA2, k + j] * u
+            + system.modal[DAMPING, k + j] * du
         )
     shares = scratch.shares
     shares[S2X_SUM], shares[S2Y_SUM], shares[I1_SUM], shares[GJ_SUM] = ax, ay, -w * w, dw
@@ -56,26 +56,26 @@ def linear_terms(p, i, q, v, a, f, scratch):
 
 
 @inlined
-def begin_body(p, i, q, v, a, f, scratch, points):
+def begin_body(system, i, q, v, a, f, scratch, points):
     """M q'' + h + D u' + K u of body i, less its weight, into f, but for the shares in scratch.
 
     Joints and motors add theirs, and `sums.hand_on` ends it. `points` is scratch.points, None for linear geometry.
     """
-    body_sums(p, i, q, v, a, scratch)
-    clear_shares(p, i, scratch)
+    body_sums(system, i, q, v, a, scratch)
+    clear_shares(system, i, scratch)
     if points is None:
-        linear_terms(p, i, q, v, a, f, scratch)
-    elif p.bodies[i].slopes > 0:
-        bent_equations(p, i, q, v, a, f, points)
+        linear_terms(system, i, q, v, a, f, scratch)
+    elif system.bodies[i].slopes > 0:
+        second_order_equations(system, i, q, v, a, f, points)
     else:
-        linear_terms(p, i, q, v, a, f, scratch)
-    add_coupled_damping(p, i, v, f, scratch)
+        linear_terms(system, i, q, v, a, f, scratch)
+    add_coupled_damping(system, i, v, f, scratch)
 
 
 @inlined
-def add_coupled_damping(p, i, v, f, scratch):
-    """Add D u' of body i to f, without the diagonal of D, which `linear_terms` and `bent_equations` take."""
-    body = p.bodies[i]
+def add_coupled_damping(system, i, v, f, scratch):
+    """Add D u' of body i to f, without the diagonal of D, which `linear_terms` and `second_order_equations` take."""
+    body = system.bodies[i]
     if body.damping < 0:
         return
     e = body.offset + 3
@@ -83,7 +83,7 @@ def add_coupled_damping(p, i, v, f, scratch):
         total, at = zeros(), body.damping + block
         for j in range(body.nf):
             # The matrix is symmetric.
-            total = add_scaled(total, load(p.damping, at), v[e + j])
+            total = add_scaled(total, load(system.damping, at), v[e + j])
             at += body.stride
         store(scratch.G2_v, block, total)
     for j in range(body.nf):
@@ -91,58 +91,58 @@ def add_coupled_damping(p, i, v, f, scratch):
 
 
 @kernel
-def body_terms(p, i, q, v, a, f, scratch):
+def body_terms(system, i, q, v, a, f, scratch):
     """M q'' + h + D u' + K u of body i, less its weight, into f; the translational part in the ground frame."""
-    begin_body(p, i, q, v, a, f, scratch, scratch.points)
-    hand_on(p, i, scratch, f)
+    begin_body(system, i, q, v, a, f, scratch, scratch.points)
+    hand_on(system, i, scratch, f)
 
 
 @kernel
-def motion_forces(p, q, v, a, f, scratch):
+def motion_forces(system, q, v, a, f, scratch):
     """M q'' + h + K u of the whole system at every instant of a motion, less weight and loads: all (instants, n)."""
     for k in range(q.shape[0]):
-        for i in range(p.bodies.size):
-            body_terms(p, i, q[k], v[k], a[k], f[k], scratch)
-        apply_loads(p, q[k], f[k])
-        apply_lines(p, q[k], v[k], f[k])
+        for i in range(system.bodies.size):
+            body_terms(system, i, q[k], v[k], a[k], f[k], scratch)
+        apply_loads(system, q[k], f[k])
+        apply_lines(system, q[k], v[k], f[k])
 
 
 @kernel
-def weight_work(p, q, scratch):
+def weight_work(system, q, scratch):
     """What gravity has done since all mass lay at the origin of the ground frame: g . sum m p."""
-    return add_weights(p, q, scratch.points)
+    return add_weights(system, q, scratch.points)
 
 
 @inlined
-def add_weights(p, q, points):
+def add_weights(system, q, points):
     """Of all bodies; `points` as for `begin_body`."""
     total = 0.0
-    if p.gravity[0] == 0.0 and p.gravity[1] == 0.0:
+    if system.gravity[0] == 0.0 and system.gravity[1] == 0.0:
         return total
-    for i in range(p.bodies.size):
-        body = p.bodies[i]
+    for i in range(system.bodies.size):
+        body = system.bodies[i]
         o, k = body.offset, body.flex
         sx, sy = body.S1x, body.S1y
         for j in range(body.nf):
-            sx += p.modal[S2X, k + j] * q[o + 3 + j]
-            sy += p.modal[S2Y, k + j] * q[o + 3 + j]
+            sx += system.modal[S2X, k + j] * q[o + 3 + j]
+            sy += system.modal[S2Y, k + j] * q[o + 3 + j]
         if points is not None:
             if body.slopes > 0:
-                sx -= bent_shortening(p, i, q, points)
+                sx -= second_order_shortening(system, i, q, points)
         c, s = cos(q[o + 2]), sin(q[o + 2])
-        total += p.gravity[0] * (body.m * q[o] + c * sx - s * sy)
-        total += p.gravity[1] * (body.m * q[o + 1] + s * sx + c * sy)
+        total += system.gravity[0] * (body.m * q[o] + c * sx - s * sy)
+        total += system.gravity[1] * (body.m * q[o + 1] + s * sx + c * sy)
     return total
 
 
 @kernel
-def body_energy(p, i, q, v, scratch):
+def body_energy(system, i, q, v, scratch):
     """Kinetic and strain energy of body i."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
-    body_sums(p, i, q, v, v, scratch)
-    body_products(p, i, q, v, scratch)
+    body_sums(system, i, q, v, v, scratch)
+    body_products(system, i, q, v, scratch)
     c, s = scratch.turn[0], scratch.turn[1]
     w = v[o + 2]
     rx, ry = c * v[o] + s * v[o + 1], c * v[o + 1] - s * v[o]
@@ -154,29 +154,29 @@ def body_energy(p, i, q, v, scratch):
         inertia += scratch.I2_q[j] * u
         coupling -= scratch.G2_q[j] * du
         flexible += du * du
-        strain += p.modal[OMEGA2, k + j] * u * u
+        strain += system.modal[OMEGA2, k + j] * u * u
     kinetic = 0.5 * (body.m * (rx * rx + ry * ry) + inertia * w * w + flexible)
     kinetic += rx * (vx - sy * w) + ry * (vy + sx * w) + w * coupling
     return kinetic, 0.5 * strain
 
 
 @kernel
-def system_energy(p, q, v, scratch):
+def system_energy(system, q, v, scratch):
     """Kinetic and strain energy of the system."""
-    return add_energies(p, q, v, scratch, scratch.points)
+    return add_energies(system, q, v, scratch, scratch.points)
 
 
 @inlined
-def add_energies(p, q, v, scratch, points):
+def add_energies(system, q, v, scratch, points):
     """Energies of all bodies; `points` as for `begin_body`."""
     kinetic, strain = 0.0, 0.0
-    for i in range(p.bodies.size):
+    for i in range(system.bodies.size):
         if points is None:
-            t, u = body_energy(p, i, q, v, scratch)
-        elif p.bodies[i].slopes > 0:
-            t, u = bent_energy(p, i, q, v, points)
+            t, u = body_energy(system, i, q, v, scratch)
+        elif system.bodies[i].slopes > 0:
+            t, u = second_order_energy(system, i, q, v, points)
         else:
-            t, u = body_energy(p, i, q, v, scratch)
+            t, u = body_energy(system, i, q, v, scratch)
         kinetic += t
         strain += u
     return kinetic, strain

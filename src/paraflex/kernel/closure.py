@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, copy, fill, largest
 from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.compiling import by_reference, lasting, routine, seldom
+from paraflex.kernel.compiling import by_reference, releases_lock, routine, unoptimised
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.dense import factor_dense, solve_factored
 from paraflex.kernel.joints import (
@@ -58,123 +58,123 @@ class ClosureScratch(NamedTuple):
     body: Scratch
 
 
-def make_closure_scratch(p: PackedSystem, tasks: int, signals: int) -> ClosureScratch:
+def make_closure_scratch(system: PackedSystem, tasks: int, signals: int) -> ClosureScratch:
     """Allocate what `close_path` needs."""
-    n, m = int(sum(3 + body["nf"] for body in p.bodies)), p.rows.size
+    n, m = int(sum(3 + body["nf"] for body in system.bodies)), system.rows.size
     jacobian, before, factors, fresh, change = (apart((n, n)) for _ in range(5))
     order, fresh_order = apart(n, np.int64), apart(n, np.int64)
     phi, dphi, lam = (apart(m) for _ in range(3))
     return ClosureScratch(
         single=apart((n, 1)), right=apart((n, 1 + tasks)), jacobian=jacobian, before=before, factors=factors,
         order=order, fresh=fresh, fresh_order=fresh_order, change=change, here=apart((3, tasks)), phi=phi, dphi=dphi,
-        lam=lam, zero=apart(n), idle=apart(signals), unused=apart(n), body=make_scratch(p),
+        lam=lam, zero=apart(n), idle=apart(signals), unused=apart(n), body=make_scratch(system),
     )  # fmt: skip
 
 
-@seldom
-def task_values(p, marker, coordinates, q, v, a, out):
+@unoptimised
+def task_values(system, marker, coordinates, q, v, a, out):
     """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker, into out (3, tasks)."""
-    px, py, vx, vy, ax, ay, _, _ = marker_motion(p, marker, q, v, a)
+    px, py, vx, vy, ax, ay, _, _ = marker_motion(system, marker, q, v, a)
     for i in range(coordinates.size):
         if coordinates[i] == 0:
             out[0, i], out[1, i], out[2, i] = px, vx, ax
         elif coordinates[i] == 1:
             out[0, i], out[1, i], out[2, i] = py, vy, ay
         else:
-            out[0, i] = marker_angle(p, marker, q)
-            out[1, i] = marker_angle(p, marker, v)
-            out[2, i] = marker_angle(p, marker, a)
+            out[0, i] = marker_angle(system, marker, q)
+            out[1, i] = marker_angle(system, marker, v)
+            out[2, i] = marker_angle(system, marker, a)
 
 
 @routine
-def closure_jacobian(p, marker, coordinates, q, jacobian):
+def closure_jacobian(system, marker, coordinates, q, jacobian):
     """[Phi_q; task_q] at q."""
-    m = p.rows.size
-    fill_jacobian(p, q, jacobian)
+    m = system.rows.size
+    fill_jacobian(system, q, jacobian)
     for i in range(coordinates.size):
         fill(jacobian[m + i], 0.0)
-    _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
+    _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
     for i in range(coordinates.size):
         if coordinates[i] == 2:
-            apply_torque(p, marker, 1.0, jacobian[m + i])
+            apply_torque(system, marker, 1.0, jacobian[m + i])
         else:
             unit = 1.0 if coordinates[i] == 0 else 0.0
-            apply_force(p, marker, q, unit, 1.0 - unit, rx, ry, jacobian[m + i])
+            apply_force(system, marker, q, unit, 1.0 - unit, rx, ry, jacobian[m + i])
 
 
 @routine
-def row_unit(p, coordinates, r):
+def row_unit(system, coordinates, r):
     """What row r is compared with: the size of the mechanism for a length, 1 for an angle."""
-    if r < p.rows.size:
-        return p.rows[r].unit
-    return 1.0 if coordinates[r - p.rows.size] == 2 else p.size
+    if r < system.rows.size:
+        return system.rows[r].unit
+    return 1.0 if coordinates[r - system.rows.size] == 2 else system.size
 
 
 @routine
-def scaled_jacobian(p, marker, coordinates, q, jacobian):
+def scaled_jacobian(system, marker, coordinates, q, jacobian):
     """[Phi_q; task_q] at q without dimension: rows in their units, places of bodies in sizes of the mechanism."""
-    closure_jacobian(p, marker, coordinates, q, jacobian)
+    closure_jacobian(system, marker, coordinates, q, jacobian)
     for r in range(jacobian.shape[0]):
-        unit = row_unit(p, coordinates, r)
+        unit = row_unit(system, coordinates, r)
         for j in range(jacobian.shape[1]):
             jacobian[r, j] /= unit
-        for i in range(p.bodies.size):
-            for j in range(p.bodies[i].offset, p.bodies[i].offset + 2):
-                jacobian[r, j] *= p.size
+        for i in range(system.bodies.size):
+            for j in range(system.bodies[i].offset, system.bodies[i].offset + 2):
+                jacobian[r, j] *= system.size
 
 
 @routine
-def solve_scaled(p, coordinates, factors, order, right):
+def solve_scaled(system, coordinates, factors, order, right):
     """Solve for coordinates [m, rad] with the factors of a Jacobian without dimension, in place."""
     for r in range(right.shape[0]):
-        unit = row_unit(p, coordinates, r)
+        unit = row_unit(system, coordinates, r)
         for k in range(right.shape[1]):
             right[r, k] /= unit
     solve_factored(factors, order, right)
-    for i in range(p.bodies.size):
-        for j in range(p.bodies[i].offset, p.bodies[i].offset + 2):
+    for i in range(system.bodies.size):
+        for j in range(system.bodies[i].offset, system.bodies[i].offset + 2):
             for k in range(right.shape[1]):
-                right[j, k] *= p.size
+                right[j, k] *= system.size
 
 
 @routine
-def largest_shift(p, x):
+def largest_shift(system, x):
     """The largest change of place among changes of coordinates, in sizes of the mechanism."""
     shift = 0.0
-    for i in range(p.bodies.size):
-        first = p.bodies[i].offset
-        shift = max(shift, abs(x[first]) / p.size, abs(x[first + 1]) / p.size)
+    for i in range(system.bodies.size):
+        first = system.bodies[i].offset
+        shift = max(shift, abs(x[first]) / system.size, abs(x[first + 1]) / system.size)
     return shift
 
 
 @routine
-def largest_turn(p, x):
+def largest_turn(system, x):
     """The largest turn of a body among changes of coordinates [rad]."""
     turn = 0.0
-    for i in range(p.bodies.size):
-        turn = max(turn, abs(x[p.bodies[i].offset + 2]))
+    for i in range(system.bodies.size):
+        turn = max(turn, abs(x[system.bodies[i].offset + 2]))
     return turn
 
 
 @routine
-def relative_change(ws):
+def relative_change(work):
     """Norm of before^-1 (jacobian - before): below one, no matrix between the two is singular.
 
     Assemblies meet where the Jacobian is singular, and a step over that may end in another one; a step that is short
     enough does not, and no step is short enough that passes a singularity. A determinant would not tell: two loops may
     be singular at once, as are an arm and the parallelogram beside it.
     """
-    n, columns = ws.jacobian.shape[0], 0
+    n, columns = work.jacobian.shape[0], 0
     for j in range(n):
         moves = False
         for i in range(n):
-            ws.change[i, columns] = ws.jacobian[i, j] - ws.before[i, j]
-            moves = moves or ws.change[i, columns] != 0.0
+            work.change[i, columns] = work.jacobian[i, j] - work.before[i, j]
+            moves = moves or work.change[i, columns] != 0.0
         # Most columns are the same in every position.
         if moves:
             columns += 1
-    change = ws.change[:, :columns]
-    solve_factored(ws.factors, ws.order, change)
+    change = work.change[:, :columns]
+    solve_factored(work.factors, work.order, change)
     norm = 0.0
     for i in range(n):
         total = 0.0
@@ -185,69 +185,69 @@ def relative_change(ws):
 
 
 @routine
-def close_loops(p, signals, marker, coordinates, t, goal, known, q, ws):
+def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
     """Close the loops at one instant by Newton's method, from the pose in q; whether they close, and what gap is left.
 
     `known` says that ws.factors hold those of a pose nearby, which serve as long as they do it quickly.
     """
     gap = 0.0
     for iteration in range(MAX_ITERATIONS):
-        constraint_values(p, signals, t, q, ws.zero, ws.body, ws.phi, ws.dphi)
-        task_values(p, marker, coordinates, q, ws.zero, ws.zero, ws.here)
-        for r in range(ws.phi.size):
-            ws.single[r, 0] = ws.phi[r]
+        constraint_values(system, signals, t, q, work.zero, work.body, work.phi, work.dphi)
+        task_values(system, marker, coordinates, q, work.zero, work.zero, work.here)
+        for r in range(work.phi.size):
+            work.single[r, 0] = work.phi[r]
         for i in range(coordinates.size):
-            ws.single[ws.phi.size + i, 0] = ws.here[0, i] - goal[i]
-        gap = largest(ws.single[:, 0])
+            work.single[work.phi.size + i, 0] = work.here[0, i] - goal[i]
+        gap = largest(work.single[:, 0])
         if known and iteration < CHORDS:
-            solve_scaled(p, coordinates, ws.factors, ws.order, ws.single)
+            solve_scaled(system, coordinates, work.factors, work.order, work.single)
         else:
-            scaled_jacobian(p, marker, coordinates, q, ws.fresh)
-            if factor_dense(ws.fresh, ws.fresh_order) < SINGULAR_PIVOT:
+            scaled_jacobian(system, marker, coordinates, q, work.fresh)
+            if factor_dense(work.fresh, work.fresh_order) < SINGULAR_PIVOT:
                 return SINGULAR, gap
-            solve_scaled(p, coordinates, ws.fresh, ws.fresh_order, ws.single)
+            solve_scaled(system, coordinates, work.fresh, work.fresh_order, work.single)
         for j in range(q.size):
-            q[j] -= ws.single[j, 0]
-        move = max(largest_shift(p, ws.single[:, 0]), largest_turn(p, ws.single[:, 0]))
-        if move < SMALLEST_MOVE * (1.0 + max(largest_shift(p, q), largest_turn(p, q))):
+            q[j] -= work.single[j, 0]
+        move = max(largest_shift(system, work.single[:, 0]), largest_turn(system, work.single[:, 0]))
+        if move < SMALLEST_MOVE * (1.0 + max(largest_shift(system, q), largest_turn(system, q))):
             return CLOSED, gap
     return NO_CONVERGENCE, gap
 
 
 @routine
-def move_loops(p, signals, marker, coordinates, t, target, q, v, a, basis, ws):
+def move_loops(system, signals, marker, coordinates, t, target, q, v, a, basis, work):
     """Velocities, accelerations and basis of closed loops, with the factors at their pose."""
-    m, tasks = ws.phi.size, coordinates.size
-    constraint_values(p, signals, t, q, ws.zero, ws.body, ws.phi, ws.dphi)
+    m, tasks = work.phi.size, coordinates.size
+    constraint_values(system, signals, t, q, work.zero, work.body, work.phi, work.dphi)
     for r in range(q.size):
-        fill(ws.right[r], 0.0)
+        fill(work.right[r], 0.0)
     for r in range(m):
-        ws.right[r, 0] = -ws.dphi[r]
+        work.right[r, 0] = -work.dphi[r]
     for i in range(tasks):
-        ws.right[m + i, 0] = target[1, i]
-        ws.right[m + i, 1 + i] = 1.0
-    solve_scaled(p, coordinates, ws.factors, ws.order, ws.right)
+        work.right[m + i, 0] = target[1, i]
+        work.right[m + i, 1 + i] = 1.0
+    solve_scaled(system, coordinates, work.factors, work.order, work.right)
     for j in range(q.size):
-        v[j] = ws.right[j, 0]
+        v[j] = work.right[j, 0]
         for i in range(tasks):
-            basis[j, i] = ws.right[j, 1 + i]
+            basis[j, i] = work.right[j, 1 + i]
     # The part of Phi'' and of the task's acceleration that does not depend on the accelerations.
-    start_rows(p, signals, t, INDEX_1, ws.phi)
-    for i in range(p.bodies.size):
-        body_joints(p, i, q, v, ws.zero, ws.lam, INDEX_1, ws.body, ws.unused, ws.phi)
-    apply_axes(p, q, v, ws.zero, ws.lam, INDEX_1, ws.idle, ws.unused, ws.phi)
-    task_values(p, marker, coordinates, q, v, ws.zero, ws.here)
+    start_rows(system, signals, t, INDEX_1, work.phi)
+    for i in range(system.bodies.size):
+        body_joints(system, i, q, v, work.zero, work.lam, INDEX_1, work.body, work.unused, work.phi)
+    apply_axes(system, q, v, work.zero, work.lam, INDEX_1, work.idle, work.unused, work.phi)
+    task_values(system, marker, coordinates, q, v, work.zero, work.here)
     for r in range(m):
-        ws.single[r, 0] = -ws.phi[r]
+        work.single[r, 0] = -work.phi[r]
     for i in range(tasks):
-        ws.single[m + i, 0] = target[2, i] - ws.here[2, i]
-    solve_scaled(p, coordinates, ws.factors, ws.order, ws.single)
+        work.single[m + i, 0] = target[2, i] - work.here[2, i]
+    solve_scaled(system, coordinates, work.factors, work.order, work.single)
     for j in range(q.size):
-        a[j] = ws.single[j, 0]
+        a[j] = work.single[j, 0]
 
 
-@lasting
-def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, basis, ws):
+@releases_lock
+def close_path(system, signals, marker_index, coordinates, times, target, q, v, a, basis, work):
     """Close the loops along a path, each instant starting from the one before.
 
     Parameters
@@ -258,7 +258,7 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
         Written; q[0] holds the pose to start from.
     basis : (times, n, tasks) array
         Written: coordinates' change per change of the task coordinates, the null space of Phi_q in task terms.
-    ws : ClosureScratch
+    work : ClosureScratch
 
     Returns
     -------
@@ -266,27 +266,29 @@ def close_path(p, signals, marker_index, coordinates, times, target, q, v, a, ba
         Where it stopped and the residual left there, for a status other than CLOSED: NO_CONVERGENCE, SINGULAR, or
         TOO_COARSE where a singular position may lie between this instant and the one before.
     """
-    marker = p.markers[marker_index]
+    marker = system.markers[marker_index]
     for k in range(times.size):
         if k > 0:
             dt = times[k] - times[k - 1]
             for j in range(q.shape[1]):
                 q[k, j] = q[k - 1, j] + dt * (v[k - 1, j] + 0.5 * dt * a[k - 1, j])
-        copy(q[k], ws.unused)
-        status, gap = close_loops(p, signals, marker, coordinates, times[k], target[k, 0], k > 0, q[k], ws)
+        copy(q[k], work.unused)
+        status, gap = close_loops(system, signals, marker, coordinates, times[k], target[k, 0], k > 0, q[k], work)
         if status != CLOSED:
             return status, k, gap
         for j in range(q.shape[1]):
-            ws.unused[j] -= q[k, j]
-        if k > 0 and (largest_turn(p, ws.unused) > LARGEST_TURN or largest_shift(p, ws.unused) > LARGEST_SHIFT):
+            work.unused[j] -= q[k, j]
+        if k > 0 and (
+            largest_turn(system, work.unused) > LARGEST_TURN or largest_shift(system, work.unused) > LARGEST_SHIFT
+        ):
             return TOO_COARSE, k, gap
-        scaled_jacobian(p, marker, coordinates, q[k], ws.jacobian)
-        if k > 0 and relative_change(ws) >= 1.0:
+        scaled_jacobian(system, marker, coordinates, q[k], work.jacobian)
+        if k > 0 and relative_change(work) >= 1.0:
             return TOO_COARSE, k, gap
         for j in range(q.shape[1]):
-            copy(ws.jacobian[j], ws.before[j])
-            copy(ws.jacobian[j], ws.factors[j])
-        if factor_dense(ws.factors, ws.order) < SINGULAR_PIVOT:
+            copy(work.jacobian[j], work.before[j])
+            copy(work.jacobian[j], work.factors[j])
+        if factor_dense(work.factors, work.order) < SINGULAR_PIVOT:
             return SINGULAR, k, gap
-        move_loops(p, signals, marker, coordinates, times[k], target[k], q[k], v[k], a[k], basis[k], ws)
+        move_loops(system, signals, marker, coordinates, times[k], target[k], q[k], v[k], a[k], basis[k], work)
     return CLOSED, times.size, 0.0

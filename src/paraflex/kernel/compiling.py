@@ -18,7 +18,7 @@ else:
     from paraflex.kernel.machine_code import compiled
     from paraflex.kernel.records import by_reference
 
-__all__ = ["FAST_MATH", "Kernel", "by_reference", "inlined", "kernel", "lasting", "routine", "seldom"]
+__all__ = ["FAST_MATH", "Kernel", "by_reference", "inlined", "kernel", "releases_lock", "routine", "unoptimised"]
 
 # Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
@@ -86,7 +86,7 @@ def kernel(function: Callable[..., Any]) -> Kernel:
     return Kernel(function)
 
 
-def lasting(function: Callable[..., Any]) -> Kernel:
+def releases_lock(function: Callable[..., Any]) -> Kernel:
     """Make a kernel that lets other threads run meanwhile: of a function that takes long.
 
     One that soon returns would have to wait for them.
@@ -94,6 +94,6 @@ def lasting(function: Callable[..., Any]) -> Kernel:
     return Kernel(function, nogil=True)
 
 
-def seldom(function: Callable[..., Any]) -> Kernel:
+def unoptimised(function: Callable[..., Any]) -> Kernel:
     """Make a kernel of what Python calls a few times a run: compiled in half the time, and not fast."""
     return Kernel(function, quick=True)

@@ -6,7 +6,7 @@ from math import cosh
 
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import axis_motion, axis_values, fill_axis_rows
-from paraflex.kernel.compiling import inlined, kernel, routine, seldom
+from paraflex.kernel.compiling import inlined, kernel, routine, unoptimised
 from paraflex.kernel.joints import (
     angle_by_sums,
     apply_force,
@@ -24,54 +24,54 @@ from paraflex.kernel.sums import body_sums
 FLATTEST = 1e-9
 
 
-@seldom
-def constraint_values(p, signals, t, q, v, scratch, phi, dphi):
+@unoptimised
+def constraint_values(system, signals, t, q, v, scratch, phi, dphi):
     """Phi and Phi' at (t, q, v), into phi and dphi; zero in rows that are no constraints."""
-    for r in range(p.rows.size):
-        row = p.rows[r]
+    for r in range(system.rows.size):
+        row = system.rows[r]
         phi[r], dphi[r] = row.ground if row.kind == CONSTRAINT else 0.0, 0.0
         if row.signal >= 0:
             value, rate, _ = evaluate_signal(signals, row.signal, t)
             phi[r] -= value
             dphi[r] -= rate
-    for i in range(p.bodies.size):
+    for i in range(system.bodies.size):
         # The acceleration slot is not used here: v stands in for an array of the right length.
-        body_sums(p, i, q, v, v, scratch)
-        for k in range(p.bodies[i].port, p.bodies[i].port_end):
-            port = p.ports[k]
-            r, sign = port.row, port.sign
-            if p.rows[r].kind != CONSTRAINT or port.kind == AXIS:
+        body_sums(system, i, q, v, v, scratch)
+        for k in range(system.bodies[i].port, system.bodies[i].port_end):
+            port = system.ports[k]
+            r, weight = port.row, port.weight
+            if system.rows[r].kind != CONSTRAINT or port.kind == AXIS:
                 continue
             if port.kind == ANGLE:
-                angle, rate, _ = angle_by_sums(p, p.markers[port.marker], q, v, v, scratch)
-                phi[r] += sign * angle
-                dphi[r] += sign * rate
+                angle, rate, _ = angle_by_sums(system, system.markers[port.marker], q, v, v, scratch)
+                phi[r] += weight * angle
+                dphi[r] += weight * rate
             else:
-                px, py, vx, vy, _, _, _, _ = motion_by_sums(p, p.markers[port.marker], q, v, v, scratch)
-                phi[r] += sign * px
-                phi[r + 1] += sign * py
-                dphi[r] += sign * vx
-                dphi[r + 1] += sign * vy
-    axis_values(p, q, v, phi, dphi)
+                px, py, vx, vy, _, _, _, _ = motion_by_sums(system, system.markers[port.marker], q, v, v, scratch)
+                phi[r] += weight * px
+                phi[r + 1] += weight * py
+                dphi[r] += weight * vx
+                dphi[r + 1] += weight * vy
+    axis_values(system, q, v, phi, dphi)
 
 
-@seldom
-def fill_jacobian(p, q, jacobian):
+@unoptimised
+def fill_jacobian(system, q, jacobian):
     """Phi_q into a dense (rows, n) array, zero in rows that are no constraints; not for the time loop."""
-    for r in range(p.rows.size):
+    for r in range(system.rows.size):
         fill(jacobian[r], 0.0)
-    for k in range(p.ports.size):
-        port = p.ports[k]
-        marker = p.markers[port.marker]
-        if p.rows[port.row].kind != CONSTRAINT:
+    for k in range(system.ports.size):
+        port = system.ports[k]
+        marker = system.markers[port.marker]
+        if system.rows[port.row].kind != CONSTRAINT:
             continue
         if port.kind == ANGLE:
-            apply_torque(p, marker, port.sign, jacobian[port.row])
+            apply_torque(system, marker, port.weight, jacobian[port.row])
         elif port.kind != AXIS:
-            _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
-            apply_force(p, marker, q, port.sign, 0.0, rx, ry, jacobian[port.row])
-            apply_force(p, marker, q, 0.0, port.sign, rx, ry, jacobian[port.row + 1])
-    fill_axis_rows(p, q, jacobian)
+            _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
+            apply_force(system, marker, q, port.weight, 0.0, rx, ry, jacobian[port.row])
+            apply_force(system, marker, q, 0.0, port.weight, rx, ry, jacobian[port.row + 1])
+    fill_axis_rows(system, q, jacobian)
 
 
 @inlined
@@ -81,49 +81,49 @@ def damped(kind):
 
 
 @routine
-def joint_rates(p, q, v, rates):
+def joint_rates(system, q, v, rates):
     """Rates of the joints of dampers and friction into their entries of rates; whether there are any."""
     some = False
-    for r in range(p.rows.size):
-        if damped(p.rows[r].kind):
+    for r in range(system.rows.size):
+        if damped(system.rows[r].kind):
             rates[r], some = 0.0, True
     if not some:
         return False
-    for k in range(p.ports.size):
-        port = p.ports[k]
-        if port.kind == ANGLE and damped(p.rows[port.row].kind):
-            rates[port.row] += port.sign * marker_angle(p, p.markers[port.marker], v)
-    for k in range(p.axes.size):
-        row = p.axes[k].row
+    for k in range(system.ports.size):
+        port = system.ports[k]
+        if port.kind == ANGLE and damped(system.rows[port.row].kind):
+            rates[port.row] += port.weight * marker_angle(system, system.markers[port.marker], v)
+    for k in range(system.axes.size):
+        row = system.axes[k].row
         if row >= 0:
-            if damped(p.rows[row].kind):
-                rates[row] = axis_motion(p, k, q, v, v)[1]
+            if damped(system.rows[row].kind):
+                rates[row] += system.axes[k].weight * axis_motion(system, k, q, v, v)[1]
     return True
 
 
 @routine
-def dissipated_power(p, q, v, lam, rates):
+def dissipated_power(system, q, v, lam, rates):
     """What dampers and friction take; `rates` is scratch (m,)."""
     power = 0.0
-    if not joint_rates(p, q, v, rates):
+    if not joint_rates(system, q, v, rates):
         return power
-    for r in range(p.rows.size):
-        if damped(p.rows[r].kind):
+    for r in range(system.rows.size):
+        if damped(system.rows[r].kind):
             power += lam[r] * rates[r]
     return power
 
 
 @kernel
-def note_friction(p, q, v, rates, compliance):
+def note_friction(system, q, v, rates, compliance):
     """Inverse slopes of friction at the rates in v, for the iteration matrix; whether there is any.
 
     `rates` is scratch (m,).
     """
     some = False
-    if not joint_rates(p, q, v, rates):
+    if not joint_rates(system, q, v, rates):
         return some
-    for r in range(p.rows.size):
-        row = p.rows[r]
+    for r in range(system.rows.size):
+        row = system.rows[r]
         if row.kind == FRICTION:
             # d tanh(x) / dx = 1 / cosh^2 x; beyond x = 20 it is below rounding.
             c = cosh(min(abs(rates[r]) / (row.compliance * row.limit), 20.0))

@@ -19,40 +19,45 @@ SLOW_AGE = 25
 
 
 @routine
-def embedded_error(tableau, h, m):
+def embedded_error(tableau, h, march):
     """Difference to the embedded formula, in q and v, into m.eq and m.ev."""
-    fill(m.eq, 0.0)
-    fill(m.ev, 0.0)
+    fill(march.eq, 0.0)
+    fill(march.ev, 0.0)
     for s in range(tableau.c.size):
         weight = h * tableau.error[s]
-        for j in range(m.q.size):
-            m.eq[j] += weight * m.stage_d[s, j]
-            m.ev[j] += weight * m.stage_a[1, s, j]
+        for j in range(march.q.size):
+            march.eq[j] += weight * march.stage_d[s, j]
+            march.ev[j] += weight * march.stage_a[1, s, j]
 
 
 @routine
-def history_error(h, m):
+def history_error(h, march):
     """Difference to formulas of higher order through the last step's acceleration, into m.eq and m.ev.
 
     For v the integral of the parabola through the accelerations at t - h_0, t and t + h, for q that of the cubic with
     the velocities and accelerations at t and t + h.
     """
-    h0 = m.clock[LAST_STEP]
+    h0 = march.clock[LAST_STEP]
     if h0 > 0.0:
         before, end = -h * h * h / (6.0 * h0 * (h0 + h)), h * (h / 3.0 + 0.5 * h0) / (h + h0)
     else:
         # Nothing is known of the third derivative: it changes acceleration as much as the second does.
         before, end = -h / 12.0, 5.0 * h / 12.0
-    middle, last = h - before - end, m.stage_v.shape[0] - 1
-    for j in range(m.q.size):
-        a0, a1 = m.stage_a[1, 0, j], m.stage_a[1, last, j]
-        a_before = m.stage_a[0, 0, j] if h0 > 0.0 else a0
-        m.ev[j] = m.stage_v[last, j] - m.v[j] - before * a_before - middle * a0 - end * a1
-        m.eq[j] = m.stage_q[last, j] - m.q[j] - 0.5 * h * (m.v[j] + m.stage_v[last, j]) - h * h / 12.0 * (a0 - a1)
+    middle, last = h - before - end, march.stage_v.shape[0] - 1
+    for j in range(march.q.size):
+        a0, a1 = march.stage_a[1, 0, j], march.stage_a[1, last, j]
+        a_before = march.stage_a[0, 0, j] if h0 > 0.0 else a0
+        march.ev[j] = march.stage_v[last, j] - march.v[j] - before * a_before - middle * a0 - end * a1
+        march.eq[j] = (
+            march.stage_q[last, j]
+            - march.q[j]
+            - 0.5 * h * (march.v[j] + march.stage_v[last, j])
+            - h * h / 12.0 * (a0 - a1)
+        )
 
 
 @routine
-def filtered_error(p, g, rates, memory, m, ws, slow):
+def filtered_error(system, g, rates, memory, march, work, slow):
     """The estimate in m.eq and m.ev in the mass norm, in position and by what its velocity error does later: metres.
 
     The velocity error is filtered once more, as if by a step as long as `memory`: what is left of it is the part that
@@ -63,39 +68,39 @@ def filtered_error(p, g, rates, memory, m, ws, slow):
     for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2. Where Phi' = 0 is
     imposed, and no outcome of integration, Phi_q eps_v = 0. `rates` says which: 1 or 0, and alpha and beta.
     """
-    filter_error(p, g, rates, m.eq, m.ev, ws)
-    for j in range(m.q.size):
-        m.eq[j] += g * ws.x[j]
-    position = mass_norm(p, ws, m.eq)
-    if m.counts[STEPS] % SLOW_AGE == 0:
-        note_friction(p, m.q, m.v, slow.mu, slow.compliance)
-        factor_system(p, memory * memory, m.q, slow)
-    for j in range(m.q.size):
-        m.eq[j] = 0.0
-        m.ev[j] = ws.x[j]
-    filter_error(p, memory, rates, m.eq, m.ev, slow)
-    return position, memory * mass_norm(p, slow, slow.x)
+    filter_error(system, g, rates, march.eq, march.ev, work)
+    for j in range(march.q.size):
+        march.eq[j] += g * work.x[j]
+    position = mass_norm(system, work, march.eq)
+    if march.counts[STEPS] % SLOW_AGE == 0:
+        note_friction(system, march.q, march.v, slow.mu, slow.compliance)
+        factor_system(system, memory * memory, march.q, slow)
+    for j in range(march.q.size):
+        march.eq[j] = 0.0
+        march.ev[j] = work.x[j]
+    filter_error(system, memory, rates, march.eq, march.ev, slow)
+    return position, memory * mass_norm(system, slow, slow.x)
 
 
 @routine
-def filter_error(p, g, rates, eq, ev, ws):
+def filter_error(system, g, rates, eq, ev, work):
     """eps_v of (1 - g J) eps = (e_q, e_v) into ws.x, with the factor in ws made for b = g^2."""
     of_v, alpha, beta = rates
     scale = 1.0 + 2.0 * alpha * g + beta * beta * g * g
     for j in range(eq.size):
-        ws.x[j] = ev[j]
-        ws.f[j] = eq[j]
-    fill(ws.mu, 0.0)
-    for i in range(p.bodies.size):
-        body = p.bodies[i]
-        to_body_frame(p, i, ws, ws.x)
-        to_body_frame(p, i, ws, ws.f)
-        jacobian_times(p, i, ws, ws.x, of_v / scale, 0.0, 0.0, ws.mu)
-        jacobian_times(p, i, ws, ws.f, -beta * beta * g / scale, -1.0 / g, 0.0, ws.mu)
-        mass_times(p, i, ws, ws.mass, ws.x)
+        work.x[j] = ev[j]
+        work.f[j] = eq[j]
+    fill(work.mu, 0.0)
+    for i in range(system.bodies.size):
+        body = system.bodies[i]
+        to_body_frame(system, i, work, work.x)
+        to_body_frame(system, i, work, work.f)
+        jacobian_times(system, i, work, work.x, of_v / scale, 0.0, 0.0, work.mu)
+        jacobian_times(system, i, work, work.f, -beta * beta * g / scale, -1.0 / g, 0.0, work.mu)
+        mass_times(system, i, work, work.mass, work.x)
         e = body.offset + 3
         for j in range(body.nf):
-            ws.x[e + j] -= g * p.modal[OMEGA2, body.flex + j] * eq[e + j]
-        subtract_geometric(p, i, ws.geometric, g, eq, ws.x)
-        to_ground_frame(p, i, ws, ws.x)
-    solve_system(p, ws, ws.x, ws.mu)
+            work.x[e + j] -= g * system.modal[OMEGA2, body.flex + j] * eq[e + j]
+        subtract_geometric(system, i, work.geometric, g, eq, work.x)
+        to_ground_frame(system, i, work, work.x)
+    solve_system(system, work, work.x, work.mu)

@@ -24,24 +24,24 @@ SMALLEST_B = 1e-18
 
 
 @inlined
-def factor_body(p, i, b, q, ws):
+def factor_body(system, i, b, q, work):
     """Factor M + g D + b K of body i at q, D diagonal, g^2 = b: the arrow with its 3 x 3 rigid block."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     n, k = body.nf, body.flex
-    fr, scratch = ws.frame[i], ws.scratch
+    fr, scratch = work.frame[i], work.scratch
     g = sqrt(b)
-    body_sums(p, i, q, q, q, scratch)
-    body_products(p, i, q, q, scratch)
+    body_sums(system, i, q, q, q, scratch)
+    body_products(system, i, q, q, scratch)
     sx, sy = body.S1x + scratch.q[S2X_SUM], body.S1y + scratch.q[S2Y_SUM]
     inertia = body.I0 + 2.0 * scratch.q[I1_SUM]
     a00, a10, a11, a20, a21, a22 = body.m, 0.0, body.m, 0.0, 0.0, 0.0
     for j in range(n):
         inertia += scratch.I2_q[j] * q[body.offset + 3 + j]
-        S2x, S2y = p.modal[S2X, k + j], p.modal[S2Y, k + j]
-        mpf = p.modal[GJ, k + j] - scratch.G2_q[j]
-        d = 1.0 / (1.0 + g * p.modal[DAMPING, k + j] + b * p.modal[OMEGA2, k + j])
-        ws.flex[MPF, k + j] = mpf
-        ws.flex[DINV, k + j] = d
+        S2x, S2y = system.modal[S2X, k + j], system.modal[S2Y, k + j]
+        mpf = system.modal[GJ, k + j] - scratch.G2_q[j]
+        d = 1.0 / (1.0 + g * system.modal[DAMPING, k + j] + b * system.modal[OMEGA2, k + j])
+        work.flex[MPF, k + j] = mpf
+        work.flex[DINV, k + j] = d
         a00 -= S2x * S2x * d
         a10 -= S2y * S2x * d
         a11 -= S2y * S2y * d
@@ -72,104 +72,104 @@ def solve_rigid(fr, r0, r1, r2):
 
 
 @routine
-def respond(p, i, ws):
+def respond(system, i, work):
     """Response of body i to its constraint rows, (M + b K)^-1 J^T, and to its rigid coordinates, into ws.response."""
-    body = p.bodies[i]
-    n, k, lanes, fr = body.nf, body.flex, body.lanes, ws.frame[i]
+    body = system.bodies[i]
+    n, k, lanes, fr = body.nf, body.flex, body.lanes, work.frame[i]
     for block in range(0, lanes, LANES):
         at = body.jac + block
-        r0, r1, r2 = load(ws.jac, at), load(ws.jac, at + lanes), load(ws.jac, at + 2 * lanes)
+        r0, r1, r2 = load(work.jac, at), load(work.jac, at + lanes), load(work.jac, at + 2 * lanes)
         for j in range(n):
-            row, d = load(ws.jac, at + (3 + j) * lanes), ws.flex[DINV, k + j]
-            r0 = add_scaled(r0, row, -d * p.modal[S2X, k + j])
-            r1 = add_scaled(r1, row, -d * p.modal[S2Y, k + j])
-            r2 = add_scaled(r2, row, -d * ws.flex[MPF, k + j])
+            row, d = load(work.jac, at + (3 + j) * lanes), work.flex[DINV, k + j]
+            r0 = add_scaled(r0, row, -d * system.modal[S2X, k + j])
+            r1 = add_scaled(r1, row, -d * system.modal[S2Y, k + j])
+            r2 = add_scaled(r2, row, -d * work.flex[MPF, k + j])
         # As `solve_rigid`, eight at once.
         r0 = add_scaled(zeros(), r0, fr[5])
         r1 = add_scaled(zeros(), add_scaled(r1, r0, -fr[6]), fr[7])
         r2 = add_scaled(zeros(), add_scaled(add_scaled(r2, r0, -fr[8]), r1, -fr[9]), fr[10] * fr[10])
         r1 = add_scaled(zeros(), add_scaled(r1, r2, -fr[9]), fr[7])
         r0 = add_scaled(zeros(), add_scaled(add_scaled(r0, r1, -fr[6]), r2, -fr[8]), fr[5])
-        store(ws.response, at, r0)
-        store(ws.response, at + lanes, r1)
-        store(ws.response, at + 2 * lanes, r2)
+        store(work.response, at, r0)
+        store(work.response, at + lanes, r1)
+        store(work.response, at + 2 * lanes, r2)
         for j in range(n):
-            d = ws.flex[DINV, k + j]
-            x = add_scaled(zeros(), load(ws.jac, at + (3 + j) * lanes), d)
-            x = add_scaled(add_scaled(x, r0, -d * p.modal[S2X, k + j]), r1, -d * p.modal[S2Y, k + j])
-            store(ws.response, at + (3 + j) * lanes, add_scaled(x, r2, -d * ws.flex[MPF, k + j]))
+            d = work.flex[DINV, k + j]
+            x = add_scaled(zeros(), load(work.jac, at + (3 + j) * lanes), d)
+            x = add_scaled(add_scaled(x, r0, -d * system.modal[S2X, k + j]), r1, -d * system.modal[S2Y, k + j])
+            store(work.response, at + (3 + j) * lanes, add_scaled(x, r2, -d * work.flex[MPF, k + j]))
     rigid = body.jac + body.parts
     for r in range(3):
         for l in range(3):
-            ws.response[rigid + r * lanes + l] = 1.0 if r == l else 0.0
+            work.response[rigid + r * lanes + l] = 1.0 if r == l else 0.0
     for j in range(n):
-        d, at = ws.flex[DINV, k + j], rigid + (3 + j) * lanes
-        ws.response[at] = -d * p.modal[S2X, k + j]
-        ws.response[at + 1] = -d * p.modal[S2Y, k + j]
-        ws.response[at + 2] = -d * ws.flex[MPF, k + j]
+        d, at = work.flex[DINV, k + j], rigid + (3 + j) * lanes
+        work.response[at] = -d * system.modal[S2X, k + j]
+        work.response[at + 1] = -d * system.modal[S2Y, k + j]
+        work.response[at + 2] = -d * work.flex[MPF, k + j]
 
 
 @inlined
-def body_jacobian(p, i, q, ws):
+def body_jacobian(system, i, q, work):
     """The parts of body i's constraint rows in its own frame, [1, E s, N] and [0, 1, N2'], into the lanes of ws.jac."""
-    body = p.bodies[i]
-    n, lanes, scratch = body.nf, body.lanes, ws.scratch
+    body = system.bodies[i]
+    n, lanes, scratch = body.nf, body.lanes, work.scratch
     at = body.jac
     for j in range((3 + n) * lanes):
-        ws.jac[at + j] = 0.0
+        work.jac[at + j] = 0.0
     for k in range(body.port, body.port_end):
-        port = p.ports[k]
-        marker = p.markers[port.marker]
+        port = system.ports[k]
+        marker = system.markers[port.marker]
         x, h = at + port.local, marker.shape
         if port.kind == ANGLE:
-            ws.jac[x + 2 * lanes] = 1.0
+            work.jac[x + 2 * lanes] = 1.0
             for j in range(n):
-                ws.jac[x + (3 + j) * lanes] = p.shape[SLOPE, h + j]
+                work.jac[x + (3 + j) * lanes] = system.shape[SLOPE, h + j]
             continue
-        ux, uy = marker_shape(p, marker, q)
-        ux -= marker_shortening(p, p.bending, marker, q, q, q)[0]
-        ws.jac[x], ws.jac[x + 2 * lanes] = 1.0, -(marker.y + uy)
-        ws.jac[x + 1 + lanes], ws.jac[x + 1 + 2 * lanes] = 1.0, marker.x + ux
+        ux, uy = marker_shape(system, marker, q)
+        ux -= marker_shortening(system, system.bending, marker, q, q, q)[0]
+        work.jac[x], work.jac[x + 2 * lanes] = 1.0, -(marker.y + uy)
+        work.jac[x + 1 + lanes], work.jac[x + 1 + 2 * lanes] = 1.0, marker.x + ux
         fill(scratch.rigid, 0.0)
-        shorten(p, p.bending, marker, q, -1.0, scratch.rigid, 0)
+        shorten(system, system.bending, marker, q, -1.0, scratch.rigid, 0)
         for j in range(n):
-            ws.jac[x + (3 + j) * lanes] = p.shape[NX, h + j] + scratch.rigid[j]
-            ws.jac[x + 1 + (3 + j) * lanes] = p.shape[NY, h + j]
+            work.jac[x + (3 + j) * lanes] = system.shape[NX, h + j] + scratch.rigid[j]
+            work.jac[x + 1 + (3 + j) * lanes] = system.shape[NY, h + j]
         if port.parts > 2:
-            ws.jac[x + 2 + 2 * lanes] = 1.0
+            work.jac[x + 2 + 2 * lanes] = 1.0
             for j in range(n):
-                ws.jac[x + 2 + (3 + j) * lanes] = p.shape[SLOPE, h + j]
+                work.jac[x + 2 + (3 + j) * lanes] = system.shape[SLOPE, h + j]
         if port.parts > 3:
             fill(scratch.rigid, 0.0)
-            add_track(p, port.axis, ws.axes[port.axis, 3], 1.0, scratch.rigid, 0)
+            add_track(system, port.axis, work.axes[port.axis, 3], 1.0, scratch.rigid, 0)
             for j in range(n):
-                ws.jac[x + 3 + (3 + j) * lanes] = scratch.rigid[j]
+                work.jac[x + 3 + (3 + j) * lanes] = scratch.rigid[j]
 
 
 @inlined
-def body_block(p, i, ws):
+def body_block(system, i, work):
     """J M^-1 J^T of body i in its frame, into ws.blocks."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     lanes = body.lanes
     for r in range(body.parts):
         for block in range(0, lanes, LANES):
             total = zeros()
             for x in range(body.jac, body.jac + (3 + body.nf) * lanes, lanes):
-                total = add_scaled(total, load(ws.jac, x + block), ws.response[x + r])
-            store(ws.blocks, body.block + r * lanes + block, total)
+                total = add_scaled(total, load(work.jac, x + block), work.response[x + r])
+            store(work.blocks, body.block + r * lanes + block, total)
 
 
 @kernel
-def factor_bodies(p, b, q, ws):
+def factor_bodies(system, b, q, work):
     """Factor every body's M + b K at its deformation in q, in its own frame."""
-    ws.step[0] = max(b, SMALLEST_B)
-    turn_axes(p, q, ws.axes)
-    for i in range(p.bodies.size):
-        if p.bodies[i].slopes == 0:
-            factor_body(p, i, b, q, ws)
-        body_jacobian(p, i, q, ws)
-        if factor_dense_body(p, i, b, q, ws, ws.dense):
-            respond_dense(p, i, ws, ws.dense, ws.inverse)
+    work.step[0] = max(b, SMALLEST_B)
+    turn_axes(system, q, work.axes)
+    for i in range(system.bodies.size):
+        if system.bodies[i].slopes == 0:
+            factor_body(system, i, b, q, work)
+        body_jacobian(system, i, q, work)
+        if factor_dense_body(system, i, b, q, work, work.dense):
+            respond_dense(system, i, work, work.dense, work.inverse)
         else:
-            respond(p, i, ws)
-        body_block(p, i, ws)
+            respond(system, i, work)
+        body_block(system, i, work)

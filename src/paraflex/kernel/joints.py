@@ -18,19 +18,19 @@ from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 
 @inlined
-def marker_shape(p, marker, vector):
+def marker_shape(system, marker, vector):
     """Body-frame displacement N z of a marker for the flexible part of a system vector z (q, v or a)."""
-    body = p.bodies[marker.body]
+    body = system.bodies[marker.body]
     e, k = body.offset + 3, marker.shape
     x, y = 0.0, 0.0
     for j in range(body.nf):
-        x += p.shape[NX, k + j] * vector[e + j]
-        y += p.shape[NY, k + j] * vector[e + j]
+        x += system.shape[NX, k + j] * vector[e + j]
+        y += system.shape[NY, k + j] * vector[e + j]
     return x, y
 
 
 @inlined
-def marker_shortening(p, bending, marker, q, v, a):
+def marker_shortening(system, bending, marker, q, v, a):
     """Half of f, f' and f'' of a marker: how far bending moves it towards the beam's first end.
 
     `bending` is p.bending, None for linear geometry.
@@ -38,7 +38,7 @@ def marker_shortening(p, bending, marker, q, v, a):
     f0, f1, f2 = 0.0, 0.0, 0.0
     if bending is None:
         return f0, f1, f2
-    body = p.bodies[marker.body]
+    body = system.bodies[marker.body]
     e, n = body.offset + 3, body.nf
     if marker.bending >= 0:
         for j in range(n):
@@ -54,29 +54,29 @@ def marker_shortening(p, bending, marker, q, v, a):
 
 
 @inlined
-def marker_angle(p, marker, vector):
+def marker_angle(system, marker, vector):
     """The angle phi + N2' u of a marker, or its rate or acceleration, by the system vector given."""
-    body = p.bodies[marker.body]
+    body = system.bodies[marker.body]
     e, k = body.offset + 3, marker.shape
     angle = vector[body.offset + 2]
     for j in range(body.nf):
-        angle += p.shape[SLOPE, k + j] * vector[e + j]
+        angle += system.shape[SLOPE, k + j] * vector[e + j]
     return angle
 
 
 @inlined
-def marker_motion(p, marker, q, v, a):
+def marker_motion(system, marker, q, v, a):
     """Position, velocity and acceleration of a marker in the ground frame, and its s there: (p, p', p'', R s)."""
-    angle = q[p.bodies[marker.body].offset + 2]
-    shapes = marker_shape(p, marker, q), marker_shape(p, marker, v), marker_shape(p, marker, a)
-    shortening = marker_shortening(p, p.bending, marker, q, v, a)
-    return point_motion(p, marker, cos(angle), sin(angle), shapes, shortening, q, v, a)
+    angle = q[system.bodies[marker.body].offset + 2]
+    shapes = marker_shape(system, marker, q), marker_shape(system, marker, v), marker_shape(system, marker, a)
+    shortening = marker_shortening(system, system.bending, marker, q, v, a)
+    return point_motion(system, marker, cos(angle), sin(angle), shapes, shortening, q, v, a)
 
 
 @inlined
-def point_motion(p, marker, c, s, shapes, shortening, q, v, a):
+def point_motion(system, marker, c, s, shapes, shortening, q, v, a):
     """What `marker_motion` returns, by N u and its rates, halves of f and its, cosine and sine of the body's angle."""
-    o = p.bodies[marker.body].offset
+    o = system.bodies[marker.body].offset
     w, dw = v[o + 2], a[o + 2]
     (sx, sy), (ux, uy), (bx, by) = shapes
     f0, f1, f2 = shortening
@@ -102,9 +102,9 @@ def point_motion(p, marker, c, s, shapes, shortening, q, v, a):
 
 
 @inlined
-def apply_force(p, marker, q, fx, fy, rx, ry, f):
+def apply_force(system, marker, q, fx, fy, rx, ry, f):
     """Add to f the generalised force of a ground-frame force at a marker: J^T F, J = [1, R E s, R N]."""
-    body = p.bodies[marker.body]
+    body = system.bodies[marker.body]
     o, e, k = body.offset, body.offset + 3, marker.shape
     c, s = cos(q[o + 2]), sin(q[o + 2])
     f[o] += fx
@@ -112,18 +112,18 @@ def apply_force(p, marker, q, fx, fy, rx, ry, f):
     f[o + 2] += rx * fy - ry * fx
     bx, by = c * fx + s * fy, c * fy - s * fx
     for j in range(body.nf):
-        f[e + j] += p.shape[NX, k + j] * bx + p.shape[NY, k + j] * by
-    shorten(p, p.bending, marker, q, -bx, f, e)
+        f[e + j] += system.shape[NX, k + j] * bx + system.shape[NY, k + j] * by
+    shorten(system, system.bending, marker, q, -bx, f, e)
 
 
 @inlined
-def shorten(p, bending, marker, q, scale, x, at):
+def shorten(system, bending, marker, q, scale, x, at):
     """Add scale times the derivative of a marker's f/2 to x[at:]; `bending` as for `marker_shortening`."""
     if bending is None:
         return
     if marker.bending < 0:
         return
-    body = p.bodies[marker.body]
+    body = system.bodies[marker.body]
     e, n = body.offset + 3, body.nf
     for j in range(n):
         row = marker.bending + j * body.stride
@@ -134,21 +134,21 @@ def shorten(p, bending, marker, q, scale, x, at):
 
 
 @inlined
-def apply_torque(p, marker, torque, f):
+def apply_torque(system, marker, torque, f):
     """Add to f the generalised force of a torque at a marker: it works on phi and on the slope there."""
-    body = p.bodies[marker.body]
+    body = system.bodies[marker.body]
     e, k = body.offset + 3, marker.shape
     f[body.offset + 2] += torque
     for j in range(body.nf):
-        f[e + j] += p.shape[SLOPE, k + j] * torque
+        f[e + j] += system.shape[SLOPE, k + j] * torque
 
 
 @kernel
-def start_rows(p, signals, t, weights, rows):
+def start_rows(system, signals, t, weights, rows):
     """Constraint rows before any body: what ground points and prescribed values contribute."""
     weight_a, weight_v, weight_q = weights
-    for r in range(p.rows.size):
-        row = p.rows[r]
+    for r in range(system.rows.size):
+        row = system.rows[r]
         rows[r] = weight_q * row.ground
         if row.signal >= 0:
             value, rate, acceleration = evaluate_signal(signals, row.signal, t)
@@ -156,78 +156,78 @@ def start_rows(p, signals, t, weights, rows):
 
 
 @routine
-def start_compliant_rows(p, lam, rows):
+def start_compliant_rows(system, lam, rows):
     """Rows of springs, dampers and friction before any body: less the rest value, less compliance times the force."""
-    for r in range(p.rows.size):
-        if p.rows[r].kind == FRICTION:
+    for r in range(system.rows.size):
+        if system.rows[r].kind == FRICTION:
             rows[r] = 0.0
-        elif p.rows[r].kind != CONSTRAINT:
-            rows[r] = p.rows[r].ground - p.rows[r].compliance * lam[r]
+        elif system.rows[r].kind != CONSTRAINT:
+            rows[r] = system.rows[r].ground - system.rows[r].compliance * lam[r]
 
 
 @routine
-def finish_friction(p, lam, compliance, rows):
+def finish_friction(system, lam, compliance, rows):
     """Turn what rows of friction hold, the rate of their joint, into their residual.
 
     compliance (limit tanh(rate / speed) - lambda) has the slope 1 against the rate where `compliance` was noted.
     """
-    for r in range(p.rows.size):
-        row = p.rows[r]
+    for r in range(system.rows.size):
+        row = system.rows[r]
         if row.kind == FRICTION:
             rows[r] = compliance[r] * (row.limit * tanh(rows[r] / (row.compliance * row.limit)) - lam[r])
 
 
 @routine
-def spring_energy(p, lam):
+def spring_energy(system, lam):
     """Energy of the springs by their torques."""
     energy = 0.0
-    for r in range(p.rows.size):
-        if p.rows[r].kind == SPRING:
-            energy += 0.5 * p.rows[r].compliance * lam[r] * lam[r]
+    for r in range(system.rows.size):
+        if system.rows[r].kind == SPRING:
+            energy += 0.5 * system.rows[r].compliance * lam[r] * lam[r]
     return energy
 
 
 @routine
-def modal_damping_power(p, v):
+def modal_damping_power(system, v):
     """What the damping of the flexible coordinates takes."""
     power = 0.0
-    for i in range(p.bodies.size):
-        body = p.bodies[i]
+    for i in range(system.bodies.size):
+        body = system.bodies[i]
         for j in range(body.nf):
             rate = v[body.offset + 3 + j]
-            power += p.modal[DAMPING, body.flex + j] * rate * rate
+            power += system.modal[DAMPING, body.flex + j] * rate * rate
             if body.damping >= 0:
                 for l in range(body.nf):
-                    power += p.damping[body.damping + j * body.stride + l] * v[body.offset + 3 + l] * rate
+                    power += system.damping[body.damping + j * body.stride + l] * v[body.offset + 3 + l] * rate
     return power
 
 
 @routine
-def apply_loads(p, q, f):
+def apply_loads(system, q, f):
     """Subtract the generalised forces of constant loads from f."""
-    for k in range(p.loads.size):
-        load = p.loads[k]
-        marker = p.markers[load.marker]
-        _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
-        apply_force(p, marker, q, -load.fx, -load.fy, rx, ry, f)
-        apply_torque(p, marker, -load.torque, f)
+    for k in range(system.loads.size):
+        load = system.loads[k]
+        marker = system.markers[load.marker]
+        _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
+        apply_force(system, marker, q, -load.fx, -load.fy, rx, ry, f)
+        apply_torque(system, marker, -load.torque, f)
 
 
 @inlined
-def line_end(p, marker, x, y, q, v):
+def line_end(system, marker, x, y, q, v):
     """Position and velocity of an end of a line spring, and R s there: (px, py, vx, vy, rx, ry)."""
     if marker < 0:
         return x, y, 0.0, 0.0, 0.0, 0.0
-    px, py, vx, vy, _, _, rx, ry = marker_motion(p, p.markers[marker], q, v, v)
+    px, py, vx, vy, _, _, rx, ry = marker_motion(system, system.markers[marker], q, v, v)
     return px, py, vx, vy, rx, ry
 
 
 @routine
-def line_state(p, k, q, v):
+def line_state(system, k, q, v):
     """Stretch, its rate, and the unit vector from a to b of line spring k; zero length has no direction."""
-    line = p.lines[k]
-    ax, ay, vax, vay, _, _ = line_end(p, line.a, line.ax, line.ay, q, v)
-    bx, by, vbx, vby, _, _ = line_end(p, line.b, line.bx, line.by, q, v)
+    line = system.lines[k]
+    ax, ay, vax, vay, _, _ = line_end(system, line.a, line.ax, line.ay, q, v)
+    bx, by, vbx, vby, _, _ = line_end(system, line.b, line.bx, line.by, q, v)
     dx, dy = bx - ax, by - ay
     length = sqrt(dx * dx + dy * dy)
     if length == 0.0:
@@ -237,47 +237,47 @@ def line_state(p, k, q, v):
 
 
 @routine
-def apply_lines(p, q, v, f):
+def apply_lines(system, q, v, f):
     """Subtract the generalised forces of springs and dampers between points from f."""
-    for k in range(p.lines.size):
-        line = p.lines[k]
-        stretch, rate, ex, ey = line_state(p, k, q, v)
+    for k in range(system.lines.size):
+        line = system.lines[k]
+        stretch, rate, ex, ey = line_state(system, k, q, v)
         pull = line.stiffness * stretch + line.damping * rate
         if line.a >= 0:
-            _, _, _, _, rx, ry = line_end(p, line.a, line.ax, line.ay, q, v)
-            apply_force(p, p.markers[line.a], q, -pull * ex, -pull * ey, rx, ry, f)
+            _, _, _, _, rx, ry = line_end(system, line.a, line.ax, line.ay, q, v)
+            apply_force(system, system.markers[line.a], q, -pull * ex, -pull * ey, rx, ry, f)
         if line.b >= 0:
-            _, _, _, _, rx, ry = line_end(p, line.b, line.bx, line.by, q, v)
-            apply_force(p, p.markers[line.b], q, pull * ex, pull * ey, rx, ry, f)
+            _, _, _, _, rx, ry = line_end(system, line.b, line.bx, line.by, q, v)
+            apply_force(system, system.markers[line.b], q, pull * ex, pull * ey, rx, ry, f)
 
 
 @routine
-def line_energy(p, q, v):
+def line_energy(system, q, v):
     """Energy of the springs between points, and the power their dampers take."""
     energy, power = 0.0, 0.0
-    for k in range(p.lines.size):
-        stretch, rate, _, _ = line_state(p, k, q, v)
-        energy += 0.5 * p.lines[k].stiffness * stretch * stretch
-        power += p.lines[k].damping * rate * rate
+    for k in range(system.lines.size):
+        stretch, rate, _, _ = line_state(system, k, q, v)
+        energy += 0.5 * system.lines[k].stiffness * stretch * stretch
+        power += system.lines[k].damping * rate * rate
     return energy, power
 
 
 @routine
-def load_power(p, q, v):
+def load_power(system, q, v):
     """Power of constant loads."""
     power = 0.0
-    for k in range(p.loads.size):
-        load = p.loads[k]
-        marker = p.markers[load.marker]
-        _, _, vx, vy, _, _, _, _ = marker_motion(p, marker, q, v, v)
-        power += load.fx * vx + load.fy * vy + load.torque * marker_angle(p, marker, v)
+    for k in range(system.loads.size):
+        load = system.loads[k]
+        marker = system.markers[load.marker]
+        _, _, vx, vy, _, _, _, _ = marker_motion(system, marker, q, v, v)
+        power += load.fx * vx + load.fy * vy + load.torque * marker_angle(system, marker, v)
     return power
 
 
 @inlined
-def angle_row(p, marker, kind, weights, q, v, a):
+def angle_row(system, marker, kind, weights, q, v, a):
     """What a marker's angle and its rates give to a row of that kind; linear in q, v and a."""
-    angles = marker_angle(p, marker, q), marker_angle(p, marker, v), marker_angle(p, marker, a)
+    angles = marker_angle(system, marker, q), marker_angle(system, marker, v), marker_angle(system, marker, a)
     return angle_part(kind, weights, angles)
 
 
@@ -290,29 +290,29 @@ def angle_part(kind, weights, angles):
 
 
 @inlined
-def angle_by_sums(p, marker, q, v, a, scratch):
+def angle_by_sums(system, marker, q, v, a, scratch):
     """Angle of a marker with its rate and acceleration, by the sums of its body."""
-    turn, z = p.bodies[marker.body].offset + 2, marker.column + SLOPE
+    turn, z = system.bodies[marker.body].offset + 2, marker.column + SLOPE
     return q[turn] + scratch.q[z], v[turn] + scratch.v[z], a[turn] + scratch.a[z]
 
 
 @inlined
-def motion_by_sums(p, marker, q, v, a, scratch):
+def motion_by_sums(system, marker, q, v, a, scratch):
     """What `marker_motion` returns, by the sums of the marker's body."""
     x = marker.column
     y = x + 1
     shapes = (scratch.q[x], scratch.q[y]), (scratch.v[x], scratch.v[y]), (scratch.a[x], scratch.a[y])
-    shortening = shortening_by_products(p, p.bending, marker, q, v, a, scratch.points)
-    return point_motion(p, marker, scratch.turn[0], scratch.turn[1], shapes, shortening, q, v, a)
+    shortening = shortening_by_products(system, system.bending, marker, q, v, a, scratch.points)
+    return point_motion(system, marker, scratch.turn[0], scratch.turn[1], shapes, shortening, q, v, a)
 
 
 @inlined
-def shortening_by_products(p, bending, marker, q, v, a, points):
+def shortening_by_products(system, bending, marker, q, v, a, points):
     """What `marker_shortening` returns; bending u stays in points.B_q. Both are None for linear geometry."""
     f0, f1, f2 = 0.0, 0.0, 0.0
     if bending is None:
         return f0, f1, f2
-    body = p.bodies[marker.body]
+    body = system.bodies[marker.body]
     e = body.offset + 3
     if marker.bending >= 0:
         for block in range(0, body.stride, LANES):
@@ -333,71 +333,73 @@ def shortening_by_products(p, bending, marker, q, v, a, points):
 
 
 @inlined
-def shorten_by_products(p, bending, marker, scale, f, points):
+def shorten_by_products(system, bending, marker, scale, f, points):
     """Add scale times the derivative of a marker's f/2 to f, just after `shortening_by_products`."""
     if bending is None:
         return
     if marker.bending >= 0:
-        body = p.bodies[marker.body]
+        body = system.bodies[marker.body]
         for j in range(body.nf):
             f[body.offset + 3 + j] += scale * points.B_q[j]
 
 
 @inlined
-def add_joints(p, i, q, v, a, lam, weights, scratch, f, rows):
+def add_joints(system, i, q, v, a, lam, weights, scratch, f, rows):
     """Add body i's part of the weighted sum of Phi'', Phi' and Phi to rows, and Phi_q^T lambda to f and the shares."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     o = body.offset
     c, s = scratch.turn[0], scratch.turn[1]
     for k in range(body.port, body.port_end):
-        port = p.ports[k]
-        marker = p.markers[port.marker]
-        r, sign, x = port.row, port.sign, marker.column
+        port = system.ports[k]
+        marker = system.markers[port.marker]
+        r, weight, x = port.row, port.weight, marker.column
         if port.kind == ANGLE:
-            rows[r] += sign * angle_part(p.rows[r].kind, weights, angle_by_sums(p, marker, q, v, a, scratch))
-            share_torque(p, marker, sign * lam[r], scratch, f)
+            rows[r] += weight * angle_part(
+                system.rows[r].kind, weights, angle_by_sums(system, marker, q, v, a, scratch)
+            )
+            share_torque(system, marker, weight * lam[r], scratch, f)
         elif port.kind != AXIS:
-            px, py, vx, vy, ax, ay, rx, ry = motion_by_sums(p, marker, q, v, a, scratch)
-            rows[r] += sign * (weights[0] * ax + weights[1] * vx + weights[2] * px)
-            rows[r + 1] += sign * (weights[0] * ay + weights[1] * vy + weights[2] * py)
-            fx, fy = sign * lam[r], sign * lam[r + 1]
+            px, py, vx, vy, ax, ay, rx, ry = motion_by_sums(system, marker, q, v, a, scratch)
+            rows[r] += weight * (weights[0] * ax + weights[1] * vx + weights[2] * px)
+            rows[r + 1] += weight * (weights[0] * ay + weights[1] * vy + weights[2] * py)
+            fx, fy = weight * lam[r], weight * lam[r + 1]
             bx, by = c * fx + s * fy, c * fy - s * fx
             f[o] += fx
             f[o + 1] += fy
             f[o + 2] += rx * fy - ry * fx
             scratch.shares[x] += bx
             scratch.shares[x + 1] += by
-            shorten_by_products(p, p.bending, marker, -bx, f, scratch.points)
+            shorten_by_products(system, system.bending, marker, -bx, f, scratch.points)
 
 
 @inlined
-def share_torque(p, marker, torque, scratch, f):
+def share_torque(system, marker, torque, scratch, f):
     """Add a torque at a marker to f and the shares: see `apply_torque`."""
-    f[p.bodies[marker.body].offset + 2] += torque
+    f[system.bodies[marker.body].offset + 2] += torque
     scratch.shares[marker.column + SLOPE] += torque
 
 
 @inlined
-def add_efforts(p, i, torques, scratch, f):
+def add_efforts(system, i, torques, scratch, f):
     """Subtract the generalised force of the motors on body i from f and the shares."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     for k in range(body.effort, body.effort_end):
-        effort = p.efforts[k]
-        share_torque(p, p.markers[effort.marker], -effort.sign * torques[effort.signal], scratch, f)
+        effort = system.efforts[k]
+        share_torque(system, system.markers[effort.marker], -effort.sign * torques[effort.signal], scratch, f)
 
 
 @kernel
-def body_joints(p, i, q, v, a, lam, weights, scratch, f, rows):
+def body_joints(system, i, q, v, a, lam, weights, scratch, f, rows):
     """Add body i's part of the weighted sum of Phi'', Phi' and Phi to rows, and Phi_q^T lambda to f."""
-    body_sums(p, i, q, v, a, scratch)
-    clear_shares(p, i, scratch)
-    add_joints(p, i, q, v, a, lam, weights, scratch, f, rows)
-    hand_on(p, i, scratch, f)
+    body_sums(system, i, q, v, a, scratch)
+    clear_shares(system, i, scratch)
+    add_joints(system, i, q, v, a, lam, weights, scratch, f, rows)
+    hand_on(system, i, scratch, f)
 
 
 @kernel
-def body_efforts(p, i, torques, scratch, f):
+def body_efforts(system, i, torques, scratch, f):
     """Subtract the generalised force of the motors on body i from f."""
-    clear_shares(p, i, scratch)
-    add_efforts(p, i, torques, scratch, f)
-    hand_on(p, i, scratch, f)
+    clear_shares(system, i, scratch)
+    add_efforts(system, i, torques, scratch, f)
+    hand_on(system, i, scratch, f)

@@ -52,25 +52,25 @@ def inner(x, y):
 
 
 @routine
-def matrix_times(p, g, b, weights, scale, q, v, a, lam, torques, unit, x, d, ws, out):
+def matrix_times(system, g, b, weights, scale, q, v, a, lam, torques, unit, x, direction, work, out):
     """Preconditioned exact matrix of a stage times x, into out; multipliers in units of `unit`."""
     n = a.size
     for j in range(n):
-        d.q[j], d.v[j], d.a[j] = b * x[j], g * x[j], x[j]
+        direction.q[j], direction.v[j], direction.a[j] = b * x[j], g * x[j], x[j]
     for r in range(lam.size):
-        d.lam[r] = unit * x[n + r]
-    residual_tangent(p, weights, q, v, a, lam, torques, ws.compliance, 0, p.bodies.size, d)
+        direction.lam[r] = unit * x[n + r]
+    residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, 0, system.bodies.size, direction)
     for j in range(n):
-        ws.f[j] = d.f[j]
+        work.f[j] = direction.f[j]
     for r in range(lam.size):
-        ws.rows[r] = d.rows[r]
-    right_hand_side(p, ws, scale)
-    solve_system(p, ws, ws.x, ws.mu)
+        work.rows[r] = direction.rows[r]
+    right_hand_side(system, work, scale)
+    solve_system(system, work, work.x, work.mu)
     # Solutions of a run are corrections: less the residual.
     for j in range(n):
-        out[j] = -ws.x[j]
+        out[j] = -work.x[j]
     for r in range(lam.size):
-        out[n + r] = -ws.mu[r] / unit
+        out[n + r] = -work.mu[r] / unit
 
 
 @inlined
@@ -108,23 +108,23 @@ def orthogonalise(space, k):
 
 
 @inlined
-def combine(space, count, unit, ws):
+def combine(space, count, unit, work):
     """The solution in ws.x and ws.mu: back substitution, and the sum of the basis vectors."""
     for i in range(count - 1, -1, -1):
         for k in range(i + 1, count):
             space.rest[i] -= space.hessenberg[k, i] * space.rest[k]
         space.rest[i] = space.rest[i] / space.hessenberg[i, i] if space.hessenberg[i, i] != 0.0 else 0.0
-    fill(ws.x, 0.0)
-    fill(ws.mu, 0.0)
+    fill(work.x, 0.0)
+    fill(work.mu, 0.0)
     for k in range(count):
-        for j in range(ws.x.size):
-            ws.x[j] += space.rest[k] * space.basis[k, j]
-        for r in range(ws.mu.size):
-            ws.mu[r] += unit * space.rest[k] * space.basis[k, ws.x.size + r]
+        for j in range(work.x.size):
+            work.x[j] += space.rest[k] * space.basis[k, j]
+        for r in range(work.mu.size):
+            work.mu[r] += unit * space.rest[k] * space.basis[k, work.x.size + r]
 
 
 @kernel
-def exact_correction(p, g, b, weights, q, v, a, lam, torques, unit, d, space, ws):
+def exact_correction(system, g, b, weights, q, v, a, lam, torques, unit, direction, space, work):
     """Turn the correction of a run in ws.x and ws.mu to the one that the exact matrix asks for.
 
     Parameters
@@ -137,9 +137,9 @@ def exact_correction(p, g, b, weights, q, v, a, lam, torques, unit, d, space, ws
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     n, first = a.size, space.basis[0]
     for j in range(n):
-        first[j] = ws.x[j]
+        first[j] = work.x[j]
     for r in range(lam.size):
-        first[n + r] = ws.mu[r] / unit
+        first[n + r] = work.mu[r] / unit
     size = sqrt(inner(first, first))
     if not size > 0.0:
         return
@@ -150,11 +150,12 @@ def exact_correction(p, g, b, weights, q, v, a, lam, torques, unit, d, space, ws
     count = 0
     for k in range(space.cosines.size):
         matrix_times(
-            p, g, b, weights, scale, q, v, a, lam, torques, unit, space.basis[k], d, ws, space.basis[k + 1]
+            system, g, b, weights, scale, q, v, a, lam, torques, unit, space.basis[k], direction, work,
+            space.basis[k + 1],
         )  # fmt: skip
         more = orthogonalise(space, k)
         left = rotate(space, k)
         count = k + 1
         if left <= ENOUGH * size or not more:
             break
-    combine(space, count, unit, ws)
+    combine(space, count, unit, work)

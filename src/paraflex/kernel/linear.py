@@ -11,7 +11,7 @@ from math import cos, sin, sqrt
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import turn_axes
 from paraflex.kernel.bending import inverse_times
-from paraflex.kernel.compiling import inlined, kernel, routine, seldom
+from paraflex.kernel.compiling import inlined, kernel, routine, unoptimised
 from paraflex.kernel.factor import factor_bodies, solve_rigid
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DINV, POINT, SPRING
 from paraflex.kernel.sums import row_product
@@ -26,31 +26,38 @@ INDEPENDENT = 1e-3
 
 
 @inlined
-def share(ws, port, r, part, c, s):
+def share(work, port, r, part, c, s):
     """What one part of a port, in the body frame, gives to its constraint row r; c and s turn that frame."""
     if port.kind == ANGLE:
-        return port.sign
+        return port.weight
     if port.kind == POINT:
         if r == part:
-            return port.sign * c
-        return port.sign * s if r == 1 else -port.sign * s
-    ex, ey = ws.axes[port.axis, 0], ws.axes[port.axis, 1]
+            return port.weight * c
+        return port.weight * s if r == 1 else -port.weight * s
+    ex, ey = work.axes[port.axis, 0], work.axes[port.axis, 1]
     if part == 0:
-        return port.sign * (c * ex + s * ey)
+        return port.weight * (c * ex + s * ey)
     if part == 1:
-        return port.sign * (c * ey - s * ex)
-    return ws.axes[port.axis, 2] if part == 2 else -1.0
+        return port.weight * (c * ey - s * ex)
+    # Only the end that carries the axis has more parts; its weight is that of the axis, less.
+    return -port.weight * work.axes[port.axis, 2] if part == 2 else port.weight
 
 
 @inlined
-def add_entry(p, ws, row, column, value):
+def add_entry(system, work, row, column, value):
     """Add to an entry of the Schur complement, by its lower half."""
     high, low = max(row, column), min(row, column)
-    ws.schur[p.rows[high].start + low - p.rows[high].first] += value
+    work.schur[system.rows[high].start + low - system.rows[high].first] += value
+
+
+@inlined
+def add_pair_entry(system, work, row, column, same, value):
+    """Add what two ports give to an entry; to a diagonal one two ports that are not the same give it both ways."""
+    add_entry(system, work, row, column, value if same or row != column else 2.0 * value)
 
 
 @routine
-def add_axis_pair(p, ws, body, port, other, same, c, s):
+def add_axis_pair(system, work, body, port, other, same, c, s):
     """Add the entries between two ports of a body of which at least one is an axis."""
     for r in range(port.rows):
         for q in range(r + 1 if same else other.rows):
@@ -58,32 +65,32 @@ def add_axis_pair(p, ws, body, port, other, same, c, s):
             for x in range(port.parts):
                 for y in range(other.parts):
                     at = body.block + (port.local + x) * body.lanes + other.local + y
-                    value += share(ws, port, r, x, c, s) * ws.blocks[at] * share(ws, other, q, y, c, s)
-            add_entry(p, ws, port.row + r, other.row + q, value)
+                    value += share(work, port, r, x, c, s) * work.blocks[at] * share(work, other, q, y, c, s)
+            add_pair_entry(system, work, port.row + r, other.row + q, same, value)
 
 
 @inlined
-def add_schur(p, i, ws):
+def add_schur(system, i, work):
     """Turn body i's J M^-1 J^T to the ground frame and add it to the Schur complement."""
-    body = p.bodies[i]
-    c, s = ws.frame[i, 0], ws.frame[i, 1]
+    body = system.bodies[i]
+    c, s = work.frame[i, 0], work.frame[i, 1]
     for k in range(body.port, body.port_end):
-        port = p.ports[k]
+        port = system.ports[k]
         for l in range(body.port, k + 1):
-            other = p.ports[l]
+            other = system.ports[l]
             if port.kind == AXIS or other.kind == AXIS:
-                add_axis_pair(p, ws, body, port, other, l == k, c, s)
+                add_axis_pair(system, work, body, port, other, l == k, c, s)
                 continue
-            sign = port.sign * other.sign
+            weight = port.weight * other.weight
             at = body.block + port.local * body.lanes + other.local
             # A 2 x 2 block, of which an angle's row or column is missing.
-            b00, b01, b10, b11 = ws.blocks[at], 0.0, 0.0, 0.0
+            b00, b01, b10, b11 = work.blocks[at], 0.0, 0.0, 0.0
             if other.kind == POINT:
-                b01 = ws.blocks[at + 1]
+                b01 = work.blocks[at + 1]
             if port.kind == POINT:
-                b10 = ws.blocks[at + body.lanes]
+                b10 = work.blocks[at + body.lanes]
                 if other.kind == POINT:
-                    b11 = ws.blocks[at + body.lanes + 1]
+                    b11 = work.blocks[at + body.lanes + 1]
                 b00, b10 = c * b00 - s * b10, s * b00 + c * b10
                 b01, b11 = c * b01 - s * b11, s * b01 + c * b11
             if other.kind == POINT:
@@ -92,112 +99,114 @@ def add_schur(p, i, ws):
             for r in range(port.rows):
                 for q in range(other.rows if l < k else r + 1):
                     value = (b00 if q == 0 else b01) if r == 0 else (b10 if q == 0 else b11)
-                    add_entry(p, ws, port.row + r, other.row + q, sign * value)
+                    add_pair_entry(system, work, port.row + r, other.row + q, l == k, weight * value)
 
 
 @routine
-def factor_schur(p, ws, dependent_part):
+def factor_schur(system, work, dependent_part):
     """Cholesky factor of the Schur complement in place, row by row within the envelope.
 
     Returns the number of dependent rows found; each gets multiplier zero, which leaves the accelerations those of
     the pseudo-inverse (Eq. 59) as long as the constraints are consistent.
     """
     dependent = 0
-    ws.least[0] = 1.0
-    for i in range(p.rows.size):
-        first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
+    work.least[0] = 1.0
+    for i in range(system.rows.size):
+        first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
         for j in range(first, i):
-            first_j, start_j = p.rows[j].first, p.rows[j].start - p.rows[j].first
-            total = ws.schur[start + j]
+            first_j, start_j = system.rows[j].first, system.rows[j].start - system.rows[j].first
+            total = work.schur[start + j]
             for k in range(max(first, first_j), j):
-                total -= ws.schur[start + k] * ws.schur[start_j + k]
+                total -= work.schur[start + k] * work.schur[start_j + k]
             # Diagonals hold reciprocals; that of a dependent row is zero and keeps its column at zero.
-            ws.schur[start + j] = total * ws.schur[start_j + j]
-        diagonal = ws.schur[start + i]
+            work.schur[start + j] = total * work.schur[start_j + j]
+        diagonal = work.schur[start + i]
         pivot = diagonal
         for k in range(first, i):
-            pivot -= ws.schur[start + k] * ws.schur[start + k]
-        if ws.redundant[i] > 0.0 and pivot > INDEPENDENT * diagonal:
-            ws.redundant[i] = 0.0
+            pivot -= work.schur[start + k] * work.schur[start + k]
+        if work.redundant[i] > 0.0 and pivot > INDEPENDENT * diagonal:
+            work.redundant[i] = 0.0
         # Springs give: their rows never depend on others.
-        counts = p.rows[i].kind == CONSTRAINT and ws.redundant[i] == 0.0
-        if counts and pivot < ws.least[0] * diagonal:
-            ws.least[0], ws.least[1] = pivot / diagonal, i
-        if pivot > max(dependent_part, ws.redundant[i]) * diagonal:
-            ws.schur[start + i] = 1.0 / sqrt(pivot)
+        counts = system.rows[i].kind == CONSTRAINT and work.redundant[i] == 0.0
+        if counts and pivot < work.least[0] * diagonal:
+            work.least[0], work.least[1] = pivot / diagonal, i
+        if pivot > max(dependent_part, work.redundant[i]) * diagonal:
+            work.schur[start + i] = 1.0 / sqrt(pivot)
         else:
-            ws.schur[start + i] = 0.0
+            work.schur[start + i] = 0.0
             dependent += 1
     return dependent
 
 
 @routine
-def solve_schur(p, ws, x):
+def solve_schur(system, work, x):
     """Solve with the factored Schur complement, in place."""
-    for i in range(p.rows.size):
-        first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
+    for i in range(system.rows.size):
+        first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
         total = x[i]
         for k in range(first, i):
-            total -= ws.schur[start + k] * x[k]
-        x[i] = total * ws.schur[start + i]
-    for i in range(p.rows.size - 1, -1, -1):
-        first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
-        x[i] *= ws.schur[start + i]
+            total -= work.schur[start + k] * x[k]
+        x[i] = total * work.schur[start + i]
+    for i in range(system.rows.size - 1, -1, -1):
+        first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
+        x[i] *= work.schur[start + i]
         for k in range(first, i):
-            x[k] -= ws.schur[start + k] * x[i]
+            x[k] -= work.schur[start + k] * x[i]
 
 
 @inlined
-def row_scale(p, r, ws, scale):
+def row_scale(system, r, work, scale):
     """What makes the iteration matrix symmetric: scale for a constraint, 1/b for a spring, else 1/g."""
-    kind = p.rows[r].kind
+    kind = system.rows[r].kind
     if kind == SPRING:
-        return 1.0 / ws.step[0]
-    return scale if kind == CONSTRAINT else 1.0 / sqrt(ws.step[0])
+        return 1.0 / work.step[0]
+    return scale if kind == CONSTRAINT else 1.0 / sqrt(work.step[0])
 
 
 @kernel
-def orient(p, q, ws, dependent_part):
+def orient(system, q, work, dependent_part):
     """Turn the factored bodies to their angles in q and factor the Schur complement; number of dependent rows."""
-    fill(ws.schur, 0.0)
-    turn_axes(p, q, ws.axes)
-    for i in range(p.bodies.size):
-        phi = q[p.bodies[i].offset + 2]
-        ws.frame[i, 0], ws.frame[i, 1] = cos(phi), sin(phi)
-        add_schur(p, i, ws)
-    for r in range(p.rows.size):
-        if p.rows[r].kind != CONSTRAINT:
-            ws.schur[p.rows[r].start + r - p.rows[r].first] += ws.compliance[r] * row_scale(p, r, ws, 1.0)
-    return factor_schur(p, ws, dependent_part)
+    fill(work.schur, 0.0)
+    turn_axes(system, q, work.axes)
+    for i in range(system.bodies.size):
+        phi = q[system.bodies[i].offset + 2]
+        work.frame[i, 0], work.frame[i, 1] = cos(phi), sin(phi)
+        add_schur(system, i, work)
+    for r in range(system.rows.size):
+        if system.rows[r].kind != CONSTRAINT:
+            work.schur[system.rows[r].start + r - system.rows[r].first] += work.compliance[r] * row_scale(
+                system, r, work, 1.0
+            )
+    return factor_schur(system, work, dependent_part)
 
 
-@seldom
-def factor_system(p, b, q, ws):
+@unoptimised
+def factor_system(system, b, q, work):
     """Factor the iteration matrix [M + b K, Phi_q^T; Phi_q, 0] at q; returns the number of dependent rows."""
-    factor_bodies(p, b, q, ws)
-    return orient(p, q, ws, DEPENDENT_ROW)
+    factor_bodies(system, b, q, work)
+    return orient(system, q, work, DEPENDENT_ROW)
 
 
 @inlined
-def to_body_frame(p, i, ws, x):
+def to_body_frame(system, i, work, x):
     """Turn the translational part of body i in x from the ground frame to the factor's body frame."""
-    o = p.bodies[i].offset
-    c, s = ws.frame[i, 0], ws.frame[i, 1]
+    o = system.bodies[i].offset
+    c, s = work.frame[i, 0], work.frame[i, 1]
     x[o], x[o + 1] = c * x[o] + s * x[o + 1], c * x[o + 1] - s * x[o]
 
 
 @inlined
-def to_ground_frame(p, i, ws, x):
+def to_ground_frame(system, i, work, x):
     """Turn the translational part of body i in x back to the ground frame."""
-    o = p.bodies[i].offset
-    c, s = ws.frame[i, 0], ws.frame[i, 1]
+    o = system.bodies[i].offset
+    c, s = work.frame[i, 0], work.frame[i, 1]
     x[o], x[o + 1] = c * x[o] - s * x[o + 1], s * x[o] + c * x[o + 1]
 
 
 @inlined
-def lanes_times(p, i, matrix, x, scratch):
+def lanes_times(system, i, matrix, x, scratch):
     """Sums of x over the coordinates of body i by the lanes of ws.jac or ws.response, into scratch.lanes."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     for block in range(0, body.lanes, LANES):
         total = zeros()
         at = body.jac + block
@@ -208,105 +217,105 @@ def lanes_times(p, i, matrix, x, scratch):
 
 
 @inlined
-def add_lanes(p, i, ws, scale, spring_scale, damper_scale, rows):
+def add_lanes(system, i, work, scale, spring_scale, damper_scale, rows):
     """Add what `lanes_times` found for the parts of body i's constraint rows to rows, times the scale of their kind."""
-    body = p.bodies[i]
-    c, s, lanes = ws.frame[i, 0], ws.frame[i, 1], ws.scratch.lanes
+    body = system.bodies[i]
+    c, s, lanes = work.frame[i, 0], work.frame[i, 1], work.scratch.lanes
     for k in range(body.port, body.port_end):
-        port = p.ports[k]
-        kind, x = p.rows[port.row].kind, port.local
+        port = system.ports[k]
+        kind, x = system.rows[port.row].kind, port.local
         kind_scale = scale if kind == CONSTRAINT else (spring_scale if kind == SPRING else damper_scale)
-        factor = port.sign * kind_scale
+        factor = port.weight * kind_scale
         if port.kind == ANGLE:
             rows[port.row] += factor * lanes[x]
         elif port.kind == AXIS:
             for part in range(port.parts):
-                rows[port.row] += kind_scale * share(ws, port, 0, part, c, s) * lanes[x + part]
+                rows[port.row] += kind_scale * share(work, port, 0, part, c, s) * lanes[x + part]
         else:
             rows[port.row] += factor * (c * lanes[x] - s * lanes[x + 1])
             rows[port.row + 1] += factor * (s * lanes[x] + c * lanes[x + 1])
 
 
 @inlined
-def jacobian_times(p, i, ws, x, scale, spring_scale, damper_scale, rows):
+def jacobian_times(system, i, work, x, scale, spring_scale, damper_scale, rows):
     """Add J x of body i to rows, times the scale of their kind; x in the body frame."""
-    lanes_times(p, i, ws.jac, x, ws.scratch)
-    add_lanes(p, i, ws, scale, spring_scale, damper_scale, rows)
+    lanes_times(system, i, work.jac, x, work.scratch)
+    add_lanes(system, i, work, scale, spring_scale, damper_scale, rows)
 
 
 @inlined
-def reactions(p, i, ws, mu):
+def reactions(system, i, work, mu):
     """What multipliers do to body i along the parts of its rows, less: -J^T mu by lanes, into scratch.lanes."""
-    body = p.bodies[i]
-    c, s, lanes = ws.frame[i, 0], ws.frame[i, 1], ws.scratch.lanes
+    body = system.bodies[i]
+    c, s, lanes = work.frame[i, 0], work.frame[i, 1], work.scratch.lanes
     for k in range(body.port, body.port_end):
-        port = p.ports[k]
+        port = system.ports[k]
         x = port.local
         if port.kind == ANGLE:
-            lanes[x] = -port.sign * mu[port.row]
+            lanes[x] = -port.weight * mu[port.row]
         elif port.kind == AXIS:
             for part in range(port.parts):
-                lanes[x + part] = -mu[port.row] * share(ws, port, 0, part, c, s)
+                lanes[x + part] = -mu[port.row] * share(work, port, 0, part, c, s)
         else:
-            fx, fy = port.sign * mu[port.row], port.sign * mu[port.row + 1]
+            fx, fy = port.weight * mu[port.row], port.weight * mu[port.row + 1]
             lanes[x], lanes[x + 1] = -(c * fx + s * fy), s * fx - c * fy
     for x in range(body.parts, body.lanes):
         lanes[x] = 0.0
 
 
 @inlined
-def lanes_of(p, i, j, ws):
+def lanes_of(system, i, j, work):
     """The sum of scratch.lanes as coordinate j of body i feels them."""
-    body = p.bodies[i]
-    return row_product(ws.response, body.jac + j * body.lanes, body.lanes, ws.scratch.lanes)
+    body = system.bodies[i]
+    return row_product(work.response, body.jac + j * body.lanes, body.lanes, work.scratch.lanes)
 
 
 @kernel
-def solve_system(p, ws, x, mu):
+def solve_system(system, work, x, mu):
     """Solve [M + b K, Phi_q^T; Phi_q, -C/b] [x; mu] = [x; mu] in place; x in the ground frame.
 
     C holds the compliance of springs, zero for constraints; for dampers it is -C/g.
     """
-    solve_all(p, ws, ws.inverse, x, mu)
+    solve_all(system, work, work.inverse, x, mu)
 
 
 @inlined
-def solve_all(p, ws, inverse, x, mu):
+def solve_all(system, work, inverse, x, mu):
     """See `solve_system`; `inverse` is ws.inverse, None for linear geometry."""
-    lanes = ws.scratch.lanes
+    lanes = work.scratch.lanes
     for r in range(mu.size):
         mu[r] = -mu[r]
-    for i in range(p.bodies.size):
-        body = p.bodies[i]
+    for i in range(system.bodies.size):
+        body = system.bodies[i]
         o, rigid = body.offset, body.parts
-        to_body_frame(p, i, ws, x)
-        lanes_times(p, i, ws.response, x, ws.scratch)
-        add_lanes(p, i, ws, 1.0, 1.0, 1.0, mu)
+        to_body_frame(system, i, work, x)
+        lanes_times(system, i, work.response, x, work.scratch)
+        add_lanes(system, i, work, 1.0, 1.0, 1.0, mu)
         if body.full == 0:
-            x[o], x[o + 1], x[o + 2] = solve_rigid(ws.frame[i], lanes[rigid], lanes[rigid + 1], lanes[rigid + 2])
-    solve_schur(p, ws, mu)
-    for i in range(p.bodies.size):
-        body = p.bodies[i]
+            x[o], x[o + 1], x[o + 2] = solve_rigid(work.frame[i], lanes[rigid], lanes[rigid + 1], lanes[rigid + 2])
+    solve_schur(system, work, mu)
+    for i in range(system.bodies.size):
+        body = system.bodies[i]
         o = body.offset
-        reactions(p, i, ws, mu)
+        reactions(system, i, work, mu)
         if body.full == 0:
             for r in range(3):
                 lanes[body.parts + r] = x[o + r]
             for r in range(3):
-                x[o + r] = lanes_of(p, i, r, ws)
+                x[o + r] = lanes_of(system, i, r, work)
             for j in range(3, 3 + body.nf):
-                x[o + j] = ws.flex[DINV, body.flex + j - 3] * x[o + j] + lanes_of(p, i, j, ws)
+                x[o + j] = work.flex[DINV, body.flex + j - 3] * x[o + j] + lanes_of(system, i, j, work)
         else:
-            inverse_times(p, i, inverse, ws.scratch.rigid, x)
+            inverse_times(system, i, inverse, work.scratch.rigid, x)
             for j in range(3 + body.nf):
-                x[o + j] += lanes_of(p, i, j, ws)
-        to_ground_frame(p, i, ws, x)
+                x[o + j] += lanes_of(system, i, j, work)
+        to_ground_frame(system, i, work, x)
 
 
 @routine
-def right_hand_side(p, ws, scale):
+def right_hand_side(system, work, scale):
     """-f and -rows as the right-hand side of `solve_system`; rows times their `row_scale`."""
-    for j in range(ws.f.size):
-        ws.x[j] = -ws.f[j]
-    for r in range(ws.rows.size):
-        ws.mu[r] = -ws.rows[r] * row_scale(p, r, ws, scale)
+    for j in range(work.f.size):
+        work.x[j] = -work.f[j]
+    for r in range(work.rows.size):
+        work.mu[r] = -work.rows[r] * row_scale(system, r, work, scale)

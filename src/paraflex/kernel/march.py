@@ -6,7 +6,7 @@ from math import ceil, sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import inlined, lasting, routine, seldom
+from paraflex.kernel.compiling import inlined, releases_lock, routine, unoptimised
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
@@ -81,10 +81,10 @@ def interpolate(q0, v0, a0, q1, v1, a1, h, x):
 
 
 @routine
-def write_samples(p, tableau, t, h, m, ws, out):
+def write_samples(system, tableau, t, h, march, work, out):
     """Fill every sample time within the accepted step from t to t + h."""
     piece = 0
-    i = m.counts[SAMPLE]
+    i = march.counts[SAMPLE]
     while i < out.times.size and out.times[i] <= t + h * (1.0 + 1e-12):
         time = out.times[i]
         while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
@@ -92,35 +92,35 @@ def write_samples(p, tableau, t, h, m, ws, out):
         s0, s1 = tableau.dense[piece], tableau.dense[piece + 1]
         width = (tableau.c[s1] - tableau.c[s0]) * h
         x = min(max((time - t - tableau.c[s0] * h) / width, 0.0), 1.0)
-        for j in range(m.q.size):
+        for j in range(march.q.size):
             out.q[i, j], out.v[i, j], out.a[i, j] = interpolate(
-                m.stage_q[s0, j], m.stage_v[s0, j], m.stage_a[1, s0, j],
-                m.stage_q[s1, j], m.stage_v[s1, j], m.stage_a[1, s1, j], width, x,
+                march.stage_q[s0, j], march.stage_v[s0, j], march.stage_a[1, s0, j],
+                march.stage_q[s1, j], march.stage_v[s1, j], march.stage_a[1, s1, j], width, x,
             )  # fmt: skip
-        interpolate_multipliers(tableau, (time - t) / h, m, out.lam[i])
-        out.energy[i, 0], out.energy[i, 1] = system_energy(p, out.q[i], out.v[i], ws.scratch)
-        out.energy[i, 1] += spring_energy(p, out.lam[i]) + line_energy(p, out.q[i], out.v[i])[0]
+        interpolate_multipliers(tableau, (time - t) / h, march, out.lam[i])
+        out.energy[i, 0], out.energy[i, 1] = system_energy(system, out.q[i], out.v[i], work.scratch)
+        out.energy[i, 1] += spring_energy(system, out.lam[i]) + line_energy(system, out.q[i], out.v[i])[0]
         # Within the step by the cubic with the power at its ends; over the whole step by the scheme's own quadrature.
-        done, last = min(max((time - t) / h, 0.0), 1.0), m.power.size - 1
+        done, last = min(max((time - t) / h, 0.0), 1.0), march.power.size - 1
         left = 1.0 - done
-        out.energy[i, 2] = m.clock[WORK] + done * done * (3.0 - 2.0 * done) * step_work(tableau, h, m)
-        out.energy[i, 2] += h * done * left * (left * m.power[0] - done * m.power[last])
-        out.energy[i, 2] += weight_work(p, out.q[i], ws.scratch) - m.clock[WEIGHT_0]
+        out.energy[i, 2] = march.clock[WORK] + done * done * (3.0 - 2.0 * done) * step_work(tableau, h, march)
+        out.energy[i, 2] += h * done * left * (left * march.power[0] - done * march.power[last])
+        out.energy[i, 2] += weight_work(system, out.q[i], work.scratch) - march.clock[WEIGHT_0]
         i += 1
-    m.counts[SAMPLE] = i
+    march.counts[SAMPLE] = i
 
 
 @routine
-def step_work(tableau, h, m):
+def step_work(tableau, h, march):
     """Work done in the step, by the scheme's own quadrature."""
     last, work = tableau.c.size - 1, 0.0
     for s in range(last + 1):
-        work += h * tableau.A[last, s] * m.power[s]
+        work += h * tableau.A[last, s] * march.power[s]
     return work
 
 
 @routine
-def interpolate_multipliers(tableau, x, m, lam):
+def interpolate_multipliers(tableau, x, march, lam):
     """Multipliers at fraction x of the step: the polynomial through those at the nodes."""
     fill(lam, 0.0)
     for k in tableau.nodes:
@@ -129,131 +129,131 @@ def interpolate_multipliers(tableau, x, m, lam):
             if l != k:
                 weight *= (x - tableau.c[l]) / (tableau.c[k] - tableau.c[l])
         for r in range(lam.size):
-            lam[r] += weight * m.stage_lam[k, r]
+            lam[r] += weight * march.stage_lam[k, r]
 
 
 @routine
-def first_stage(p, signals, t, controls, m, ws):
+def first_stage(system, signals, t, controls, march, work):
     """Accelerations and multipliers at (t, q, v), solved exactly, as the first stage."""
-    a, lam = m.stage_a[1, 0], m.stage_lam[0]
-    note_friction(p, m.q, m.v, ws.mu, ws.compliance)
-    factor_bodies(p, 0.0, m.q, ws)
-    orient(p, m.q, ws, controls.dependent_part)
-    m.clock[FACTOR_B] = -1.0
-    if ws.least[0] < SINGULAR_PART and m.counts[STEPS] > 0:
+    a, lam = march.stage_a[1, 0], march.stage_lam[0]
+    note_friction(system, march.q, march.v, work.mu, work.compliance)
+    factor_bodies(system, 0.0, march.q, work)
+    orient(system, march.q, work, controls.dependent_part)
+    march.clock[FACTOR_B] = -1.0
+    if work.least[0] < SINGULAR_PART and march.counts[STEPS] > 0:
         return
     weights = INDEX_1
     if controls.treatment == BAUMGARTE and controls.gain == 0.0:
         weights = (1.0, 2.0 * controls.alpha, controls.beta * controls.beta)
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
     for _ in range(2):
-        equations(p, signals, t, weights, m.q, m.v, a, lam, m.torques, ws)
-        right_hand_side(p, ws, 1.0)
-        solve_system(p, ws, ws.x, ws.mu)
-        add(ws.x, a)
-        add(ws.mu, lam)
+        equations(system, signals, t, weights, march.q, march.v, a, lam, march.torques, work)
+        right_hand_side(system, work, 1.0)
+        solve_system(system, work, work.x, work.mu)
+        add(work.x, a)
+        add(work.mu, lam)
 
 
 @routine
-def enter(p, signals, t, controls, m, ws):
+def enter(system, signals, t, controls, march, work):
     """Where a run comes near a singular position: bring it back to the constraints, what is left of them would grow.
 
     Where there is no place on them so near by the mechanism is driven beyond its reach, and cannot pass.
     """
-    copy(m.q, m.eq)
-    copy(m.v, m.ev)
-    project(p, signals, t, m.q, m.v, ws)
-    for j in range(m.q.size):
-        ws.x[j] = m.q[j] - m.eq[j]
-    m.counts[PREPARED] = 1
-    if not mass_norm(p, ws, ws.x) <= ENTRY * controls.near_error:
-        copy(m.eq, m.q)
-        copy(m.ev, m.v)
-        m.counts[PREPARED] = -1
+    copy(march.q, march.eq)
+    copy(march.v, march.ev)
+    project(system, signals, t, march.q, march.v, work)
+    for j in range(march.q.size):
+        work.x[j] = march.q[j] - march.eq[j]
+    march.counts[PREPARED] = 1
+    if not mass_norm(system, work, work.x) <= ENTRY * controls.near_error:
+        copy(march.eq, march.q)
+        copy(march.ev, march.v)
+        march.counts[PREPARED] = -1
         return
-    copy(m.q, m.stage_q[0])
-    copy(m.v, m.stage_v[0])
-    copy(m.v, m.stage_d[0])
-    first_stage(p, signals, t, controls, m, ws)
+    copy(march.q, march.stage_q[0])
+    copy(march.v, march.stage_v[0])
+    copy(march.v, march.stage_d[0])
+    first_stage(system, signals, t, controls, march, work)
 
 
-@seldom
-def start(p, signals, tableau, controls, m, ws, out):
+@unoptimised
+def start(system, signals, tableau, controls, march, work, out):
     """First stage and first sample of a run."""
-    t = m.clock[TIME]
-    first_stage(p, signals, t, controls, m, ws)
-    a, lam = m.stage_a[1, 0], m.stage_lam[0]
-    m.stage_t[1, 0] = t
-    copy(m.q, m.stage_q[0])
-    copy(m.v, m.stage_v[0])
-    copy(m.v, m.stage_d[0])
-    copy(a, m.algorithmic[0])
-    m.clock[LAST_STEP], m.clock[LAST_ERROR] = 0.0, 1.0
-    m.clock[PART_END] = t
-    m.clock[SLOPE], m.counts[ROOT_STEP] = 0.0, -1
-    m.power[0] = input_power(p, signals, t, m.q, m.v, lam, m.torques, ws)
-    kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)
-    strain += spring_energy(p, lam) + line_energy(p, m.q, m.v)[0]
-    m.clock[ENERGY_0] = kinetic + strain
-    m.clock[WEIGHT_0] = weight_work(p, m.q, ws.scratch)
-    note_constraints(p, signals, t, m, ws)
+    t = march.clock[TIME]
+    first_stage(system, signals, t, controls, march, work)
+    a, lam = march.stage_a[1, 0], march.stage_lam[0]
+    march.stage_t[1, 0] = t
+    copy(march.q, march.stage_q[0])
+    copy(march.v, march.stage_v[0])
+    copy(march.v, march.stage_d[0])
+    copy(a, march.algorithmic[0])
+    march.clock[LAST_STEP], march.clock[LAST_ERROR] = 0.0, 1.0
+    march.clock[PART_END] = t
+    march.clock[SLOPE], march.counts[ROOT_STEP] = 0.0, -1
+    march.power[0] = input_power(system, signals, t, march.q, march.v, lam, march.torques, work)
+    kinetic, strain = system_energy(system, march.q, march.v, work.scratch)
+    strain += spring_energy(system, lam) + line_energy(system, march.q, march.v)[0]
+    march.clock[ENERGY_0] = kinetic + strain
+    march.clock[WEIGHT_0] = weight_work(system, march.q, work.scratch)
+    note_constraints(system, signals, t, march, work)
     if out.times.size > 0 and out.times[0] <= t:
-        copy(m.q, out.q[0])
-        copy(m.v, out.v[0])
+        copy(march.q, out.q[0])
+        copy(march.v, out.v[0])
         copy(a, out.a[0])
         copy(lam, out.lam[0])
         out.energy[0, 0], out.energy[0, 1], out.energy[0, 2] = kinetic, strain, 0.0
-        m.counts[SAMPLE] = 1
+        march.counts[SAMPLE] = 1
 
 
 @routine
-def note_constraints(p, signals, t, m, ws):
+def note_constraints(system, signals, t, march, work):
     """Keep the largest constraint violation seen at accepted steps."""
-    constraint_values(p, signals, t, m.q, m.v, ws.scratch, ws.rows, ws.mu)
-    for r in range(ws.rows.size):
-        m.clock[PHI_MAX] = max(m.clock[PHI_MAX], abs(ws.rows[r]))
-        m.clock[DPHI_MAX] = max(m.clock[DPHI_MAX], abs(ws.mu[r]))
+    constraint_values(system, signals, t, march.q, march.v, work.scratch, work.rows, work.mu)
+    for r in range(work.rows.size):
+        march.clock[PHI_MAX] = max(march.clock[PHI_MAX], abs(work.rows[r]))
+        march.clock[DPHI_MAX] = max(march.clock[DPHI_MAX], abs(work.mu[r]))
 
 
 @routine
-def accept(p, signals, tableau, controls, t, h, m, ws, out):
+def accept(system, signals, tableau, controls, t, h, march, work, out):
     """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1
-    if m.counts[NEAR] > 0:
-        note_crossing(p, t, h, m, ws)
-    if controls.treatment == PROJECTION and m.counts[NEAR] == 0:
-        project(p, signals, t + h, m.stage_q[last], m.stage_v[last], ws)
-    write_samples(p, tableau, t, h, m, ws, out)
-    copy(m.stage_q[last], m.q)
-    copy(m.stage_v[last], m.v)
-    m.clock[WORK] += step_work(tableau, h, m)
-    m.clock[LAST_STEP] = h
-    copy(m.stage_t[1], m.stage_t[0])
+    if march.counts[NEAR] > 0:
+        note_crossing(system, t, h, march, work)
+    if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
+        project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
+    write_samples(system, tableau, t, h, march, work, out)
+    copy(march.stage_q[last], march.q)
+    copy(march.stage_v[last], march.v)
+    march.clock[WORK] += step_work(tableau, h, march)
+    march.clock[LAST_STEP] = h
+    copy(march.stage_t[1], march.stage_t[0])
     for s in range(last + 1):
-        copy(m.stage_a[1, s], m.stage_a[0, s])
-    m.stage_t[1, 0] = t + h
-    copy(m.q, m.stage_q[0])
-    copy(m.v, m.stage_v[0])
-    copy(m.stage_d[last], m.stage_d[0])
-    copy(m.algorithmic[1], m.algorithmic[0])
-    copy(m.stage_a[0, last], m.stage_a[1, 0])
-    copy(m.stage_lam[last], m.stage_lam[0])
-    m.power[0] = m.power[last]
-    m.counts[STEPS] += 1
-    m.counts[FAILURES] = 0
-    m.counts[DRIFTED] = m.counts[HELD_END]
-    if m.counts[NEAR] == 0:
-        m.counts[PREPARED] = 0
-    kinetic, strain = system_energy(p, m.q, m.v, ws.scratch)
-    strain += spring_energy(p, m.stage_lam[0]) + line_energy(p, m.q, m.v)[0]
-    done = m.clock[WORK] + weight_work(p, m.q, ws.scratch) - m.clock[WEIGHT_0]
-    balance = abs(kinetic + strain - m.clock[ENERGY_0] - done)
-    m.clock[BALANCE] = max(m.clock[BALANCE], balance)
-    note_constraints(p, signals, t + h, m, ws)
+        copy(march.stage_a[1, s], march.stage_a[0, s])
+    march.stage_t[1, 0] = t + h
+    copy(march.q, march.stage_q[0])
+    copy(march.v, march.stage_v[0])
+    copy(march.stage_d[last], march.stage_d[0])
+    copy(march.algorithmic[1], march.algorithmic[0])
+    copy(march.stage_a[0, last], march.stage_a[1, 0])
+    copy(march.stage_lam[last], march.stage_lam[0])
+    march.power[0] = march.power[last]
+    march.counts[STEPS] += 1
+    march.counts[FAILURES] = 0
+    march.counts[DRIFTED] = march.counts[HELD_END]
+    if march.counts[NEAR] == 0:
+        march.counts[PREPARED] = 0
+    kinetic, strain = system_energy(system, march.q, march.v, work.scratch)
+    strain += spring_energy(system, march.stage_lam[0]) + line_energy(system, march.q, march.v)[0]
+    done = march.clock[WORK] + weight_work(system, march.q, work.scratch) - march.clock[WEIGHT_0]
+    balance = abs(kinetic + strain - march.clock[ENERGY_0] - done)
+    march.clock[BALANCE] = max(march.clock[BALANCE], balance)
+    note_constraints(system, signals, t + h, march, work)
 
 
-@lasting
-def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
+@releases_lock
+def march(system, signals, tableau, controls, stops, max_steps, march, work, slow, out):
     """Advance by up to max_steps attempted steps, ending steps exactly at each of the times in `stops`.
 
     Returns
@@ -263,73 +263,73 @@ def march(p, signals, tableau, controls, stops, max_steps, m, ws, slow, out):
     """
     exponent = 1.0 / tableau.order
     for _ in range(max_steps):
-        t = m.clock[TIME]
-        while m.counts[STOP] < stops.size and stops[m.counts[STOP]] <= t:
-            m.counts[STOP] += 1
-        if m.counts[STOP] == stops.size:
+        t = march.clock[TIME]
+        while march.counts[STOP] < stops.size and stops[march.counts[STOP]] <= t:
+            march.counts[STOP] += 1
+        if march.counts[STOP] == stops.size:
             return FINISHED
-        end, longest = stops[m.counts[STOP]], controls.fixed_step
-        if t < m.clock[PART_END]:
-            end, longest = m.clock[PART_END], m.clock[PART]
+        end, longest = stops[march.counts[STOP]], controls.fixed_step
+        if t < march.clock[PART_END]:
+            end, longest = march.clock[PART_END], march.clock[PART]
         left = end - t
-        h = min(m.clock[STEP], controls.max_step)
+        h = min(march.clock[STEP], controls.max_step)
         landing = False
         if controls.fixed_step > 0.0:
             # Stretches between stops are divided evenly.
             h = left / max(1.0, ceil(left / longest - 1e-6))
             # But for rounding the same step: its factor still serves.
-            if abs(h - m.clock[STEP]) <= 1e-9 * h:
-                h = m.clock[STEP]
-            m.clock[STEP] = h
+            if abs(h - march.clock[STEP]) <= 1e-9 * h:
+                h = march.clock[STEP]
+            march.clock[STEP] = h
         if left <= h * (1.0 + 1e-9):
             h, landing = left, True
         elif left < 2.0 * h and controls.fixed_step == 0.0:
             h = 0.5 * left
-        cause, error = attempt(p, signals, tableau, controls, t, h, m, ws, slow)
+        cause, error = attempt(system, signals, tableau, controls, t, h, march, work, slow)
         if cause == ENTERS:
-            enter(p, signals, t, controls, m, ws)
+            enter(system, signals, t, controls, march, work)
             continue
         if cause == PAUSED and error <= 1.0:
-            after_failure = m.counts[FAILURES] > 0
-            accept(p, signals, tableau, controls, t, h, m, ws, out)
-            m.clock[TIME] = end if landing else t + h
+            after_failure = march.counts[FAILURES] > 0
+            accept(system, signals, tableau, controls, t, h, march, work, out)
+            march.clock[TIME] = end if landing else t + h
             if controls.fixed_step > 0.0:
                 continue
             # Near a singular position steps are of one length, and not so short that rounding tells.
-            if m.counts[NEAR] > 0:
-                pace = abs(m.clock[SLOPE]) * h
-                if pace < LEAST_PACE * sqrt(m.clock[WIDEST]) and error < GROWING and not after_failure:
-                    m.clock[STEP] = MAX_FACTOR * h
+            if march.counts[NEAR] > 0:
+                pace = abs(march.clock[SLOPE]) * h
+                if pace < LEAST_PACE * sqrt(march.clock[WIDEST]) and error < GROWING and not after_failure:
+                    march.clock[STEP] = MAX_FACTOR * h
                 continue
             error = max(error, SMALLEST_ERROR) / SAFETY**tableau.order
-            factor = error ** (-BY_ERROR * exponent) * m.clock[LAST_ERROR] ** (BY_LAST_ERROR * exponent)
+            factor = error ** (-BY_ERROR * exponent) * march.clock[LAST_ERROR] ** (BY_LAST_ERROR * exponent)
             factor = min(MAX_FACTOR, factor)
-            m.clock[LAST_ERROR] = error
+            march.clock[LAST_ERROR] = error
             # Keep the step, and with it the factor, unless the change is worth it; a step cut short to land on a stop
             # says nothing about longer ones.
-            if factor < KEEP_ABOVE or (factor > KEEP_BELOW and h >= m.clock[STEP] and not after_failure):
-                m.clock[STEP] = factor * h
+            if factor < KEEP_ABOVE or (factor > KEEP_BELOW and h >= march.clock[STEP] and not after_failure):
+                march.clock[STEP] = factor * h
             continue
-        m.counts[REJECTED] += 1
+        march.counts[REJECTED] += 1
         if controls.fixed_step > 0.0:
             if h <= SMALLEST_PART * controls.fixed_step:
                 return cause
-            if t >= m.clock[PART_END]:
-                m.clock[PART_END] = end if landing else t + h
-            m.clock[PART] = MIN_FACTOR * h
-        if m.counts[FAILURES] == 1:
+            if t >= march.clock[PART_END]:
+                march.clock[PART_END] = end if landing else t + h
+            march.clock[PART] = MIN_FACTOR * h
+        if march.counts[FAILURES] == 1:
             # The first stage is the last step's last, with the error its longer step could bear: not so a shorter one.
-            first_stage(p, signals, t, controls, m, ws)
+            first_stage(system, signals, t, controls, march, work)
             if tableau.newmark.size > 0:
-                restart_algorithmic(tableau.newmark, m)
-        m.counts[FAILURES] += 1
+                restart_algorithmic(tableau.newmark, march)
+        march.counts[FAILURES] += 1
         if controls.fixed_step > 0.0:
             continue
         if cause == PAUSED:
             cause = ERROR_TEST
-            m.clock[STEP] = h * max(MIN_FACTOR, SAFETY * (1.0 / error) ** exponent)
+            march.clock[STEP] = h * max(MIN_FACTOR, SAFETY * (1.0 / error) ** exponent)
         else:
-            m.clock[STEP] = h * MIN_FACTOR
-        if m.clock[STEP] < controls.least_step:
+            march.clock[STEP] = h * MIN_FACTOR
+        if march.clock[STEP] < controls.least_step:
             return cause
     return PAUSED

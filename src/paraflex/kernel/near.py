@@ -51,33 +51,33 @@ FAR = 10.0
 
 
 @routine
-def note_root(m, ws):
+def note_root(march, work):
     """Keep how near to dependence constraint rows are at the start of a step, and how fast that changes."""
-    m.clock[WIDEST] = max(m.clock[WIDEST], ws.least[0])
-    if m.counts[ROOT_STEP] == m.counts[STEPS]:
+    march.clock[WIDEST] = max(march.clock[WIDEST], work.least[0])
+    if march.counts[ROOT_STEP] == march.counts[STEPS]:
         return
-    root, change = sqrt(max(ws.least[0], 0.0)), 0.0
-    if m.counts[ROOT_STEP] >= 0:
-        change = (root - m.clock[ROOT]) / m.clock[LAST_STEP]
-    size = max(abs(change), FORGETTING * abs(m.clock[SLOPE]))
-    m.clock[SLOPE] = size if change > 0.0 else -size
-    m.clock[ROOT], m.counts[ROOT_STEP] = root, m.counts[STEPS]
+    root, change = sqrt(max(work.least[0], 0.0)), 0.0
+    if march.counts[ROOT_STEP] >= 0:
+        change = (root - march.clock[ROOT]) / march.clock[LAST_STEP]
+    size = max(abs(change), FORGETTING * abs(march.clock[SLOPE]))
+    march.clock[SLOPE] = size if change > 0.0 else -size
+    march.clock[ROOT], march.counts[ROOT_STEP] = root, march.counts[STEPS]
 
 
 @routine
-def comes_near(h, m):
+def comes_near(h, march):
     """Whether a step begins near a singular position."""
-    return m.clock[ROOT] < max(NEAR_STEPS * abs(m.clock[SLOPE]) * h, NEAR_ROOT * sqrt(m.clock[WIDEST]))
+    return march.clock[ROOT] < max(NEAR_STEPS * abs(march.clock[SLOPE]) * h, NEAR_ROOT * sqrt(march.clock[WIDEST]))
 
 
 @routine
-def share_of_passage(h, m):
+def share_of_passage(h, march):
     """The part that a step is of the way past a singular position."""
-    return min(1.0, abs(m.clock[SLOPE]) * h / (NEAR_ROOT * sqrt(m.clock[WIDEST])))
+    return min(1.0, abs(march.clock[SLOPE]) * h / (NEAR_ROOT * sqrt(march.clock[WIDEST])))
 
 
 @routine
-def trust(weights, g, b, ahead, m):
+def trust(weights, g, b, ahead, march):
     """How far constraint rows are trusted near a singular position: `held` and `lag` of `hold_rows`.
 
     With root(t) what is left of a row, constraint rows w_a Phi'' + w_v Phi' + w_q Phi of a stage change with its
@@ -85,151 +85,151 @@ def trust(weights, g, b, ahead, m):
     the first only, and before a singular position both cancel. The stage is so long `ahead` of the start of the step.
     """
     lag = (2.0 * weights[0] * g + weights[1] * b) / (weights[0] + weights[1] * g + weights[2] * b)
-    speed = abs(m.clock[SLOPE])
+    speed = abs(march.clock[SLOPE])
     held = min(max(HELD * lag, LEAST_HELD * g) * speed, MOST_HELD)
-    before = m.clock[SLOPE] < 0.0 and m.clock[ROOT] > speed * ahead
+    before = march.clock[SLOPE] < 0.0 and march.clock[ROOT] > speed * ahead
     return held, -lag * speed if before else lag * speed
 
 
 @routine
-def hold_rows(p, ws, held, lag, rows, scratch):
+def hold_rows(system, work, held, lag, rows, scratch):
     """Right-hand sides of rows that nearly depend on others, as far as these rows are to be trusted.
 
     A row whose part left has a root below `held` gets what follows from the others: the solution does not move along
     the direction in which it nearly depends on them. Of others the true derivative along that direction is the
     matrix's times 1 + lag / root.
     """
-    for i in range(p.rows.size):
-        first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
+    for i in range(system.rows.size):
+        first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
         follows, square = 0.0, 0.0
         for k in range(first, i):
-            follows += ws.schur[start + k] * scratch[k]
-            square += ws.schur[start + k] * ws.schur[start + k]
-        inverse = ws.schur[start + i]
+            follows += work.schur[start + k] * scratch[k]
+            square += work.schur[start + k] * work.schur[start + k]
+        inverse = work.schur[start + i]
         if inverse == 0.0:
             scratch[i] = 0.0
             continue
         scratch[i] = (rows[i] - follows) * inverse
         root = 1.0 / sqrt(1.0 + square * inverse * inverse)
-        if ws.redundant[i] > 0.0 or root > FAR * held:
+        if work.redundant[i] > 0.0 or root > FAR * held:
             continue
         scratch[i] = 0.0 if root < held else scratch[i] / (1.0 + lag / root)
         rows[i] = follows + scratch[i] / inverse
 
 
 @routine
-def damp_rows(p, ws, held, rows, scratch):
+def damp_rows(system, work, held, rows, scratch):
     """Right-hand sides of rows such that those with a root below `held` count as if they had that much left."""
-    for i in range(p.rows.size):
-        first, start = p.rows[i].first, p.rows[i].start - p.rows[i].first
+    for i in range(system.rows.size):
+        first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
         follows, square = 0.0, 0.0
         for k in range(first, i):
-            follows += ws.schur[start + k] * scratch[k]
-            square += ws.schur[start + k] * ws.schur[start + k]
-        inverse = ws.schur[start + i]
+            follows += work.schur[start + k] * scratch[k]
+            square += work.schur[start + k] * work.schur[start + k]
+        inverse = work.schur[start + i]
         if inverse == 0.0:
             scratch[i] = 0.0
             continue
         root = 1.0 / sqrt(1.0 + square * inverse * inverse)
         scratch[i] = (rows[i] - follows) * inverse
-        if root < held and ws.redundant[i] == 0.0:
+        if root < held and work.redundant[i] == 0.0:
             scratch[i] *= root / held
             rows[i] = follows + scratch[i] / inverse
 
 
 @routine
-def return_to_constraints(p, signals, t, held, m, ws):
+def return_to_constraints(system, signals, t, held, march, work):
     """Bring the end of a step near a singular position back to the constraints; how far it was from them [m].
 
     Only as far as rows are trusted. Where they are not, what they are off by, and its rate times the time it takes to
     where they are, still tell of that distance.
     """
-    last = m.stage_q.shape[0] - 1
-    q, v = m.stage_q[last], m.stage_v[last]
-    constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
-    distance = damped_distance(p, ws.rows, held, ws)
-    if m.clock[SLOPE] != 0.0:
-        constraint_values(p, signals, t, q, v, ws.scratch, ws.mu, ws.rows)
-        distance = max(distance, held / abs(m.clock[SLOPE]) * damped_distance(p, ws.rows, held, ws))
-    m.counts[HELD_END] = 1 if ws.least[0] < held * held else 0
+    last = march.stage_q.shape[0] - 1
+    q, v = march.stage_q[last], march.stage_v[last]
+    constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
+    distance = damped_distance(system, work.rows, held, work)
+    if march.clock[SLOPE] != 0.0:
+        constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
+        distance = max(distance, held / abs(march.clock[SLOPE]) * damped_distance(system, work.rows, held, work))
+    march.counts[HELD_END] = 1 if work.least[0] < held * held else 0
     for _ in range(PASSES):
-        constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
-        if largest_violation(p, ws.rows) > CLOSED:
-            hold_rows(p, ws, held, 0.0, ws.rows, ws.mu)
-            least_change(p, ws.rows, ws)
-            add(ws.x, q)
+        constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
+        if largest_violation(system, work.rows) > CLOSED:
+            hold_rows(system, work, held, 0.0, work.rows, work.mu)
+            least_change(system, work.rows, work)
+            add(work.x, q)
     for _ in range(PASSES):
-        constraint_values(p, signals, t, q, v, ws.scratch, ws.mu, ws.rows)
-        if largest_violation(p, ws.rows) > CLOSED:
-            hold_rows(p, ws, held, 0.0, ws.rows, ws.mu)
-            least_change(p, ws.rows, ws)
-            add(ws.x, v)
-    return distance * LEAVING if m.counts[DRIFTED] > 0 else distance
+        constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
+        if largest_violation(system, work.rows) > CLOSED:
+            hold_rows(system, work, held, 0.0, work.rows, work.mu)
+            least_change(system, work.rows, work)
+            add(work.x, v)
+    return distance * LEAVING if march.counts[DRIFTED] > 0 else distance
 
 
 @routine
-def damped_distance(p, rows, held, ws):
+def damped_distance(system, rows, held, work):
     """How far constraints of these values are from being met [m], rows not trusted counting as far as they are."""
-    if largest_violation(p, rows) <= CLOSED:
+    if largest_violation(system, rows) <= CLOSED:
         return 0.0
-    damp_rows(p, ws, held, rows, ws.mu)
-    least_change(p, rows, ws)
-    return mass_norm(p, ws, ws.x)
+    damp_rows(system, work, held, rows, work.mu)
+    least_change(system, rows, work)
+    return mass_norm(system, work, work.x)
 
 
 @routine
-def begin_near(p, m, ws):
+def begin_near(system, march, work):
     """Near a singular position: keep what opens the row that is nearest to dependence, at the start of the step."""
-    m.counts[NEAR] = 1 + int(ws.least[1])
-    open_row(p, m.counts[NEAR] - 1, ws)
-    copy(ws.x, m.opening)
+    march.counts[NEAR] = 1 + int(work.least[1])
+    open_row(system, march.counts[NEAR] - 1, work)
+    copy(work.x, march.opening)
 
 
 @routine
-def open_row(p, row, ws):
+def open_row(system, row, work):
     """The least change of coordinates that opens one row by one unit, into ws.x: infinite at a singular position."""
-    fill(ws.x, 0.0)
-    fill(ws.mu, 0.0)
-    ws.mu[row] = 1.0
-    solve_system(p, ws, ws.x, ws.mu)
+    fill(work.x, 0.0)
+    fill(work.mu, 0.0)
+    work.mu[row] = 1.0
+    solve_system(system, work, work.x, work.mu)
 
 
 @routine
-def note_crossing(p, t, h, m, ws):
+def note_crossing(system, t, h, march, work):
     """Keep when a step has straddled a singular position: what opens the row has changed sign, through infinity."""
-    open_row(p, m.counts[NEAR] - 1, ws)
+    open_row(system, march.counts[NEAR] - 1, work)
     product, start, end = 0.0, 0.0, 0.0
-    for j in range(ws.x.size):
-        product += m.opening[j] * ws.x[j]
-        start += m.opening[j] * m.opening[j]
-        end += ws.x[j] * ws.x[j]
+    for j in range(work.x.size):
+        product += march.opening[j] * work.x[j]
+        start += march.opening[j] * march.opening[j]
+        end += work.x[j] * work.x[j]
     if product >= 0.0:
         return
-    m.clock[ROOT] = -m.clock[ROOT]
+    march.clock[ROOT] = -march.clock[ROOT]
     # Both grow as one over the time from it.
-    note_position(t + h * sqrt(end) / (sqrt(start) + sqrt(end)), t, h, m)
+    note_position(t + h * sqrt(end) / (sqrt(start) + sqrt(end)), t, h, march)
 
 
 @routine
-def note_position(at, t, h, m):
+def note_position(at, t, h, march):
     """Keep when a step from t was at a singular position, and as long before and after that as the step lasts."""
-    last, around = m.counts[PASSAGES] - 1, max(at - t, t + h - at)
+    last, around = march.counts[PASSAGES] - 1, max(at - t, t + h - at)
     if last >= 0:
-        if abs(0.5 * (m.passages[0, last] + m.passages[1, last]) - at) < SAME_POSITION * h:
+        if abs(0.5 * (march.passages[0, last] + march.passages[1, last]) - at) < SAME_POSITION * h:
             return
-    if last + 1 < m.passages.shape[1]:
-        m.passages[0, last + 1], m.passages[1, last + 1] = at - around, at + around
-        m.counts[PASSAGES] += 1
+    if last + 1 < march.passages.shape[1]:
+        march.passages[0, last + 1], march.passages[1, last + 1] = at - around, at + around
+        march.counts[PASSAGES] += 1
 
 
 @routine
-def note_passage(t, h, m):
+def note_passage(t, h, march):
     """Keep from when to when a run is at a singular position; steps that touch are of one."""
-    last = m.counts[PASSAGES] - 1
+    last = march.counts[PASSAGES] - 1
     if last >= 0:
-        if t <= m.passages[1, last]:
-            m.passages[1, last] = max(t + h, m.passages[1, last])
+        if t <= march.passages[1, last]:
+            march.passages[1, last] = max(t + h, march.passages[1, last])
             return
-    if last + 1 < m.passages.shape[1]:
-        m.passages[0, last + 1], m.passages[1, last + 1] = t, t + h
-        m.counts[PASSAGES] += 1
+    if last + 1 < march.passages.shape[1]:
+        march.passages[0, last + 1], march.passages[1, last + 1] = t, t + h
+        march.counts[PASSAGES] += 1

@@ -20,89 +20,89 @@ from paraflex.kernel.stage import equations
 
 
 @routine
-def newmark_start(numbers, t, h, m):
+def newmark_start(numbers, t, h, march):
     """Explicit parts of the stage into m.qs and m.vs; its time, g and b of q = q* + b v', v = v* + g v'."""
-    a0, theta = m.algorithmic[0], numbers[THETA]
+    a0, theta = march.algorithmic[0], numbers[THETA]
     if theta > 1.0:
         h = theta * h
-        for j in range(m.q.size):
-            m.qs[j] = m.q[j] + h * m.v[j] + h * h / 3.0 * a0[j]
-            m.vs[j] = m.v[j] + 0.5 * h * a0[j]
+        for j in range(march.q.size):
+            march.qs[j] = march.q[j] + h * march.v[j] + h * h / 3.0 * a0[j]
+            march.vs[j] = march.v[j] + 0.5 * h * a0[j]
         return t + h, 0.5 * h, h * h / 6.0
     alpha_m, alpha_f, beta, gamma = numbers[ALPHA_M], numbers[ALPHA_F], numbers[BETA], numbers[GAMMA]
     part = (1.0 - alpha_f) / (1.0 - alpha_m)
-    moved = shifted(alpha_m - alpha_f, h, m)
-    for j in range(m.q.size):
-        a = a0[j] + moved * (m.stage_a[1, 0, j] - m.stage_a[0, 0, j])
-        carried = (alpha_f * m.stage_a[1, 0, j] - alpha_m * a) / (1.0 - alpha_m)
-        m.qs[j] = m.q[j] + h * m.v[j] + h * h * ((0.5 - beta) * a + beta * carried)
-        m.vs[j] = m.v[j] + h * ((1.0 - gamma) * a + gamma * carried)
+    moved = shifted(alpha_m - alpha_f, h, march)
+    for j in range(march.q.size):
+        a = a0[j] + moved * (march.stage_a[1, 0, j] - march.stage_a[0, 0, j])
+        carried = (alpha_f * march.stage_a[1, 0, j] - alpha_m * a) / (1.0 - alpha_m)
+        march.qs[j] = march.q[j] + h * march.v[j] + h * h * ((0.5 - beta) * a + beta * carried)
+        march.vs[j] = march.v[j] + h * ((1.0 - gamma) * a + gamma * carried)
     return t + h, gamma * h * part, beta * h * h * part
 
 
 @routine
-def shifted(where, h, m):
+def shifted(where, h, march):
     """What of the last step's change of acceleration to add where the step changes from that of the last one."""
-    last = m.clock[LAST_STEP]
+    last = march.clock[LAST_STEP]
     return where * (h - last) / last if last > 0.0 else 0.0
 
 
 @routine
-def restart_algorithmic(numbers, m):
+def restart_algorithmic(numbers, march):
     """The algorithmic acceleration anew, from true ones: after steps cut short the carried one serves no more."""
-    where = numbers[ALPHA_M] - numbers[ALPHA_F] if m.clock[LAST_STEP] > 0.0 else 0.0
-    for j in range(m.q.size):
-        a = m.stage_a[1, 0, j]
-        m.algorithmic[0, j] = a + where * (a - m.stage_a[0, 0, j])
+    where = numbers[ALPHA_M] - numbers[ALPHA_F] if march.clock[LAST_STEP] > 0.0 else 0.0
+    for j in range(march.q.size):
+        a = march.stage_a[1, 0, j]
+        march.algorithmic[0, j] = a + where * (a - march.stage_a[0, 0, j])
 
 
 @routine
-def newmark_end(p, signals, numbers, varying, t, h, m, ws):
+def newmark_end(system, signals, numbers, varying, t, h, march, work):
     """From the stage to the end of the step: q and v in ws.q and ws.v, the new algorithmic acceleration.
 
     Where steps vary, and with Wilson's method, velocities and algorithmic accelerations are brought back to their
     constraints: what a step leaves of Phi' the next one takes back, and if that is shorter, by a larger force.
     """
     if numbers[THETA] > 1.0:
-        wilson_end(numbers[THETA], h, m, ws)
+        wilson_end(numbers[THETA], h, march, work)
     else:
-        carry(numbers, h, m)
+        carry(numbers, h, march)
     if numbers[THETA] > 1.0 or varying:
-        project(p, signals, t + h, ws.q, ws.v, ws)
-        allow_acceleration(p, signals, t + h, m.algorithmic[1], m, ws)
+        project(system, signals, t + h, work.q, work.v, work)
+        allow_acceleration(system, signals, t + h, march.algorithmic[1], march, work)
     if numbers[THETA] > 1.0:
-        copy(m.algorithmic[1], m.stage_a[1, 1])
+        copy(march.algorithmic[1], march.stage_a[1, 1])
 
 
 @routine
-def carry(numbers, h, m):
+def carry(numbers, h, march):
     """The new algorithmic acceleration from the old one and those of both ends."""
-    a0, a1, start, end = m.algorithmic[0], m.algorithmic[1], m.stage_a[1, 0], m.stage_a[1, 1]
+    a0, a1, start, end = march.algorithmic[0], march.algorithmic[1], march.stage_a[1, 0], march.stage_a[1, 1]
     alpha_m, alpha_f = numbers[ALPHA_M], numbers[ALPHA_F]
-    moved = shifted(alpha_m - alpha_f, h, m)
-    for j in range(m.q.size):
-        a = a0[j] + moved * (start[j] - m.stage_a[0, 0, j])
+    moved = shifted(alpha_m - alpha_f, h, march)
+    for j in range(march.q.size):
+        a = a0[j] + moved * (start[j] - march.stage_a[0, 0, j])
         a1[j] = ((1.0 - alpha_f) * end[j] + alpha_f * start[j] - alpha_m * a) / (1.0 - alpha_m)
 
 
 @routine
-def wilson_end(theta, h, m, ws):
+def wilson_end(theta, h, march, work):
     """From what was found at t + theta h to t + h, acceleration and multipliers being linear in time."""
-    a0, a1, found = m.algorithmic[0], m.algorithmic[1], m.stage_a[1, 1]
-    for j in range(m.q.size):
+    a0, a1, found = march.algorithmic[0], march.algorithmic[1], march.stage_a[1, 1]
+    for j in range(march.q.size):
         a1[j] = a0[j] + (found[j] - a0[j]) / theta
-        ws.q[j] = m.q[j] + h * m.v[j] + h * h / 6.0 * (2.0 * a0[j] + a1[j])
-        ws.v[j] = m.v[j] + 0.5 * h * (a0[j] + a1[j])
-    for r in range(m.stage_lam.shape[1]):
-        m.stage_lam[1, r] = m.stage_lam[0, r] + (m.stage_lam[1, r] - m.stage_lam[0, r]) / theta
+        work.q[j] = march.q[j] + h * march.v[j] + h * h / 6.0 * (2.0 * a0[j] + a1[j])
+        work.v[j] = march.v[j] + 0.5 * h * (a0[j] + a1[j])
+    for r in range(march.stage_lam.shape[1]):
+        march.stage_lam[1, r] = march.stage_lam[0, r] + (march.stage_lam[1, r] - march.stage_lam[0, r]) / theta
 
 
 @routine
-def allow_acceleration(p, signals, t, a, m, ws):
+def allow_acceleration(system, signals, t, a, march, work):
     """Change an acceleration to the nearest one that the constraints allow at ws.q and ws.v."""
-    equations(p, signals, t, INDEX_1, ws.q, ws.v, a, m.stage_lam[1], m.torques, ws)
-    for r in range(ws.rows.size):
-        if p.rows[r].kind != CONSTRAINT:
-            ws.rows[r] = 0.0
-    least_change(p, ws.rows, ws)
-    add(ws.x, a)
+    equations(system, signals, t, INDEX_1, work.q, work.v, a, march.stage_lam[1], march.torques, work)
+    for r in range(work.rows.size):
+        if system.rows[r].kind != CONSTRAINT:
+            work.rows[r] = 0.0
+    least_change(system, work.rows, work)
+    add(work.x, a)

@@ -23,7 +23,7 @@ INSTANT_B = 1e-36
 
 
 @kernel
-def accelerations(p, signals, t, weights, q, v, a, lam, torques, ws, dependent_part):
+def accelerations(system, signals, t, weights, q, v, a, lam, torques, work, dependent_part):
     """Accelerations (n,) and multipliers (m,) at (t, q, v), into a and lam; the factor stays in ws.
 
     Returns
@@ -33,43 +33,43 @@ def accelerations(p, signals, t, weights, q, v, a, lam, torques, ws, dependent_p
     """
     fill(a, 0.0)
     fill(lam, 0.0)
-    note_friction(p, q, v, ws.mu, ws.compliance)
-    factor_bodies(p, 0.0, q, ws)
-    ws.step[0] = INSTANT_B
-    dependent = orient(p, q, ws, dependent_part)
+    note_friction(system, q, v, work.mu, work.compliance)
+    factor_bodies(system, 0.0, q, work)
+    work.step[0] = INSTANT_B
+    dependent = orient(system, q, work, dependent_part)
     # Linear in a and lambda with this very matrix: the second pass only removes rounding.
     for _ in range(2):
-        equations(p, signals, t, weights, q, v, a, lam, torques, ws)
-        right_hand_side(p, ws, 1.0)
-        solve_system(p, ws, ws.x, ws.mu)
-        add(ws.x, a)
-        add(ws.mu, lam)
+        equations(system, signals, t, weights, q, v, a, lam, torques, work)
+        right_hand_side(system, work, 1.0)
+        solve_system(system, work, work.x, work.mu)
+        add(work.x, a)
+        add(work.mu, lam)
     return dependent
 
 
 @kernel
-def rates(p, signals, t, weights, y, a, lam, torques, ws, dependent_part, dy):
+def rates(system, signals, t, weights, y, a, lam, torques, work, dependent_part, dy):
     """Derivative of y = (q, v, work) into dy; a and lam are left as `accelerations` has them. Dependent rows."""
     n = a.size
     q, v = y[:n], y[n : 2 * n]
-    dependent = accelerations(p, signals, t, weights, q, v, a, lam, torques, ws, dependent_part)
+    dependent = accelerations(system, signals, t, weights, q, v, a, lam, torques, work, dependent_part)
     for j in range(n):
         dy[j] = v[j]
         dy[n + j] = a[j]
-    dy[2 * n] = input_power(p, signals, t, q, v, lam, torques, ws)
+    dy[2 * n] = input_power(system, signals, t, q, v, lam, torques, work)
     return dependent
 
 
 @kernel
-def stored_energy(p, q, v, lam, scratch):
+def stored_energy(system, q, v, lam, scratch):
     """Kinetic energy, strain energy with that of springs, and what gravity has done: see `bodies.weight_work`."""
-    kinetic, strain = system_energy(p, q, v, scratch)
-    strain += spring_energy(p, lam) + line_energy(p, q, v)[0]
-    return kinetic, strain, weight_work(p, q, scratch)
+    kinetic, strain = system_energy(system, q, v, scratch)
+    strain += spring_energy(system, lam) + line_energy(system, q, v)[0]
+    return kinetic, strain, weight_work(system, q, scratch)
 
 
 @kernel
-def rates_jacobian(p, weights, y, a, lam, torques, ws, d, out):
+def rates_jacobian(system, weights, y, a, lam, torques, work, d, out):
     """Derivative of `rates` by y, into out (2n + 1, 2n + 1), at the y it was last called with.
 
     The accelerations change by -[M, J^T; J, -C]^-1 (dF, dG). The row of the power is left zero: Newton's iteration
@@ -79,79 +79,79 @@ def rates_jacobian(p, weights, y, a, lam, torques, ws, d, out):
     q, v = y[:n], y[n : 2 * n]
     for j in range(2 * n + 1):
         fill(out[j], 0.0)
-    note_slopes(p, q, v, ws.mu, ws.compliance, d)
-    for i in range(p.bodies.size):
-        for j in range(p.bodies[i].offset, p.bodies[i].offset + 3 + p.bodies[i].nf):
+    note_slopes(system, q, v, work.mu, work.compliance, d)
+    for i in range(system.bodies.size):
+        for j in range(system.bodies[i].offset, system.bodies[i].offset + 3 + system.bodies[i].nf):
             for part in range(2):
                 direction = d.q if part == 0 else d.v
                 direction[j] = 1.0
-                residual_tangent(p, weights, q, v, a, lam, torques, ws.compliance, i, i + 1, d)
+                residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, i, i + 1, d)
                 direction[j] = 0.0
-                copy(d.f, ws.f)
-                copy(d.rows, ws.rows)
-                right_hand_side(p, ws, 1.0)
-                solve_system(p, ws, ws.x, ws.mu)
+                copy(d.f, work.f)
+                copy(d.rows, work.rows)
+                right_hand_side(system, work, 1.0)
+                solve_system(system, work, work.x, work.mu)
                 column = part * n + j
                 for k in range(n):
-                    out[n + k, column] = ws.x[k]
+                    out[n + k, column] = work.x[k]
             out[j, n + j] = 1.0
 
 
 @kernel
-def descriptor_residual(p, signals, t, weights, y, dy, dropped, torques, ws, out):
+def descriptor_residual(system, signals, t, weights, y, dy, dropped, torques, work, out):
     """Residual of the equations as a DAE of index 1 in y = (q, v, lambda, work), into out.
 
     q' - v, then those of `equations` with v' as the acceleration, then work' less the power. `dropped` (m,) says which
     rows follow from others: their multipliers are zero.
     """
-    n, m = ws.f.size, ws.rows.size
+    n, m = work.f.size, work.rows.size
     q, v, a, lam = y[:n], y[n : 2 * n], dy[n : 2 * n], y[2 * n : 2 * n + m]
-    note_friction(p, q, v, ws.mu, ws.compliance)
-    equations(p, signals, t, weights, q, v, a, lam, torques, ws)
+    note_friction(system, q, v, work.mu, work.compliance)
+    equations(system, signals, t, weights, q, v, a, lam, torques, work)
     for j in range(n):
         out[j] = dy[j] - v[j]
-        out[n + j] = ws.f[j]
+        out[n + j] = work.f[j]
     for r in range(m):
-        out[2 * n + r] = lam[r] if dropped[r] else ws.rows[r]
-    out[2 * n + m] = dy[2 * n + m] - input_power(p, signals, t, q, v, lam, torques, ws)
+        out[2 * n + r] = lam[r] if dropped[r] else work.rows[r]
+    out[2 * n + m] = dy[2 * n + m] - input_power(system, signals, t, q, v, lam, torques, work)
 
 
 @kernel
-def descriptor_jacobian(p, weights, y, dy, c, dropped, torques, ws, d, out):
+def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direction, out):
     """Derivative of `descriptor_residual` by y plus c times that by dy, into out, where it was last called."""
-    n, m = ws.f.size, ws.rows.size
+    n, m = work.f.size, work.rows.size
     q, v, a, lam = y[:n], y[n : 2 * n], dy[n : 2 * n], y[2 * n : 2 * n + m]
     for j in range(2 * n + m + 1):
         fill(out[j], 0.0)
-    note_slopes(p, q, v, ws.mu, ws.compliance, d)
-    for i in range(p.bodies.size):
-        for j in range(p.bodies[i].offset, p.bodies[i].offset + 3 + p.bodies[i].nf):
-            d.q[j] = 1.0
-            residual_tangent(p, weights, q, v, a, lam, torques, ws.compliance, i, i + 1, d)
-            d.q[j] = 0.0
-            fill_column(d, j, out)
-            d.v[j], d.a[j] = 1.0, c
-            residual_tangent(p, weights, q, v, a, lam, torques, ws.compliance, i, i + 1, d)
-            d.v[j], d.a[j] = 0.0, 0.0
-            fill_column(d, n + j, out)
+    note_slopes(system, q, v, work.mu, work.compliance, direction)
+    for i in range(system.bodies.size):
+        for j in range(system.bodies[i].offset, system.bodies[i].offset + 3 + system.bodies[i].nf):
+            direction.q[j] = 1.0
+            residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
+            direction.q[j] = 0.0
+            fill_column(direction, j, out)
+            direction.v[j], direction.a[j] = 1.0, c
+            residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
+            direction.v[j], direction.a[j] = 0.0, 0.0
+            fill_column(direction, n + j, out)
             out[j, j], out[j, n + j] = c, -1.0
     for r in range(m):
-        d.lam[r] = 1.0
-        residual_tangent(p, weights, q, v, a, lam, torques, ws.compliance, 0, p.bodies.size, d)
-        d.lam[r] = 0.0
-        fill_column(d, 2 * n + r, out)
+        direction.lam[r] = 1.0
+        residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, 0, system.bodies.size, direction)
+        direction.lam[r] = 0.0
+        fill_column(direction, 2 * n + r, out)
     drop_rows(dropped, 2 * n, 2 * n, out)
     out[2 * n + m, 2 * n + m] = c
 
 
 @routine
-def fill_column(d, column, out):
+def fill_column(direction, column, out):
     """The changes of the equations of motion and of the rows into a column of out, below n rows."""
-    n = d.f.size
+    n = direction.f.size
     for k in range(n):
-        out[n + k, column] = d.f[k]
-    for r in range(d.rows.size):
-        out[2 * n + r, column] = d.rows[r]
+        out[n + k, column] = direction.f[k]
+    for r in range(direction.rows.size):
+        out[2 * n + r, column] = direction.rows[r]
 
 
 @routine
@@ -164,69 +164,69 @@ def drop_rows(dropped, row, column, out):
 
 
 @kernel
-def stabilised_residual(p, signals, t, y, dy, dropped, weight, torques, idle, ws, d, phi, dphi, out):
+def stabilised_residual(system, signals, t, y, dy, dropped, weight, torques, idle, work, direction, phi, dphi, out):
     """Residual of the stabilised form of index 2 in y = (q, v, lambda, mu, work), into out.
 
     W (q' - v) + Phi_q^T mu, the equations of motion, Phi' and Phi, the power (Gear, Gupta and Leimkuhler 1985). W is
     the diagonal `weight` (n,). Rows that are no constraints stand in place of their Phi', and have no mu.
     """
-    n, m = ws.f.size, ws.rows.size
+    n, m = work.f.size, work.rows.size
     q, v, a = y[:n], y[n : 2 * n], dy[n : 2 * n]
     lam, mu = y[2 * n : 2 * n + m], y[2 * n + m : 2 * n + 2 * m]
-    note_friction(p, q, v, ws.mu, ws.compliance)
-    equations(p, signals, t, INDEX_1, q, v, a, lam, torques, ws)
-    constraint_values(p, signals, t, q, v, ws.scratch, phi, dphi)
+    note_friction(system, q, v, work.mu, work.compliance)
+    equations(system, signals, t, INDEX_1, q, v, a, lam, torques, work)
+    constraint_values(system, signals, t, q, v, work.scratch, phi, dphi)
     for r in range(m):
-        free = dropped[r] or p.rows[r].kind != CONSTRAINT
-        d.lam[r] = 0.0 if free else mu[r]
+        free = dropped[r] or system.rows[r].kind != CONSTRAINT
+        direction.lam[r] = 0.0 if free else mu[r]
         out[2 * n + m + r] = mu[r] if free else phi[r]
-        out[2 * n + r] = dphi[r] if p.rows[r].kind == CONSTRAINT else ws.rows[r]
+        out[2 * n + r] = dphi[r] if system.rows[r].kind == CONSTRAINT else work.rows[r]
         if dropped[r]:
             out[2 * n + r] = lam[r]
-    reaction_tangent(p, (0.0, 0.0, 1.0), q, idle, idle, lam, idle, 0, p.bodies.size, d)
+    reaction_tangent(system, (0.0, 0.0, 1.0), q, idle, idle, lam, idle, 0, system.bodies.size, direction)
     for j in range(n):
-        out[j] = weight[j] * (dy[j] - v[j]) + d.f[j]
-        out[n + j] = ws.f[j]
-    fill(d.lam, 0.0)
-    out[2 * n + 2 * m] = dy[2 * n + 2 * m] - input_power(p, signals, t, q, v, lam, torques, ws)
+        out[j] = weight[j] * (dy[j] - v[j]) + direction.f[j]
+        out[n + j] = work.f[j]
+    fill(direction.lam, 0.0)
+    out[2 * n + 2 * m] = dy[2 * n + 2 * m] - input_power(system, signals, t, q, v, lam, torques, work)
 
 
 @kernel
-def stabilised_jacobian(p, y, dy, c, dropped, weight, torques, idle, ws, d, out):
+def stabilised_jacobian(system, y, dy, c, dropped, weight, torques, idle, work, direction, out):
     """Derivative of `stabilised_residual` by y plus c times that by dy, into out, where it was last called."""
-    n, m = ws.f.size, ws.rows.size
+    n, m = work.f.size, work.rows.size
     q, v, a = y[:n], y[n : 2 * n], dy[n : 2 * n]
     lam, mu = y[2 * n : 2 * n + m], y[2 * n + m : 2 * n + 2 * m]
     speeds, places = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     for j in range(2 * n + 2 * m + 1):
         fill(out[j], 0.0)
-    note_slopes(p, q, v, ws.mu, ws.compliance, d)
-    for i in range(p.bodies.size):
-        for j in range(p.bodies[i].offset, p.bodies[i].offset + 3 + p.bodies[i].nf):
-            d.q[j] = 1.0
-            residual_tangent(p, speeds, q, v, a, lam, torques, ws.compliance, i, i + 1, d)
-            fill_column(d, j, out)
-            reaction_tangent(p, places, q, idle, idle, mu, idle, i, i + 1, d)
-            d.q[j] = 0.0
-            fill_reactions(d, j, out)
-            d.v[j], d.a[j] = 1.0, c
-            residual_tangent(p, speeds, q, v, a, lam, torques, ws.compliance, i, i + 1, d)
-            d.v[j], d.a[j] = 0.0, 0.0
-            fill_column(d, n + j, out)
+    note_slopes(system, q, v, work.mu, work.compliance, direction)
+    for i in range(system.bodies.size):
+        for j in range(system.bodies[i].offset, system.bodies[i].offset + 3 + system.bodies[i].nf):
+            direction.q[j] = 1.0
+            residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
+            fill_column(direction, j, out)
+            reaction_tangent(system, places, q, idle, idle, mu, idle, i, i + 1, direction)
+            direction.q[j] = 0.0
+            fill_reactions(direction, j, out)
+            direction.v[j], direction.a[j] = 1.0, c
+            residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
+            direction.v[j], direction.a[j] = 0.0, 0.0
+            fill_column(direction, n + j, out)
             out[j, j] += weight[j] * c
             out[j, n + j] = -weight[j]
     for r in range(m):
-        d.lam[r] = 1.0
-        residual_tangent(p, speeds, q, v, a, lam, torques, ws.compliance, 0, p.bodies.size, d)
-        fill_column(d, 2 * n + r, out)
-        if not dropped[r] and p.rows[r].kind == CONSTRAINT:
-            reaction_tangent(p, places, q, idle, idle, mu, idle, 0, p.bodies.size, d)
-            fill_reactions(d, 2 * n + m + r, out)
+        direction.lam[r] = 1.0
+        residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, 0, system.bodies.size, direction)
+        fill_column(direction, 2 * n + r, out)
+        if not dropped[r] and system.rows[r].kind == CONSTRAINT:
+            reaction_tangent(system, places, q, idle, idle, mu, idle, 0, system.bodies.size, direction)
+            fill_reactions(direction, 2 * n + m + r, out)
         else:
             fill(out[2 * n + m + r], 0.0)
-        d.lam[r] = 0.0
+        direction.lam[r] = 0.0
     for r in range(m):
-        if dropped[r] or p.rows[r].kind != CONSTRAINT:
+        if dropped[r] or system.rows[r].kind != CONSTRAINT:
             fill(out[2 * n + m + r], 0.0)
             out[2 * n + m + r, 2 * n + m + r] = 1.0
     drop_rows(dropped, 2 * n, 2 * n, out)
@@ -234,10 +234,10 @@ def stabilised_jacobian(p, y, dy, c, dropped, weight, torques, idle, ws, d, out)
 
 
 @routine
-def fill_reactions(d, column, out):
+def fill_reactions(direction, column, out):
     """The changes of Phi_q^T mu and of Phi into a column of out."""
-    n, m = d.f.size, d.rows.size
+    n, m = direction.f.size, direction.rows.size
     for k in range(n):
-        out[k, column] = d.f[k]
+        out[k, column] = direction.f[k]
     for r in range(m):
-        out[2 * n + m + r, column] = d.rows[r]
+        out[2 * n + m + r, column] = direction.rows[r]

@@ -1,8 +1,8 @@
 """Layout of what the kernels read (`PackedSystem`, `Signals`) and write (`Workspace`).
 
 One record a body, port, marker, effort and constraint row; flat arrays for what has a length of its own. A *marker*
-is a material point of a body with its shape rows; a *port* is one side of a joint on a moving body; an *effort* is
-one side of a motor.
+is a material point of a body with its shape rows; a constraint row is a weighted sum over *ports*, each an end on a
+moving body, of which several may be on one body; an *effort* is one side of a motor.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ PORT = np.dtype(
         ("parts", np.int64),
         ("local", np.int64),  # first of them among those of its body
         ("axis", np.int64),  # which axis it is an end of, -1 for none
-        ("sign", np.float64),  # +1 on side b of the joint, -1 on side a
+        # What its contribution to the row is multiplied by: of a joint +1 on side b, -1 on side a.
+        ("weight", np.float64),
     ],
     align=True,
 )
@@ -137,6 +138,7 @@ AXIS_RECORD = np.dtype(
         ("by", np.float64),
         ("angle", np.float64),  # of the axis against the marker that carries it
         ("row", np.int64),  # -1 for a motor's
+        ("weight", np.float64),  # what its value is multiplied by in that row
         ("signal", np.int64),  # of the motor, else -1
         ("track", np.int64),  # the deflection that a sliding point follows, -1 for none
     ],
@@ -277,17 +279,17 @@ class Workspace(NamedTuple):
     geometric: NDArray[np.float64] | None  # K_g, nf^2
 
 
-def make_workspace(p: PackedSystem) -> Workspace:
+def make_workspace(system: PackedSystem) -> Workspace:
     """Allocate the workspace of a system."""
-    n = int(sum(3 + body["nf"] for body in p.bodies))
-    m = p.rows.size
-    full = [body for body in p.bodies if body["full"]]
+    n = int(sum(3 + body["nf"] for body in system.bodies))
+    m = system.rows.size
+    full = [body for body in system.bodies if body["full"]]
     dense = int(sum((3 + body["nf"]) ** 2 for body in full))
     inverse = int(sum((3 + body["nf"]) * padded(3 + body["nf"]) for body in full))
-    lanes = int(sum((3 + body["nf"]) * body["lanes"] for body in p.bodies))
-    envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(p.rows)))
+    lanes = int(sum((3 + body["nf"]) * body["lanes"] for body in system.bodies))
+    envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(system.rows)))
     compliance = apart(m)
-    compliance[:] = p.rows["compliance"]
+    compliance[:] = system.rows["compliance"]
     return Workspace(
         f=apart(n),
         x=apart(n),
@@ -295,35 +297,35 @@ def make_workspace(p: PackedSystem) -> Workspace:
         mu=apart(m),
         q=apart(n),
         v=apart(n),
-        scratch=make_scratch(p),
+        scratch=make_scratch(system),
         step=apart(1),
-        axes=apart((p.axes.size, 4)),
+        axes=apart((system.axes.size, 4)),
         compliance=compliance,
-        frame=apart((p.bodies.size, 12)),
-        flex=apart((2, p.modal.shape[1])),
+        frame=apart((system.bodies.size, 12)),
+        flex=apart((2, system.modal.shape[1])),
         jac=apart(lanes),
         response=apart(lanes),
-        blocks=apart(int(np.sum(p.bodies["parts"] * p.bodies["lanes"]))),
+        blocks=apart(int(np.sum(system.bodies["parts"] * system.bodies["lanes"]))),
         schur=apart(envelope),
         redundant=apart(m),
         least=apart(2),
-        mass=None if p.bending is None else apart(dense),
-        dense=None if p.bending is None else apart(dense),
-        inverse=None if p.bending is None else apart(inverse),
-        geometric=None if p.bending is None else apart(p.I2.size),
+        mass=None if system.bending is None else apart(dense),
+        dense=None if system.bending is None else apart(dense),
+        inverse=None if system.bending is None else apart(inverse),
+        geometric=None if system.bending is None else apart(system.I2.size),
     )
 
 
-def make_scratch(p: PackedSystem) -> Scratch:
+def make_scratch(system: PackedSystem) -> Scratch:
     """Allocate what the terms of one body need."""
-    width, stride, lanes = (int(p.bodies[name].max(initial=0)) for name in ("width", "stride", "lanes"))
+    width, stride, lanes = (int(system.bodies[name].max(initial=0)) for name in ("width", "stride", "lanes"))
     points = None
-    if p.bending is not None:
-        pitch = int(p.bodies["pitch"].max(initial=0))
+    if system.bending is not None:
+        pitch = int(system.bodies["pitch"].max(initial=0))
         q, v, a, shares = (apart(3 * pitch) for _ in range(4))
-        rows = apart(2 * pitch * int(p.bodies["nf"].max(initial=0)))
+        rows = apart(2 * pitch * int(system.bodies["nf"].max(initial=0)))
         points = PointScratch(q, v, a, shares, apart(pitch), rows, apart(stride), apart(stride))
     q, v, a, shares = (apart(width) for _ in range(4))
     G2_q, G2_v, I2_q = (apart(stride) for _ in range(3))
-    rigid = apart(padded(3 + int(p.bodies["nf"].max(initial=0))))
+    rigid = apart(padded(3 + int(system.bodies["nf"].max(initial=0))))
     return Scratch(q, v, a, shares, G2_q, G2_v, I2_q, apart(lanes), rigid, apart(2), points)

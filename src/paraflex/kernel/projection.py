@@ -17,35 +17,35 @@ CLOSED, PASSES = 4e-14, 4
 
 
 @routine
-def project(p, signals, t, q, v, ws):
+def project(system, signals, t, q, v, work):
     """Change q until Phi = 0, then v until Phi' = 0."""
     for _ in range(PASSES):
-        constraint_values(p, signals, t, q, v, ws.scratch, ws.rows, ws.mu)
-        if largest_violation(p, ws.rows) <= CLOSED:
+        constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
+        if largest_violation(system, work.rows) <= CLOSED:
             break
-        least_change(p, ws.rows, ws)
-        add(ws.x, q)
+        least_change(system, work.rows, work)
+        add(work.x, q)
     for _ in range(PASSES):
-        constraint_values(p, signals, t, q, v, ws.scratch, ws.mu, ws.rows)
-        if largest_violation(p, ws.rows) <= CLOSED:
+        constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
+        if largest_violation(system, work.rows) <= CLOSED:
             break
-        least_change(p, ws.rows, ws)
-        add(ws.x, v)
+        least_change(system, work.rows, work)
+        add(work.x, v)
 
 
 @routine
-def largest_violation(p, rows):
+def largest_violation(system, rows):
     """The largest violation of a constraint, or of its rate, as a part of the unit of its row."""
     violation = 0.0
     for r in range(rows.size):
-        violation = max(violation, abs(rows[r]) / p.rows[r].unit)
+        violation = max(violation, abs(rows[r]) / system.rows[r].unit)
     return violation
 
 
 @routine
-def least_change(p, violation, ws):
+def least_change(system, violation, work):
     """The least x with Phi_q x = -violation, into ws.x."""
     for r in range(violation.size):
-        ws.mu[r] = -violation[r]
-    fill(ws.x, 0.0)
-    solve_system(p, ws, ws.x, ws.mu)
+        work.mu[r] = -violation[r]
+    fill(work.x, 0.0)
+    solve_system(system, work, work.x, work.mu)

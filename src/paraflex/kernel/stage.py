@@ -18,7 +18,7 @@ from math import isfinite
 from paraflex.kernel.arrays import add
 from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.bodies import begin_body
-from paraflex.kernel.compiling import inlined, routine, seldom
+from paraflex.kernel.compiling import inlined, routine, unoptimised
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import (
@@ -53,14 +53,14 @@ AGEING, BEST_RATE = 1.05, 0.02
 ROUNDING, FINEST = 1e-8, 4e-15
 
 
-@seldom
-def equations(p, signals, t, weights, q, v, a, lam, torques, ws):
+@unoptimised
+def equations(system, signals, t, weights, q, v, a, lam, torques, work):
     """Residuals of the equations of motion (ws.f) and of the constraints (ws.rows) at one instant.
 
     The latter are w_a Phi'' + w_v Phi' + w_q Phi for weights (w_a, w_v, w_q).
     """
     note_torques(signals, t, torques)
-    residuals(p, signals, t, weights, q, v, a, lam, torques, ws)
+    residuals(system, signals, t, weights, q, v, a, lam, torques, work)
 
 
 @inlined
@@ -71,25 +71,25 @@ def note_torques(signals, t, torques):
 
 
 @routine
-def residuals(p, signals, t, weights, q, v, a, lam, torques, ws):
+def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
     """What `equations` find, with given torques."""
-    start_rows(p, signals, t, weights, ws.rows)
-    start_compliant_rows(p, lam, ws.rows)
-    for i in range(p.bodies.size):
-        begin_body(p, i, q, v, a, ws.f, ws.scratch, ws.scratch.points)
-        add_joints(p, i, q, v, a, lam, weights, ws.scratch, ws.f, ws.rows)
-        add_efforts(p, i, torques, ws.scratch, ws.f)
-        hand_on(p, i, ws.scratch, ws.f)
-    apply_axes(p, q, v, a, lam, weights, torques, ws.f, ws.rows)
-    finish_friction(p, lam, ws.compliance, ws.rows)
-    apply_loads(p, q, ws.f)
-    apply_lines(p, q, v, ws.f)
+    start_rows(system, signals, t, weights, work.rows)
+    start_compliant_rows(system, lam, work.rows)
+    for i in range(system.bodies.size):
+        begin_body(system, i, q, v, a, work.f, work.scratch, work.scratch.points)
+        add_joints(system, i, q, v, a, lam, weights, work.scratch, work.f, work.rows)
+        add_efforts(system, i, torques, work.scratch, work.f)
+        hand_on(system, i, work.scratch, work.f)
+    apply_axes(system, q, v, a, lam, weights, torques, work.f, work.rows)
+    finish_friction(system, lam, work.compliance, work.rows)
+    apply_loads(system, q, work.f)
+    apply_lines(system, q, v, work.f)
 
 
 @routine
 def solve_stage(
-    p, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, tolerance, time_scale, rate, dependent_part,
-    renew, held, lag, ws,
+    system, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, tolerance, time_scale, rate, dependent_part,
+    renew, held, lag, work,
 ):  # fmt: skip
     """Newton iteration for one stage; a and lam are starting guesses and then the solution.
 
@@ -120,52 +120,52 @@ def solve_stage(
     previous = 0.0
     note_torques(signals, t, torques)
     for iteration in range(1, (NEAR_ITERATIONS if renew else MAX_ITERATIONS) + 1):
-        place(qs, vs, g, b, a, shift, ws)
+        place(qs, vs, g, b, a, shift, work)
         if renew:
-            factor_bodies(p, b, ws.q, ws)
-            orient(p, ws.q, ws, dependent_part)
-            if ws.least[0] < SINGULAR_PART:
+            factor_bodies(system, b, work.q, work)
+            orient(system, work.q, work, dependent_part)
+            if work.least[0] < SINGULAR_PART:
                 return SINGULAR, iteration, rate
-        residuals(p, signals, t, weights, ws.q, ws.v, a, lam, torques, ws)
-        right_hand_side(p, ws, scale)
+        residuals(system, signals, t, weights, work.q, work.v, a, lam, torques, work)
+        right_hand_side(system, work, scale)
         if renew:
-            hold_rows(p, ws, held, lag, ws.mu, ws.rows)
-        solve_system(p, ws, ws.x, ws.mu)
-        add(ws.x, a)
-        add(ws.mu, lam)
-        size = mass_norm(p, ws, ws.x)
+            hold_rows(system, work, held, lag, work.mu, work.rows)
+        solve_system(system, work, work.x, work.mu)
+        add(work.x, a)
+        add(work.mu, lam)
+        size = mass_norm(system, work, work.x)
         change = size * max(b, g * time_scale)
         if shift.size > 0:
-            place(qs, vs, g, b, a, shift, ws)
-            constraint_values(p, signals, t, ws.q, ws.v, ws.scratch, ws.rows, ws.mu)
+            place(qs, vs, g, b, a, shift, work)
+            constraint_values(system, signals, t, work.q, work.v, work.scratch, work.rows, work.mu)
             if renew:
-                hold_rows(p, ws, held, 0.0, ws.rows, ws.mu)
-            least_change(p, ws.rows, ws)
-            add(ws.x, shift)
-            change = max(change, mass_norm(p, ws, ws.x))
+                hold_rows(system, work, held, 0.0, work.rows, work.mu)
+            least_change(system, work.rows, work)
+            add(work.x, shift)
+            change = max(change, mass_norm(system, work, work.x))
         if not isfinite(change):
             return DIVERGED, iteration, rate
         if iteration > 1:
             rate = change / previous
             # From a good guess the second change may be larger than the first; from then on each has to be smaller.
             if change > tolerance and rate > (SECOND_RATE if iteration == 2 else WORST_RATE):
-                if b * size > FINEST * p.size and size > ROUNDING * mass_norm(p, ws, a):
+                if b * size > FINEST * system.size and size > ROUNDING * mass_norm(system, work, a):
                     return DIVERGED, iteration, rate
                 rate = 0.0
         else:
             rate = min(WORST_RATE, max(BEST_RATE, AGEING * rate))
         if change * rate <= tolerance * (1.0 - min(rate, WORST_RATE)):
-            place(qs, vs, g, b, a, shift, ws)
+            place(qs, vs, g, b, a, shift, work)
             return CONVERGED, iteration, min(rate, WORST_RATE)
         previous = change
     return SLOW, MAX_ITERATIONS, rate
 
 
 @inlined
-def place(qs, vs, g, b, a, shift, ws):
+def place(qs, vs, g, b, a, shift, work):
     """Q and v of a stage into ws.q and ws.v."""
     for j in range(a.size):
-        ws.q[j] = qs[j] + b * a[j]
-        ws.v[j] = vs[j] + g * a[j]
+        work.q[j] = qs[j] + b * a[j]
+        work.v[j] = vs[j] + g * a[j]
     for j in range(shift.size):
-        ws.q[j] += shift[j]
+        work.q[j] += shift[j]

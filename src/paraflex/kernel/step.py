@@ -69,35 +69,35 @@ SAME_TIME = 1e-6
 
 
 @routine
-def input_power(p, signals, t, q, v, lam, torques, ws):
+def input_power(system, signals, t, q, v, lam, torques, work):
     """Power of the motors, of prescribed motion and of loads, less what dampers, friction and damping take."""
-    total = load_power(p, q, v) + axis_power(p, q, v, torques) - line_energy(p, q, v)[1]
-    total -= dissipated_power(p, q, v, lam, ws.mu) + modal_damping_power(p, v)
-    for k in range(p.efforts.size):
-        effort = p.efforts[k]
-        total += effort.sign * torques[effort.signal] * marker_angle(p, p.markers[effort.marker], v)
-    for r in range(p.rows.size):
-        if p.rows[r].signal >= 0:
-            _, rate, _ = evaluate_signal(signals, p.rows[r].signal, t)
+    total = load_power(system, q, v) + axis_power(system, q, v, torques) - line_energy(system, q, v)[1]
+    total -= dissipated_power(system, q, v, lam, work.mu) + modal_damping_power(system, v)
+    for k in range(system.efforts.size):
+        effort = system.efforts[k]
+        total += effort.sign * torques[effort.signal] * marker_angle(system, system.markers[effort.marker], v)
+    for r in range(system.rows.size):
+        if system.rows[r].signal >= 0:
+            _, rate, _ = evaluate_signal(signals, system.rows[r].signal, t)
             total -= lam[r] * rate
     return total
 
 
 @routine
-def predict(i, t, h, m):
+def predict(i, t, h, march):
     """Starting guess for stage i at time t: the accelerations of the last three stages, extrapolated."""
-    stages = m.stage_v.shape[0]
-    a, times, rows = m.stage_a[1, i], m.guess_t, m.guess_s
+    stages = march.stage_v.shape[0]
+    a, times, rows = march.stage_a[1, i], march.guess_t, march.guess_s
     found = 0
     # This step's stages, the latest first, then the last step's.
     for k in range(i + stages):
         step, j = (1, i - 1 - k) if k < i else (0, stages - 1 - (k - i))
         distinct = found < 3
         for l in range(found):
-            if abs(m.stage_t[step, j] - times[l]) < SAME_TIME * h:
+            if abs(march.stage_t[step, j] - times[l]) < SAME_TIME * h:
                 distinct = False
         if distinct:
-            times[found], rows[found, 0], rows[found, 1] = m.stage_t[step, j], step, j
+            times[found], rows[found, 0], rows[found, 1] = march.stage_t[step, j], step, j
             found += 1
     fill(a, 0.0)
     for k in range(found):
@@ -105,56 +105,56 @@ def predict(i, t, h, m):
         for l in range(found):
             if l != k:
                 weight *= (t - times[l]) / (times[k] - times[l])
-        source = m.stage_a[rows[k, 0], rows[k, 1]]
+        source = march.stage_a[rows[k, 0], rows[k, 1]]
         for j in range(a.size):
             a[j] += weight * source[j]
 
 
 @routine
-def renew_factor(p, b, m, ws):
+def renew_factor(system, b, march, work):
     """Factor the bodies for stages of this b at the present deformation."""
-    note_all_axial_forces(p, m.q, m.v, m.stage_a[1, 0], m.stage_lam[0], ws, ws.geometric)
-    factor_bodies(p, b, m.q, ws)
-    m.counts[FACTORS] += 1
-    m.clock[FACTOR_B], m.clock[RATE] = b, WORST_RATE
+    note_all_axial_forces(system, march.q, march.v, march.stage_a[1, 0], march.stage_lam[0], work, work.geometric)
+    factor_bodies(system, b, march.q, work)
+    march.counts[FACTORS] += 1
+    march.clock[FACTOR_B], march.clock[RATE] = b, WORST_RATE
 
 
 @routine
-def note_excess(p, iterations, fresh, m):
+def note_excess(system, iterations, fresh, march):
     """Count what a step took beyond the first one of its factor, and ask for a new factor once that has cost enough.
 
     Where already the second step of a factor did, the next ones get a new factor each.
     """
-    cost = FACTOR_COST if p.bending is None else BENT_FACTOR_COST
+    cost = FACTOR_COST if system.bending is None else BENT_FACTOR_COST
     if fresh:
-        m.counts[FRESH] = min(iterations, m.counts[FRESH] + 1) if m.counts[FRESH] > 0 else iterations
-        m.counts[EXCESS], m.counts[REUSED] = 0, 0
-        m.counts[IMPATIENT] = max(0, m.counts[IMPATIENT] - 1)
-        if m.counts[IMPATIENT] > 0:
-            m.clock[FACTOR_B] = -1.0
+        march.counts[FRESH] = min(iterations, march.counts[FRESH] + 1) if march.counts[FRESH] > 0 else iterations
+        march.counts[EXCESS], march.counts[REUSED] = 0, 0
+        march.counts[IMPATIENT] = max(0, march.counts[IMPATIENT] - 1)
+        if march.counts[IMPATIENT] > 0:
+            march.clock[FACTOR_B] = -1.0
         return
-    m.counts[REUSED] += 1
-    m.counts[EXCESS] += max(0, iterations - m.counts[FRESH])
-    if m.counts[EXCESS] >= cost:
-        m.clock[FACTOR_B] = -1.0
-        if m.counts[REUSED] == 1 and m.counts[EXCESS] > cost:
-            m.counts[IMPATIENT] = IMPATIENCE
+    march.counts[REUSED] += 1
+    march.counts[EXCESS] += max(0, iterations - march.counts[FRESH])
+    if march.counts[EXCESS] >= cost:
+        march.clock[FACTOR_B] = -1.0
+        if march.counts[REUSED] == 1 and march.counts[EXCESS] > cost:
+            march.counts[IMPATIENT] = IMPATIENCE
 
 
 @routine
-def stage_start(tableau, i, t, h, m):
+def stage_start(tableau, i, t, h, march):
     """Explicit parts of stage i into m.qs and m.vs; its time, g and b."""
     g = tableau.A[i, i] * h
-    for j in range(m.q.size):
-        m.vs[j] = m.v[j]
-        m.qs[j] = m.q[j]
+    for j in range(march.q.size):
+        march.vs[j] = march.v[j]
+        march.qs[j] = march.q[j]
     for s in range(i):
         weight = h * tableau.A[i, s]
-        for j in range(m.q.size):
-            m.vs[j] += weight * m.stage_a[1, s, j]
-            m.qs[j] += weight * m.stage_d[s, j]
-    for j in range(m.q.size):
-        m.qs[j] += g * m.vs[j]
+        for j in range(march.q.size):
+            march.vs[j] += weight * march.stage_a[1, s, j]
+            march.qs[j] += weight * march.stage_d[s, j]
+    for j in range(march.q.size):
+        march.qs[j] += g * march.vs[j]
     return t + tableau.c[i] * h, g, g * g
 
 
@@ -174,7 +174,7 @@ def constraint_weights(controls, h):
 
 
 @routine
-def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
+def attempt(system, signals, tableau, controls, t, h, march, work, slow):
     """One step from t: all stages and the error estimate, relative to what is allowed.
 
     Returns
@@ -186,53 +186,53 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
     weights, rates = constraint_weights(controls, h)
     x, g, b = t, tableau.A[1, 1] * h, (tableau.A[1, 1] * h) ** 2
     if one_stage:
-        x, g, b = newmark_start(tableau.newmark, t, h, m)
-    fresh = m.clock[FACTOR_B] != b
+        x, g, b = newmark_start(tableau.newmark, t, h, march)
+    fresh = march.clock[FACTOR_B] != b
     if fresh:
-        renew_factor(p, b, m, ws)
-    rubs = note_friction(p, m.q, m.v, ws.mu, ws.compliance)
-    orient(p, m.q, ws, controls.dependent_part)
-    at_singular = ws.least[0] < SINGULAR_PART
-    note_root(m, ws)
-    perhaps_near = ws.least[0] < NEAR_PART * m.clock[WIDEST] and m.counts[PREPARED] >= 0
-    m.counts[NEAR], m.counts[HELD_END] = 0, 0
-    if perhaps_near and comes_near(h, m):
-        if m.counts[PREPARED] == 0:
+        renew_factor(system, b, march, work)
+    rubs = note_friction(system, march.q, march.v, work.mu, work.compliance)
+    orient(system, march.q, work, controls.dependent_part)
+    at_singular = work.least[0] < SINGULAR_PART
+    note_root(march, work)
+    perhaps_near = work.least[0] < NEAR_PART * march.clock[WIDEST] and march.counts[PREPARED] >= 0
+    march.counts[NEAR], march.counts[HELD_END] = 0, 0
+    if perhaps_near and comes_near(h, march):
+        if march.counts[PREPARED] == 0:
             return ENTERS, 0.0
-        begin_near(p, m, ws)
+        begin_near(system, march, work)
     tolerance, allowed = controls.newton_fraction * controls.rate * h, controls.rate * h
-    before = m.counts[ITERATIONS]
+    before = march.counts[ITERATIONS]
     i, rounds, held = 1, 0, 0.0
     while i < stages:
         if not one_stage:
-            x, g, b = stage_start(tableau, i, t, h, m)
-        m.stage_t[1, i] = t + tableau.c[i] * h
-        held, lag = trust(weights, g, b, x - t, m)
+            x, g, b = stage_start(tableau, i, t, h, march)
+        march.stage_t[1, i] = t + tableau.c[i] * h
+        held, lag = trust(weights, g, b, x - t, march)
         if rounds == 0:
-            predict(i, x, h, m)
-            copy(m.stage_lam[i - 1], m.stage_lam[i])
-            fill(m.shift, 0.0)
+            predict(i, x, h, march)
+            copy(march.stage_lam[i - 1], march.stage_lam[i])
+            fill(march.shift, 0.0)
         status, iterations, rate = solve_stage(
-            p, signals, x, g, b, weights, m.qs, m.vs, m.stage_a[1, i], m.stage_lam[i], m.shift,
-            m.torques, tolerance, controls.newton_memory, m.clock[RATE],
-            controls.dependent_part, m.counts[NEAR] > 0, held, lag, ws,
+            system, signals, x, g, b, weights, march.qs, march.vs, march.stage_a[1, i], march.stage_lam[i], march.shift,
+            march.torques, tolerance, controls.newton_memory, march.clock[RATE],
+            controls.dependent_part, march.counts[NEAR] > 0, held, lag, work,
         )  # fmt: skip
-        m.counts[ITERATIONS] += iterations
-        m.clock[RATE] = rate
+        march.counts[ITERATIONS] += iterations
+        march.clock[RATE] = rate
         if status == SINGULAR:
             if at_singular:
-                note_passage(t, h, m)
-                m.counts[NEAR], perhaps_near, rounds = 0, False, 0
+                note_passage(t, h, march)
+                march.counts[NEAR], perhaps_near, rounds = 0, False, 0
                 continue
-            note_position(m.stage_t[1, i], t, h, m)
+            note_position(march.stage_t[1, i], t, h, march)
             # Constraints do not say what the accelerations are here, but those before do.
-            predict(i, x, h, m)
-            place(m.qs, m.vs, g, b, m.stage_a[1, i], m.shift, ws)
+            predict(i, x, h, march)
+            place(march.qs, march.vs, g, b, march.stage_a[1, i], march.shift, work)
         elif status != CONVERGED:
-            if fresh and perhaps_near and m.counts[NEAR] == 0 and not at_singular:
-                if m.counts[PREPARED] == 0:
+            if fresh and perhaps_near and march.counts[NEAR] == 0 and not at_singular:
+                if march.counts[PREPARED] == 0:
                     return ENTERS, 0.0
-                begin_near(p, m, ws)
+                begin_near(system, march, work)
                 rounds = 0
                 continue
             goes_on = rubs or (status == SLOW and controls.fixed_step > 0.0)
@@ -241,37 +241,39 @@ def attempt(p, signals, tableau, controls, t, h, m, ws, slow):
             rounds = rounds + 1 if goes_on else 0
             # An old factor may be to blame: once more with a new one before the step is cut.
             if not fresh:
-                renew_factor(p, b, m, ws)
+                renew_factor(system, b, march, work)
                 fresh = True
             if rubs:
-                note_friction(p, m.q, ws.v, ws.mu, ws.compliance)
-            orient(p, m.q, ws, controls.dependent_part)
+                note_friction(system, march.q, work.v, work.mu, work.compliance)
+            orient(system, march.q, work, controls.dependent_part)
             continue
         rounds = 0
         if one_stage:
-            varying = controls.fixed_step == 0.0 or t < m.clock[PART_END]
-            newmark_end(p, signals, tableau.newmark, varying, t, h, m, ws)
-        copy(ws.q, m.stage_q[i])
-        copy(ws.v, m.stage_v[i])
-        if m.shift.size > 0:
-            for j in range(m.q.size):
-                m.stage_d[i, j] = ws.v[j] + m.shift[j] / g
-        m.power[i] = input_power(p, signals, m.stage_t[1, i], ws.q, ws.v, m.stage_lam[i], m.torques, ws)
+            varying = controls.fixed_step == 0.0 or t < march.clock[PART_END]
+            newmark_end(system, signals, tableau.newmark, varying, t, h, march, work)
+        copy(work.q, march.stage_q[i])
+        copy(work.v, march.stage_v[i])
+        if march.shift.size > 0:
+            for j in range(march.q.size):
+                march.stage_d[i, j] = work.v[j] + march.shift[j] / g
+        march.power[i] = input_power(
+            system, signals, march.stage_t[1, i], work.q, work.v, march.stage_lam[i], march.torques, work
+        )
         i += 1
-    note_excess(p, m.counts[ITERATIONS] - before, fresh, m)
+    note_excess(system, march.counts[ITERATIONS] - before, fresh, march)
     moved = 0.0
-    if m.counts[NEAR] > 0:
-        m.clock[FACTOR_B] = -1.0
-        moved = return_to_constraints(p, signals, t + h, held, m, ws) / controls.near_error
+    if march.counts[NEAR] > 0:
+        march.clock[FACTOR_B] = -1.0
+        moved = return_to_constraints(system, signals, t + h, held, march, work) / controls.near_error
     error = 0.0
     if controls.fixed_step == 0.0:
         if tableau.error.size > 0:
-            embedded_error(tableau, h, m)
+            embedded_error(tableau, h, march)
         else:
-            history_error(h, m)
-        error_q, error_v = filtered_error(p, b**0.5, rates, controls.memory, m, ws, slow)
-        if m.counts[NEAR] > 0:
-            allowed = max(allowed, controls.near_error * share_of_passage(h, m))
+            history_error(h, march)
+        error_q, error_v = filtered_error(system, b**0.5, rates, controls.memory, march, work, slow)
+        if march.counts[NEAR] > 0:
+            allowed = max(allowed, controls.near_error * share_of_passage(h, march))
         error = max(max(error_q, error_v) / allowed, moved)
     if not isfinite(error):
         return NOT_FINITE, 0.0

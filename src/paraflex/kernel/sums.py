@@ -43,34 +43,34 @@ def row_product(matrix, at, width, vector):
 
 
 @inlined
-def body_sums(p, i, q, v, a, scratch):
+def body_sums(system, i, q, v, a, scratch):
     """Every sum of body i, of u, u' and u'', into scratch; cosine and sine of its angle as well."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     e = body.offset + 3
     scratch.turn[0], scratch.turn[1] = cos(q[e - 1]), sin(q[e - 1])
-    column_sums(p.columns, body.columns, body.width, body.nf, e, q, v, a, scratch)
+    column_sums(system.columns, body.columns, body.width, body.nf, e, q, v, a, scratch)
 
 
 @inlined
-def clear_shares(p, i, scratch):
+def clear_shares(system, i, scratch):
     """Nothing works on any sum of body i."""
-    for block in range(0, p.bodies[i].width, LANES):
+    for block in range(0, system.bodies[i].width, LANES):
         store(scratch.shares, block, zeros())
 
 
 @inlined
-def body_products(p, i, q, v, scratch):
+def body_products(system, i, q, v, scratch):
     """G2 u, G2 u' and I2 u of body i into scratch."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     e = body.offset + 3
     for block in range(0, body.stride, LANES):
         G2_q, G2_v, I2_q = zeros(), zeros(), zeros()
         at = body.products + block
         for j in range(body.nf):
-            G2 = load(p.products, at)
+            G2 = load(system.products, at)
             G2_q = add_scaled(G2_q, G2, q[e + j])
             G2_v = add_scaled(G2_v, G2, v[e + j])
-            I2_q = add_scaled(I2_q, load(p.products, at + body.stride), q[e + j])
+            I2_q = add_scaled(I2_q, load(system.products, at + body.stride), q[e + j])
             at += 2 * body.stride
         store(scratch.G2_q, block, G2_q)
         store(scratch.G2_v, block, G2_v)
@@ -78,10 +78,10 @@ def body_products(p, i, q, v, scratch):
 
 
 @inlined
-def hand_on(p, i, scratch, f):
+def hand_on(system, i, scratch, f):
     """Add to f what the shares give to each flexible coordinate of body i."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     e, at = body.offset + 3, body.columns
     for j in range(body.nf):
-        f[e + j] += row_product(p.columns, at, body.width, scratch.shares)
+        f[e + j] += row_product(system.columns, at, body.width, scratch.shares)
         at += body.width

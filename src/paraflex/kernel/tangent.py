@@ -37,61 +37,63 @@ class Tangent(NamedTuple):
     points: NDArray[np.float64] | None  # (8, max mass points of a body) scratch of second-order geometry
 
 
-def make_tangent(p: PackedSystem) -> Tangent:
+def make_tangent(system: PackedSystem) -> Tangent:
     """Allocate a direction, zero, and room for the changes along it."""
-    n, m = int(sum(3 + body["nf"] for body in p.bodies)), p.rows.size
-    width = int((p.bodies["mass_end"] - p.bodies["mass"]).max(initial=0))
-    points = None if p.bending is None else np.zeros((8, width))
+    n, m = int(sum(3 + body["nf"] for body in system.bodies)), system.rows.size
+    width = int((system.bodies["mass_end"] - system.bodies["mass"]).max(initial=0))
+    points = None if system.bending is None else np.zeros((8, width))
     q, v, a, f = (np.zeros(n) for _ in range(4))
     return Tangent(q, v, a, np.zeros(m), f, np.zeros(m), np.zeros(m), points)
 
 
 @inlined
-def joints_tangent(p, i, weights, q, v, a, lam, d):
+def joints_tangent(system, i, weights, q, v, a, lam, direction):
     """Add the change of body i's part of the rows to d.rows, and that of Phi_q^T lambda to d.f."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     for k in range(body.port, body.port_end):
-        port = p.ports[k]
-        marker = p.markers[port.marker]
-        r, sign = port.row, port.sign
+        port = system.ports[k]
+        marker = system.markers[port.marker]
+        r, weight = port.row, port.weight
         if port.kind == ANGLE:
-            d.rows[r] += sign * angle_row(p, marker, p.rows[r].kind, weights, d.q, d.v, d.a)
-            apply_torque(p, marker, sign * d.lam[r], d.f)
+            direction.rows[r] += weight * angle_row(
+                system, marker, system.rows[r].kind, weights, direction.q, direction.v, direction.a
+            )
+            apply_torque(system, marker, weight * direction.lam[r], direction.f)
         elif port.kind != AXIS:
-            _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, v, a)
-            px, py, vx, vy, ax, ay, d_rx, d_ry = marker_tangent(p, marker, q, v, a, d)
-            d.rows[r] += sign * (weights[0] * ax + weights[1] * vx + weights[2] * px)
-            d.rows[r + 1] += sign * (weights[0] * ay + weights[1] * vy + weights[2] * py)
-            force = (sign * lam[r], sign * lam[r + 1])
-            change = (sign * d.lam[r], sign * d.lam[r + 1])
-            force_tangent(p, marker, q, force, change, (rx, ry), (d_rx, d_ry), d)
+            _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, v, a)
+            px, py, vx, vy, ax, ay, d_rx, d_ry = marker_tangent(system, marker, q, v, a, direction)
+            direction.rows[r] += weight * (weights[0] * ax + weights[1] * vx + weights[2] * px)
+            direction.rows[r + 1] += weight * (weights[0] * ay + weights[1] * vy + weights[2] * py)
+            force = (weight * lam[r], weight * lam[r + 1])
+            change = (weight * direction.lam[r], weight * direction.lam[r + 1])
+            force_tangent(system, marker, q, force, change, (rx, ry), (d_rx, d_ry), direction)
 
 
 @routine
-def loads_tangent(p, q, d):
+def loads_tangent(system, q, direction):
     """Subtract the change of the generalised forces of constant loads from d.f."""
-    for k in range(p.loads.size):
-        load = p.loads[k]
-        marker = p.markers[load.marker]
-        _, _, _, _, _, _, rx, ry = marker_motion(p, marker, q, q, q)
-        _, _, _, _, _, _, d_rx, d_ry = marker_tangent(p, marker, q, q, q, d)
-        force_tangent(p, marker, q, (-load.fx, -load.fy), (0.0, 0.0), (rx, ry), (d_rx, d_ry), d)
+    for k in range(system.loads.size):
+        load = system.loads[k]
+        marker = system.markers[load.marker]
+        _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
+        _, _, _, _, _, _, d_rx, d_ry = marker_tangent(system, marker, q, q, q, direction)
+        force_tangent(system, marker, q, (-load.fx, -load.fy), (0.0, 0.0), (rx, ry), (d_rx, d_ry), direction)
 
 
 @routine
-def lines_tangent(p, q, v, d):
+def lines_tangent(system, q, v, direction):
     """Subtract the change of the generalised forces of springs and dampers between points from d.f."""
-    for k in range(p.lines.size):
-        line = p.lines[k]
-        ax, ay, vax, vay, rax, ray = line_end(p, line.a, line.ax, line.ay, q, v)
-        bx, by, vbx, vby, rbx, rby = line_end(p, line.b, line.bx, line.by, q, v)
+    for k in range(system.lines.size):
+        line = system.lines[k]
+        ax, ay, vax, vay, rax, ray = line_end(system, line.a, line.ax, line.ay, q, v)
+        bx, by, vbx, vby, rbx, rby = line_end(system, line.b, line.bx, line.by, q, v)
         dx, dy = bx - ax, by - ay
         length = sqrt(dx * dx + dy * dy)
         # Without length there is no direction, and `line_state` has no force.
         if length == 0.0:
             continue
-        d_ax, d_ay, d_vax, d_vay, _, _, d_rax, d_ray = end_tangent(p, line.a, q, v, v, d)
-        d_bx, d_by, d_vbx, d_vby, _, _, d_rbx, d_rby = end_tangent(p, line.b, q, v, v, d)
+        d_ax, d_ay, d_vax, d_vay, _, _, d_rax, d_ray = end_tangent(system, line.a, q, v, v, direction)
+        d_bx, d_by, d_vbx, d_vby, _, _, d_rbx, d_rby = end_tangent(system, line.b, q, v, v, direction)
         ex, ey, ux, uy = dx / length, dy / length, vbx - vax, vby - vay
         d_dx, d_dy = d_bx - d_ax, d_by - d_ay
         d_length = ex * d_dx + ey * d_dy
@@ -102,39 +104,43 @@ def lines_tangent(p, q, v, d):
         fx, fy = pull * ex, pull * ey
         d_fx, d_fy = d_pull * ex + pull * d_ex, d_pull * ey + pull * d_ey
         if line.a >= 0:
-            force_tangent(p, p.markers[line.a], q, (-fx, -fy), (-d_fx, -d_fy), (rax, ray), (d_rax, d_ray), d)
+            force_tangent(
+                system, system.markers[line.a], q, (-fx, -fy), (-d_fx, -d_fy), (rax, ray), (d_rax, d_ray), direction
+            )
         if line.b >= 0:
-            force_tangent(p, p.markers[line.b], q, (fx, fy), (d_fx, d_fy), (rbx, rby), (d_rbx, d_rby), d)
+            force_tangent(
+                system, system.markers[line.b], q, (fx, fy), (d_fx, d_fy), (rbx, rby), (d_rbx, d_rby), direction
+            )
 
 
 @kernel
-def note_slopes(p, q, v, rates, compliance, d):
+def note_slopes(system, q, v, rates, compliance, direction):
     """Slopes of the rows of friction against the rate, into d.friction; `rates` is scratch (m,).
 
     `compliance` is what their residuals are multiplied by: see `joints.finish_friction`.
     """
-    if not joint_rates(p, q, v, rates):
+    if not joint_rates(system, q, v, rates):
         return
-    for r in range(p.rows.size):
-        row = p.rows[r]
+    for r in range(system.rows.size):
+        row = system.rows[r]
         if row.kind == FRICTION:
             c = cosh(min(abs(rates[r]) / (row.compliance * row.limit), 300.0))
-            d.friction[r] = compliance[r] / (row.compliance * c * c)
+            direction.friction[r] = compliance[r] / (row.compliance * c * c)
 
 
 @routine
-def finish_rows(p, compliance, d):
+def finish_rows(system, compliance, direction):
     """Rows that are no constraints: their force takes part, and friction answers its rate with its slope."""
-    for r in range(p.rows.size):
-        kind = p.rows[r].kind
+    for r in range(system.rows.size):
+        kind = system.rows[r].kind
         if kind == FRICTION:
-            d.rows[r] = d.friction[r] * d.rows[r] - compliance[r] * d.lam[r]
+            direction.rows[r] = direction.friction[r] * direction.rows[r] - compliance[r] * direction.lam[r]
         elif kind != CONSTRAINT:
-            d.rows[r] -= p.rows[r].compliance * d.lam[r]
+            direction.rows[r] -= system.rows[r].compliance * direction.lam[r]
 
 
 @kernel
-def residual_tangent(p, weights, q, v, a, lam, torques, compliance, first, last, d):
+def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, last, direction):
     """Change of the residuals along a direction, d.f and d.rows.
 
     Parameters
@@ -148,28 +154,28 @@ def residual_tangent(p, weights, q, v, a, lam, torques, compliance, first, last,
     first, last : int
         Bodies from first to before last; the direction is zero in the coordinates of all others, and in d.lam unless
         these are all bodies.
-    d : Tangent
+    direction : Tangent
         Its direction is read, d.f and d.rows are written; `note_slopes` has been called at (q, v).
     """
-    fill(d.f, 0.0)
-    fill(d.rows, 0.0)
+    fill(direction.f, 0.0)
+    fill(direction.rows, 0.0)
     for i in range(first, last):
-        body_terms_tangent(p, i, q, v, a, d, d.points)
-        joints_tangent(p, i, weights, q, v, a, lam, d)
-    axes_tangent(p, weights, q, v, a, lam, torques, d)
-    finish_rows(p, compliance, d)
-    loads_tangent(p, q, d)
-    lines_tangent(p, q, v, d)
+        body_terms_tangent(system, i, q, v, a, direction, direction.points)
+        joints_tangent(system, i, weights, q, v, a, lam, direction)
+    axes_tangent(system, weights, q, v, a, lam, torques, direction)
+    finish_rows(system, compliance, direction)
+    loads_tangent(system, q, direction)
+    lines_tangent(system, q, v, direction)
 
 
 @kernel
-def reaction_tangent(p, weights, q, v, a, lam, idle, first, last, d):
+def reaction_tangent(system, weights, q, v, a, lam, idle, first, last, direction):
     """Change of Phi_q^T lambda, into d.f, and of the rows, into d.rows, without any other force.
 
     Along d.lam alone d.f is Phi_q^T d.lam. `idle` (motors,) is zero; else as for `residual_tangent`.
     """
-    fill(d.f, 0.0)
-    fill(d.rows, 0.0)
+    fill(direction.f, 0.0)
+    fill(direction.rows, 0.0)
     for i in range(first, last):
-        joints_tangent(p, i, weights, q, v, a, lam, d)
-    axes_tangent(p, weights, q, v, a, lam, idle, d)
+        joints_tangent(system, i, weights, q, v, a, lam, direction)
+    axes_tangent(system, weights, q, v, a, lam, idle, direction)

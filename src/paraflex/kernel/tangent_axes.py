@@ -33,12 +33,12 @@ def component_tangent(ex, ey, at, change, w, dw, turn, d_w, d_dw):
 
 
 @routine
-def track_sums(p, axis, x, vector):
+def track_sums(system, axis, x, vector):
     """W, W', W'' and W''' of a track at x, times the flexible part of a system vector."""
-    track = p.tracks[axis.track]
-    body = p.bodies[p.markers[axis.a].body]
+    track = system.tracks[axis.track]
+    body = system.bodies[system.markers[axis.a].body]
     n = body.nf
-    piece, z = track_piece(p, track, x)
+    piece, z = track_piece(system, track, x)
     at = track.coefficients + piece * 6 * n
     sums = (0.0, 0.0, 0.0, 0.0)
     for j in range(n):
@@ -47,44 +47,48 @@ def track_sums(p, axis, x, vector):
             third = third * z + 3.0 * bend
             bend = bend * z + 2.0 * slope
             slope = slope * z + value
-            value = value * z + p.track_coefficients[at + j + power * n]
+            value = value * z + system.track_coefficients[at + j + power * n]
         u = vector[body.offset + 3 + j]
         sums = (sums[0] + value * u, sums[1] + slope * u, sums[2] + bend * u, sums[3] + third * u)
     return sums
 
 
 @routine
-def add_track_tangent(p, axis, x, d_x, force, d_force, d):
+def add_track_tangent(system, axis, x, d_x, force, d_force, direction):
     """Subtract from d.f the change of force W(x) along a track."""
-    track = p.tracks[axis.track]
-    body = p.bodies[p.markers[axis.a].body]
+    track = system.tracks[axis.track]
+    body = system.bodies[system.markers[axis.a].body]
     n = body.nf
-    piece, z = track_piece(p, track, x)
+    piece, z = track_piece(system, track, x)
     at = track.coefficients + piece * 6 * n
     for j in range(n):
         value, slope = 0.0, 0.0
         for power in range(5, -1, -1):
             slope = slope * z + value
-            value = value * z + p.track_coefficients[at + j + power * n]
-        d.f[body.offset + 3 + j] -= d_force * value + force * slope * d_x
+            value = value * z + system.track_coefficients[at + j + power * n]
+        direction.f[body.offset + 3 + j] -= d_force * value + force * slope * d_x
 
 
 @routine
-def axis_tangent(p, k, q, v, a, d):
+def axis_tangent(system, k, q, v, a, direction):
     """Of axis k: changes of value, rate and acceleration; e, its change; the lever, its change; x, its change.
 
     Then R s of both ends and its changes, four numbers each. On a track as in `axes.axis_motion`: e and lever are
     those of the normal to the deflected beam.
     """
-    axis = p.axes[k]
-    at, theta, w, dw, rax, ray, rbx, rby = axis_frame(p, axis, q, v, a)
-    pax, pay, vax, vay, aax, aay, d_rax, d_ray = end_tangent(p, axis.a, q, v, a, d)
-    pbx, pby, vbx, vby, abx, aby, d_rbx, d_rby = end_tangent(p, axis.b, q, v, a, d)
+    axis = system.axes[k]
+    at, theta, w, dw, rax, ray, rbx, rby = axis_frame(system, axis, q, v, a)
+    pax, pay, vax, vay, aax, aay, d_rax, d_ray = end_tangent(system, axis.a, q, v, a, direction)
+    pbx, pby, vbx, vby, abx, aby, d_rbx, d_rby = end_tangent(system, axis.b, q, v, a, direction)
     change = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
     turn, d_w, d_dw = 0.0, 0.0, 0.0
     if axis.a >= 0:
-        marker = p.markers[axis.a]
-        turn, d_w, d_dw = marker_angle(p, marker, d.q), marker_angle(p, marker, d.v), marker_angle(p, marker, d.a)
+        marker = system.markers[axis.a]
+        turn, d_w, d_dw = (
+            marker_angle(system, marker, direction.q),
+            marker_angle(system, marker, direction.v),
+            marker_angle(system, marker, direction.a),
+        )
     ex, ey = cos(theta), sin(theta)
     d_ex, d_ey = -turn * ey, turn * ex
     _, _, _, lever = component(ex, ey, at, w, dw)
@@ -93,12 +97,12 @@ def axis_tangent(p, k, q, v, a, d):
     if axis.track >= 0:
         x, dx, ddx, across = component(ey, -ex, at, w, dw)
         d_x, d_dx, d_ddx, d_across = component_tangent(ey, -ex, at, change, w, dw, turn, d_w, d_dw)
-        _, slope, bend, third = track_sums(p, axis, x, q)
-        _, slope_v, bend_v, _ = track_sums(p, axis, x, v)
-        _, slope_a, _, _ = track_sums(p, axis, x, a)
-        W_dq, slope_dq, bend_dq, _ = track_sums(p, axis, x, d.q)
-        W_dv, slope_dv, _, _ = track_sums(p, axis, x, d.v)
-        W_da, _, _, _ = track_sums(p, axis, x, d.a)
+        _, slope, bend, third = track_sums(system, axis, x, q)
+        _, slope_v, bend_v, _ = track_sums(system, axis, x, v)
+        _, slope_a, _, _ = track_sums(system, axis, x, a)
+        W_dq, slope_dq, bend_dq, _ = track_sums(system, axis, x, direction.q)
+        W_dv, slope_dv, _, _ = track_sums(system, axis, x, direction.v)
+        W_da, _, _, _ = track_sums(system, axis, x, direction.a)
         d_slope, d_bend = bend * d_x + slope_dq, third * d_x + bend_dq
         value_ -= slope * d_x + W_dq
         rate_ -= d_slope * dx + slope * d_dx + slope_v * d_x + W_dv
@@ -113,30 +117,31 @@ def axis_tangent(p, k, q, v, a, d):
 
 
 @routine
-def axes_tangent(p, weights, q, v, a, lam, torques, d):
+def axes_tangent(system, weights, q, v, a, lam, torques, direction):
     """Add the changes of the rows of all axes and of their forces, those of motors among them, to d.rows and d.f."""
-    for k in range(p.axes.size):
-        axis = p.axes[k]
+    for k in range(system.axes.size):
+        axis = system.axes[k]
         value, rate, acceleration, ex, ey, d_ex, d_ey, lever, d_lever, x, d_x, ends, d_ends = axis_tangent(
-            p, k, q, v, a, d
+            system, k, q, v, a, direction
         )
         d_force = 0.0
         if axis.row < 0:
             force = -torques[axis.signal]
         else:
-            force, d_force = lam[axis.row], d.lam[axis.row]
-            kind = p.rows[axis.row].kind
+            force, d_force = axis.weight * lam[axis.row], axis.weight * direction.lam[axis.row]
+            kind = system.rows[axis.row].kind
             if kind == CONSTRAINT:
-                d.rows[axis.row] += weights[0] * acceleration + weights[1] * rate + weights[2] * value
+                part = weights[0] * acceleration + weights[1] * rate + weights[2] * value
             else:
-                d.rows[axis.row] += value if kind == SPRING else rate
+                part = value if kind == SPRING else rate
+            direction.rows[axis.row] += axis.weight * part
         fx, fy = force * ex, force * ey
         d_fx, d_fy = d_force * ex + force * d_ex, d_force * ey + force * d_ey
         if axis.b >= 0:
-            force_tangent(p, p.markers[axis.b], q, (fx, fy), (d_fx, d_fy), ends[2:], d_ends[2:], d)
+            force_tangent(system, system.markers[axis.b], q, (fx, fy), (d_fx, d_fy), ends[2:], d_ends[2:], direction)
         if axis.a >= 0:
-            marker = p.markers[axis.a]
-            force_tangent(p, marker, q, (-fx, -fy), (-d_fx, -d_fy), ends[:2], d_ends[:2], d)
-            apply_torque(p, marker, d_force * lever + force * d_lever, d.f)
+            marker = system.markers[axis.a]
+            force_tangent(system, marker, q, (-fx, -fy), (-d_fx, -d_fy), ends[:2], d_ends[:2], direction)
+            apply_torque(system, marker, d_force * lever + force * d_lever, direction.f)
             if axis.track >= 0:
-                add_track_tangent(p, axis, x, d_x, force, d_force, d)
+                add_track_tangent(system, axis, x, d_x, force, d_force, direction)

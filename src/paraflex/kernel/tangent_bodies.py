@@ -13,136 +13,136 @@ W0, W1, W2, AXIAL, DW0, DW1, DW2, DAXIAL = range(8)
 
 
 @inlined
-def body_tangent(p, i, q, v, a, d):
+def plane_sums(shapes, x, y, first, n, e, u, d_u):
+    """Sums of n coordinates from e on by rows x and y of a table of shapes, from column `first` on: of u and of d_u.
+
+    Returns
+    -------
+    (x, y), (d_x, d_y) : floats
+    """
+    along, across, d_along, d_across = 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        Nx, Ny = shapes[x, first + j], shapes[y, first + j]
+        along += Nx * u[e + j]
+        across += Ny * u[e + j]
+        d_along += Nx * d_u[e + j]
+        d_across += Ny * d_u[e + j]
+    return (along, across), (d_along, d_across)
+
+
+@inlined
+def body_tangent(system, i, q, v, a, direction):
     """Change of M q'' + h + D u' + K u of body i, less its weight, into d.f: see `bodies.body_equations`."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
     c, s = cos(q[o + 2]), sin(q[o + 2])
-    w, dw, turn = v[o + 2], a[o + 2], d.q[o + 2]
-    d_w, d_dw = d.v[o + 2], d.a[o + 2]
-    gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
+    w, dw, turn = v[o + 2], a[o + 2], direction.q[o + 2]
+    d_w, d_dw = direction.v[o + 2], direction.a[o + 2]
+    gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
-    d_ax = c * d.a[o] + s * d.a[o + 1] + turn * ay
-    d_ay = c * d.a[o + 1] - s * d.a[o] - turn * ax
-    sx, sy, vx, vy, fx, fy, i1u, i1v = body.S1x, body.S1y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    d_sx, d_sy, d_vx, d_vy, d_fx, d_fy, d_i1u, d_i1v = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    d_ax = c * direction.a[o] + s * direction.a[o + 1] + turn * ay
+    d_ay = c * direction.a[o + 1] - s * direction.a[o] - turn * ax
+    (ux, uy), (d_sx, d_sy) = plane_sums(system.modal, S2X, S2Y, k, n, e, q, direction.q)
+    (vx, vy), (d_vx, d_vy) = plane_sums(system.modal, S2X, S2Y, k, n, e, v, direction.v)
+    (fx, fy), (d_fx, d_fy) = plane_sums(system.modal, S2X, S2Y, k, n, e, a, direction.a)
+    sx, sy = body.S1x + ux, body.S1y + uy
+    i1u, i1v, d_i1u, d_i1v = 0.0, 0.0, 0.0, 0.0
     for j in range(n):
-        S2x, S2y, i1 = p.modal[S2X, k + j], p.modal[S2Y, k + j], p.modal[I1, k + j]
-        sx += S2x * q[e + j]
-        sy += S2y * q[e + j]
-        vx += S2x * v[e + j]
-        vy += S2y * v[e + j]
-        fx += S2x * a[e + j]
-        fy += S2y * a[e + j]
+        i1 = system.modal[I1, k + j]
         i1u += i1 * q[e + j]
         i1v += i1 * v[e + j]
-        d_sx += S2x * d.q[e + j]
-        d_sy += S2y * d.q[e + j]
-        d_vx += S2x * d.v[e + j]
-        d_vy += S2y * d.v[e + j]
-        d_fx += S2x * d.a[e + j]
-        d_fy += S2y * d.a[e + j]
-        d_i1u += i1 * d.q[e + j]
-        d_i1v += i1 * d.v[e + j]
+        d_i1u += i1 * direction.q[e + j]
+        d_i1v += i1 * direction.v[e + j]
     uI2u, d_uI2u, d_uI2v, uI2v, d_mpf_a = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(n):
         g_v, i_u, g_u, d_gu, d_gv, d_iu = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         row = body.square + j * n
         for l in range(n):
-            G, I = p.G2[row + l], p.I2[row + l]
+            G, I = system.G2[row + l], system.I2[row + l]
             g_u += G * q[e + l]
             g_v += G * v[e + l]
             i_u += I * q[e + l]
-            d_gu += G * d.q[e + l]
-            d_gv += G * d.v[e + l]
-            d_iu += I * d.q[e + l]
+            d_gu += G * direction.q[e + l]
+            d_gv += G * direction.v[e + l]
+            d_iu += I * direction.q[e + l]
         uI2u += q[e + j] * i_u
         uI2v += v[e + j] * i_u
-        d_uI2u += 2.0 * d.q[e + j] * i_u
-        d_uI2v += d.v[e + j] * i_u + v[e + j] * d_iu
-        mpf = p.modal[GJ, k + j] - g_u
-        d_mpf_a += mpf * d.a[e + j] - d_gu * a[e + j]
-        d.f[e + j] = (
-            p.modal[S2X, k + j] * d_ax
-            + p.modal[S2Y, k + j] * d_ay
+        d_uI2u += 2.0 * direction.q[e + j] * i_u
+        d_uI2v += direction.v[e + j] * i_u + v[e + j] * d_iu
+        mpf = system.modal[GJ, k + j] - g_u
+        d_mpf_a += mpf * direction.a[e + j] - d_gu * a[e + j]
+        direction.f[e + j] = (
+            system.modal[S2X, k + j] * d_ax
+            + system.modal[S2Y, k + j] * d_ay
             + mpf * d_dw
             - d_gu * dw
-            + d.a[e + j]
+            + direction.a[e + j]
             - w * w * d_iu
-            - 2.0 * w * d_w * (p.modal[I1, k + j] + i_u)
+            - 2.0 * w * d_w * (system.modal[I1, k + j] + i_u)
             - 2.0 * (w * d_gv + d_w * g_v)
-            + p.modal[OMEGA2, k + j] * d.q[e + j]
-            + p.modal[DAMPING, k + j] * d.v[e + j]
+            + system.modal[OMEGA2, k + j] * direction.q[e + j]
+            + system.modal[DAMPING, k + j] * direction.v[e + j]
         )
     bx = body.m * ax - sy * dw + fx - w * w * sx - 2.0 * w * vy
     by = body.m * ay + sx * dw + fy - w * w * sy + 2.0 * w * vx
     d_bx = body.m * d_ax - d_sy * dw - sy * d_dw + d_fx - w * w * d_sx - 2.0 * (w * d_w * sx + d_w * vy + w * d_vy)
     d_by = body.m * d_ay + d_sx * dw + sx * d_dw + d_fy - w * w * d_sy - 2.0 * (w * d_w * sy - d_w * vx - w * d_vx)
-    d.f[o] = c * d_bx - s * d_by - turn * (s * bx + c * by)
-    d.f[o + 1] = s * d_bx + c * d_by + turn * (c * bx - s * by)
-    d.f[o + 2] = d_sx * ay + sx * d_ay - d_sy * ax - sy * d_ax + d_mpf_a
-    d.f[o + 2] += (2.0 * d_i1u + d_uI2u) * dw + (body.I0 + 2.0 * i1u + uI2u) * d_dw
-    d.f[o + 2] += 2.0 * (d_w * (i1v + uI2v) + w * (d_i1v + d_uI2v))
+    direction.f[o] = c * d_bx - s * d_by - turn * (s * bx + c * by)
+    direction.f[o + 1] = s * d_bx + c * d_by + turn * (c * bx - s * by)
+    direction.f[o + 2] = d_sx * ay + sx * d_ay - d_sy * ax - sy * d_ax + d_mpf_a
+    direction.f[o + 2] += (2.0 * d_i1u + d_uI2u) * dw + (body.I0 + 2.0 * i1u + uI2u) * d_dw
+    direction.f[o + 2] += 2.0 * (d_w * (i1v + uI2v) + w * (d_i1v + d_uI2v))
 
 
 @routine
-def bent_slopes(p, i, q, v, a, d, points):
+def second_order_slopes(system, i, q, v, a, direction, points):
     """Slopes at the Gauss points of body i, their derivatives, and the changes of these, into points."""
-    body = p.bodies[i]
+    body = system.bodies[i]
     e = body.offset + 3
     for j in range(body.slopes):
-        h = p.masses[body.mass + j].shape
+        h = system.masses[body.mass + j].shape
         for row in range(8):
             points[row, j] = 0.0
         for l in range(body.nf):
-            slope = p.mass_shape[SLOPE, h + l]
+            slope = system.mass_shape[SLOPE, h + l]
             points[W0, j] += slope * q[e + l]
             points[W1, j] += slope * v[e + l]
             points[W2, j] += slope * a[e + l]
-            points[DW0, j] += slope * d.q[e + l]
-            points[DW1, j] += slope * d.v[e + l]
-            points[DW2, j] += slope * d.a[e + l]
+            points[DW0, j] += slope * direction.q[e + l]
+            points[DW1, j] += slope * direction.v[e + l]
+            points[DW2, j] += slope * direction.a[e + l]
 
 
 @routine
-def bent_tangent(p, i, q, v, a, d, points):
-    """Change of M q'' + h + D u' + K u of body i, less its weight, into d.f: see `bending.bent_equations`."""
-    body = p.bodies[i]
+def second_order_tangent(system, i, q, v, a, direction, points):
+    """Change of M q'' + h + D u' + K u of body i, less its weight, into d.f: see `bending.second_order_equations`."""
+    body = system.bodies[i]
     o, n = body.offset, body.nf
     e = o + 3
     c, s = cos(q[o + 2]), sin(q[o + 2])
-    w, dw, d_phi = v[o + 2], a[o + 2], d.q[o + 2]
-    d_w, d_dw = d.v[o + 2], d.a[o + 2]
-    gx, gy = a[o] - p.gravity[0], a[o + 1] - p.gravity[1]
+    w, dw, d_phi = v[o + 2], a[o + 2], direction.q[o + 2]
+    d_w, d_dw = direction.v[o + 2], direction.a[o + 2]
+    gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
-    d_ax = c * d.a[o] + s * d.a[o + 1] + d_phi * ay
-    d_ay = c * d.a[o + 1] - s * d.a[o] - d_phi * ax
-    bent_slopes(p, i, q, v, a, d, points)
+    d_ax = c * direction.a[o] + s * direction.a[o + 1] + d_phi * ay
+    d_ay = c * direction.a[o + 1] - s * direction.a[o] - d_phi * ax
+    second_order_slopes(system, i, q, v, a, direction, points)
     for l in range(n):
-        d.f[e + l] = p.modal[OMEGA2, body.flex + l] * d.q[e + l] + p.modal[DAMPING, body.flex + l] * d.v[e + l]
+        direction.f[e + l] = (
+            system.modal[OMEGA2, body.flex + l] * direction.q[e + l]
+            + system.modal[DAMPING, body.flex + l] * direction.v[e + l]
+        )
     fx, fy, d_fx, d_fy, d_torque = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(body.mass, body.mass_end):
-        point = p.masses[k]
+        point = system.masses[k]
         h = point.shape
-        sx, sy, vx, vy, bx, by = point.x, 0.0, 0.0, 0.0, 0.0, 0.0
-        d_sx, d_sy, d_vx, d_vy, d_bx, d_by = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for l in range(n):
-            Nx, Ny = p.mass_shape[NX, h + l], p.mass_shape[NY, h + l]
-            sx += Nx * q[e + l]
-            sy += Ny * q[e + l]
-            vx += Nx * v[e + l]
-            vy += Ny * v[e + l]
-            bx += Nx * a[e + l]
-            by += Ny * a[e + l]
-            d_sx += Nx * d.q[e + l]
-            d_sy += Ny * d.q[e + l]
-            d_vx += Nx * d.v[e + l]
-            d_vy += Ny * d.v[e + l]
-            d_bx += Nx * d.a[e + l]
-            d_by += Ny * d.a[e + l]
+        (ux, sy), (d_sx, d_sy) = plane_sums(system.mass_shape, NX, NY, h, n, e, q, direction.q)
+        (vx, vy), (d_vx, d_vy) = plane_sums(system.mass_shape, NX, NY, h, n, e, v, direction.v)
+        (bx, by), (d_bx, d_by) = plane_sums(system.mass_shape, NX, NY, h, n, e, a, direction.a)
+        sx = point.x + ux
         for j in range(point.reach):
-            weight = p.mass_weights[point.weights + j]
+            weight = system.mass_weights[point.weights + j]
             s0, s1, s2 = points[W0, j], points[W1, j], points[W2, j]
             d0, d1, d2 = points[DW0, j], points[DW1, j], points[DW2, j]
             sx -= 0.5 * weight * s0 * s0
@@ -160,14 +160,14 @@ def bent_tangent(p, i, q, v, a, d, points):
         if point.inertia > 0.0:
             turn = d_dw
             for l in range(n):
-                turn += p.mass_shape[SLOPE, h + l] * d.a[e + l]
+                turn += system.mass_shape[SLOPE, h + l] * direction.a[e + l]
             turn *= point.inertia
             for l in range(n):
-                d.f[e + l] += p.mass_shape[SLOPE, h + l] * turn
+                direction.f[e + l] += system.mass_shape[SLOPE, h + l] * turn
         for l in range(n):
-            d.f[e + l] += p.mass_shape[NX, h + l] * d_mx + p.mass_shape[NY, h + l] * d_my
+            direction.f[e + l] += system.mass_shape[NX, h + l] * d_mx + system.mass_shape[NY, h + l] * d_my
         for j in range(point.reach):
-            weight = p.mass_weights[point.weights + j]
+            weight = system.mass_weights[point.weights + j]
             points[AXIAL, j] += weight * mx
             points[DAXIAL, j] += weight * d_mx
         fx += mx
@@ -176,27 +176,27 @@ def bent_tangent(p, i, q, v, a, d, points):
         d_fy += d_my
         d_torque += d_sx * my + sx * d_my - d_sy * mx - sy * d_mx + turn
     for j in range(body.slopes):
-        h = p.masses[body.mass + j].shape
+        h = system.masses[body.mass + j].shape
         force = points[DW0, j] * points[AXIAL, j] + points[W0, j] * points[DAXIAL, j]
         for l in range(n):
-            d.f[e + l] -= p.mass_shape[SLOPE, h + l] * force
-    d.f[o] = c * d_fx - s * d_fy - d_phi * (s * fx + c * fy)
-    d.f[o + 1] = s * d_fx + c * d_fy + d_phi * (c * fx - s * fy)
-    d.f[o + 2] = d_torque
+            direction.f[e + l] -= system.mass_shape[SLOPE, h + l] * force
+    direction.f[o] = c * d_fx - s * d_fy - d_phi * (s * fx + c * fy)
+    direction.f[o + 1] = s * d_fx + c * d_fy + d_phi * (c * fx - s * fy)
+    direction.f[o + 2] = d_torque
 
 
 @inlined
-def body_terms_tangent(p, i, q, v, a, d, points):
+def body_terms_tangent(system, i, q, v, a, direction, points):
     """Change of the terms of body i into d.f; `points` is d.points, None for linear geometry."""
     if points is None:
-        body_tangent(p, i, q, v, a, d)
-    elif p.bodies[i].slopes > 0:
-        bent_tangent(p, i, q, v, a, d, points)
+        body_tangent(system, i, q, v, a, direction)
+    elif system.bodies[i].slopes > 0:
+        second_order_tangent(system, i, q, v, a, direction, points)
     else:
-        body_tangent(p, i, q, v, a, d)
-    body = p.bodies[i]
+        body_tangent(system, i, q, v, a, direction)
+    body = system.bodies[i]
     if body.damping >= 0:
         e = body.offset + 3
         for j in range(body.nf):
             for l in range(body.nf):
-                d.f[e + j] += p.damping[body.damping + j * body.stride + l] * d.v[e + l]
+                direction.f[e + j] += system.damping[body.damping + j * body.stride + l] * direction.v[e + l]

@@ -260,7 +260,7 @@ class PathClosure:
                 f"the mechanism holds itself twice ({', '.join(repeated)}), and joint motions along a path need each "
                 "motion held once",
                 field="joint",
-                remedy="leave out the joint, or the link, that repeats what others do",
+                remedy="leave out the joint, the gear or the link that repeats what others do",
             )
         raise InputError(
             f"the mechanism has {free + len(repeated)} degrees of freedom, its task {tasks} coordinate(s)",

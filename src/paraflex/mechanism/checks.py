@@ -28,6 +28,7 @@ def check_mechanism(mechanism: Members) -> None:
     check_ground(mechanism)
     check_joints(mechanism)
     check_members_at_joints(mechanism)
+    check_gears(mechanism)
     check_assemblies(mechanism)
     check_connected(mechanism)
     check_task(mechanism)
@@ -84,6 +85,16 @@ def check_members_at_joints(mechanism: Members) -> None:
     for mode in mechanism.modes:
         for name in mode.motors:
             known(name, motors, f"mode.{mode.name}", "motor")
+
+
+def check_gears(mechanism: Members) -> None:
+    """Gears relate two different joints."""
+    for gear in mechanism.gears:
+        if gear.first_joint == gear.second_joint:
+            raise InputError(
+                "a gear needs two different joints", field=f"gear.{gear.name}.joints", value=gear.first_joint,
+                remedy="name the two whose angles or travels belong together",
+            )  # fmt: skip
 
 
 def check_assemblies(mechanism: Members) -> None:

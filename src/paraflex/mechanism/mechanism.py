@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
 
 from paraflex.arguments import checked_arguments, given_as, refused
 from paraflex.display import Shown
@@ -12,6 +14,7 @@ from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
+from paraflex.mechanism.phases import with_phases
 from paraflex.mechanism.quantities import known
 
 
@@ -37,6 +40,8 @@ class Mechanism(Members, Shown):
     frictions : tuple of JointFriction
     linear_springs : tuple of LinearSpring
     loads : tuple of PointForce or AppliedTorque
+    gears : tuple of Gear
+        Each with its phase.
     gravity : (x, y)
         Acceleration of free fall in the ground frame [m/s^2]; none by default.
     end_effector : EndEffector, optional
@@ -58,6 +63,12 @@ class Mechanism(Members, Shown):
         super().__post_init__()
         object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
+        object.__setattr__(self, "gears", with_phases(self))
+
+    def save(self, path: str | Path) -> None:
+        """Write the model file of this mechanism, from which `load` reads an equal one; see `Model.save`."""
+        # Files stand above what they hold; they are imported when one is written.
+        import_module("paraflex.files").Model(self).save(path)
 
     @classmethod
     def made_of(cls, given: object) -> Mechanism:

@@ -11,6 +11,7 @@ from typing import Self, TypeVar
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body
+from paraflex.mechanism.gears import Gear
 from paraflex.mechanism.groups import Group, group, grouped
 from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
 from paraflex.mechanism.loads import (
@@ -132,6 +133,7 @@ class Members(CheckedFields):
     linear_springs: tuple[LinearSpring, ...] = group(
         "linear_spring", "spring between points", LinearSpring, plural="springs between points", resists=True
     )
+    gears: tuple[Gear, ...] = group("gear", "gear", Gear, engines=True)
     loads: tuple[Load, ...] = group("load", "load", PointForce, AppliedTorque)
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER

@@ -100,7 +100,7 @@ def _from_points(
                     if pose is not None:
                         poses[body.name] = pose
                         for name, place in local.items():
-                            known.setdefault(PointRef(body.name, name), _placed(pose, place))
+                            known.setdefault(PointRef(body.name, name), placed_in(pose, place))
     return poses
 
 
@@ -129,11 +129,12 @@ def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | 
         angle = atan2(
             sum(ax * by - ay * bx for ax, ay, bx, by in arms), sum(ax * bx + ay * by for ax, ay, bx, by in arms)
         )
-    turned = _placed(Pose(angle, (0.0, 0.0)), (cx, cy))
+    turned = placed_in(Pose(angle, (0.0, 0.0)), (cx, cy))
     return Pose(angle, (gx - turned[0], gy - turned[1]))
 
 
-def _placed(pose: Pose, local: Place) -> Place:
+def placed_in(pose: Pose, local: Place) -> Place:
+    """Where a place of the undeformed body is in the ground frame [m]."""
     assert pose.position is not None
     c, s = cos(pose.angle), sin(pose.angle)
     return pose.position[0] + c * local[0] - s * local[1], pose.position[1] + s * local[0] + c * local[1]

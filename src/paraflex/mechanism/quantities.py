@@ -37,12 +37,19 @@ def not_negative(value: float, field: str, unit: str) -> None:
         raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")
 
 
+def not_zero(value: float, field: str, unit: str) -> None:
+    """Raise an `InputError` unless a value is finite and not zero."""
+    if not (math.isfinite(value) and value != 0.0):
+        raise InputError("must be a finite number other than zero", field=field, value=value, remedy=f"give it {unit}")
+
+
 def said(
     description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: bool = False
 ) -> dict[str, Any]:
     """Metadata of a member's field: what model files, their schema and errors say of it, with the unit behind "in".
 
-    A number is checked by `finite`, or `positive` or `not_negative` with a unit to ask for; a name may be a joint's.
+    A number is checked, unless it is None, by `finite`, or with a unit to ask for by `positive`, `not_negative` or
+    `not_zero`; a name may be a joint's.
     """
     checked = partial(check, unit=unit) if check is not None and unit else check
     return {"description": description, "check": checked, "joint": joint}
@@ -54,13 +61,20 @@ AT_JOINT = said("the name of a joint", joint=True)
 def check_numbers(member: Any, place: str) -> None:
     """Check the numbers of a member, each as its field says."""
     for each in fields(member):
-        check = each.metadata.get("check")
-        if check is not None:
-            check(getattr(member, each.name), f"{place}.{each.name}")
+        check, value = each.metadata.get("check"), getattr(member, each.name)
+        if check is not None and value is not None:
+            check(value, f"{place}.{each.name}")
 
 
 def joints_named(member: Any) -> Iterator[tuple[str, str]]:
-    """Fields of a member that name joints, and the joints."""
+    """Joints that a member names, each with what files call the field."""
+    together = joint_pair(member)
     for each in fields(member):
         if each.metadata.get("joint"):
-            yield each.name, getattr(member, each.name)
+            yield "joints" if together else each.name, getattr(member, each.name)
+
+
+def joint_pair(member: Any) -> list[str]:
+    """Fields of a member, or of its class, that name two joints: `joints` in files. None where it names one."""
+    named = [each.name for each in fields(member) if each.metadata.get("joint")]
+    return named if len(named) > 1 else []

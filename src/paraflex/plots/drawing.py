@@ -108,9 +108,12 @@ class Sketch:
         )  # fmt: skip
 
     def _symbols(self, kind: str, zorder: float) -> PolyCollection:
-        fill, stroke, width = LOOKS[kind]
+        fill, stroke, width, dashed = LOOKS[kind]
         face = getattr(self.look, fill) if fill else "none"
-        return self._polygons(face, getattr(self.look, stroke), width, zorder + 0.1 * list(LOOKS).index(kind))
+        symbols = self._polygons(face, getattr(self.look, stroke), width, zorder + 0.1 * list(LOOKS).index(kind))
+        if dashed:
+            symbols.set_linestyle((0, (5.0, 3.0)))
+        return symbols
 
     def _polygons(self, face: str, edge: str, width: float, zorder: float) -> PolyCollection:
         polygons = PolyCollection(

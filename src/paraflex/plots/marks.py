@@ -1,4 +1,4 @@
-"""Symbols of a scene, in metres: supports, rails, blocks, pins, welds and springs, and how each is drawn."""
+"""Symbols of a scene, in metres: supports, rails, blocks, pins, welds, springs and gears, and how each is drawn."""
 
 from __future__ import annotations
 
@@ -8,29 +8,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.plots.scene import BLOCK, DrawnJoint, Limits, Scene
+from paraflex.plots.scene import BLOCK, DrawnGear, DrawnJoint, Limits, Scene
 
 Array = NDArray[np.float64]
 
 # Sizes as parts of the picture's larger side.
 PIN, TRIANGLE, RAIL = 0.008, 0.028, 0.02
 _TEETH = 14
+# Points of a circle.
+_CIRCLE = 61
 # A joint that moves by less than this part of the picture stays where it is.
 _STILL = 1e-3
 
 
 class MarkLook(NamedTuple):
-    """How symbols are drawn: colours of a theme by what they are for, empty for none, and a width of lines."""
+    """How symbols are drawn: colours of a theme by what they are for, empty for none; width of lines, and if dashed."""
 
     fill: str
     stroke: str
     width: float
+    dashed: bool = False
 
 
 # Symbols from the back to the front; links are drawn before the first that moves.
 LOOKS = {
     "ground": MarkLook("", "earth", 1.2),
     "hatching": MarkLook("", "earth", 0.8),
+    "gear": MarkLook("", "earth", 0.9, dashed=True),
     "spring": MarkLook("", "earth", 1.1),
     "block": MarkLook("ground", "ink", 1.2),
     "weld": MarkLook("ink", "ink", 0.8),
@@ -60,11 +64,21 @@ def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
 
 
 def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
-    """Symbols of springs and joints."""
-    out = [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
+    """Symbols of gears, springs and joints."""
+    out = [Mark("gear", gear.name, line) for gear in shown.gears for line in pitch_lines(gear)]
+    out += [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
     parts = [(joint, look, shape) for joint in shown.joints for look, shape in SYMBOLS.get(joint.kind, {}).items()]
     out += [Mark(look, joint.name, shape(joint, limits)) for joint, look, shape in parts]
     return sorted(out, key=lambda mark: list(LOOKS).index(mark.look))
+
+
+def pitch_lines(gear: DrawnGear) -> list[Array]:
+    """Pitch circles (f, n, 2) of two wheels; where there are none, a line from joint to joint."""
+    if np.isnan(gear.radii).any():
+        return [gear.ends]
+    angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
+    rim = np.column_stack([np.cos(angle), np.sin(angle)])
+    return [gear.ends[:, end, None] + gear.radii[end] * rim for end in range(2)]
 
 
 def by_look(marks: Sequence[Mark]) -> dict[str, list[Mark]]:

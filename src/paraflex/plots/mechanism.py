@@ -81,7 +81,7 @@ def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> 
     outlines = {name: points[None, ks][:, figure_order(points[ks])] for name, ks in bodies.items()}
     return Scene(
         mechanism="", mode="", time=np.zeros(1), magnified=1.0, bodies=outlines, stiff={}, joints=joints, springs={},
-        anchors=(), followed=None, trail=None, desired=None, reached=0.0, limits=limits_of(points),
+        gears=(), anchors=(), followed=None, trail=None, desired=None, reached=0.0, limits=limits_of(points),
     )  # fmt: skip
 
 

@@ -65,6 +65,14 @@ class DrawnJoint:
         return bool(np.isfinite(self.direction).all())
 
 
+class DrawnGear(NamedTuple):
+    """A gear at f times: places of its two joints (f, 2, 2), and pitch radii (2,) where they are known, else NaN."""
+
+    name: str
+    ends: Array
+    radii: Array
+
+
 @dataclass(frozen=True)
 class Scene:
     """A run in pictures, at f times.
@@ -84,6 +92,7 @@ class Scene:
     joints : tuple of DrawnJoint
     springs : mapping of str to (f, 2, 2) array
         Both ends.
+    gears : tuple of DrawnGear
     anchors : tuple of (2,) arrays
         Where springs hang on the ground.
     followed : int or None
@@ -105,6 +114,7 @@ class Scene:
     stiff: dict[str, Array]
     joints: tuple[DrawnJoint, ...]
     springs: dict[str, Array]
+    gears: tuple[DrawnGear, ...]
     anchors: tuple[Array, ...]
     followed: int | None
     trail: Array | None
@@ -185,6 +195,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     )
     springs, followed = _springs(run, drawn), followed_station(run)
     seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
+    seen += [gear.ends + sign * gear.radii[:, None] for gear in _gears(run, places) for sign in (1.0, -1.0)]
     return Scene(
         mechanism=str(run.attrs["mechanism"]),
         mode=str(run["mode"].item()) if "mode" in run.coords else "",
@@ -194,6 +205,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
         stiff={} if magnify == 1.0 else {name: at(figure_of(base[:, own])) for name, own in bodies.items()},
         joints=joints,
         springs={name: at(ends) for name, ends in springs.items()},
+        gears=_gears(run, at(places)),
         anchors=_anchors(run),
         followed=followed,
         trail=None if followed is None else at(drawn[:, followed]),
@@ -250,6 +262,16 @@ def _springs(run: xr.Dataset, drawn: Array) -> dict[str, Array]:
     return {str(name): places[:, i] for i, name in enumerate(run["spring"].values)}
 
 
+def _gears(run: xr.Dataset, joints: Array) -> tuple[DrawnGear, ...]:
+    """Gears between joints that stand at these places (f, joints, 2)."""
+    if "gear_joint" not in run:
+        return ()
+    held, radii = run["gear_joint"].values, run["gear_radius"].values
+    return tuple(
+        DrawnGear(str(name), joints[:, held[i].astype(int)], radii[i]) for i, name in enumerate(run["gear"].values)
+    )
+
+
 def _with_rails(places: Array, joints: tuple[DrawnJoint, ...]) -> Array:
     """Places, and where the rails of joints end."""
     size = limits_of(places).size
@@ -297,6 +319,7 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
             replace(joint, place=joint.place[chosen], direction=joint.direction[chosen]) for joint in shown.joints
         ),
         springs={name: ends[chosen] for name, ends in shown.springs.items()},
+        gears=tuple(gear._replace(ends=gear.ends[chosen]) for gear in shown.gears),
         trail=None if shown.trail is None else shown.trail[chosen],
     )
 

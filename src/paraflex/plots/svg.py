@@ -109,6 +109,8 @@ def _mark(mark: Mark, pen: Pen) -> str:
     kind = LOOKS[mark.look]
     fill = getattr(pen.look, kind.fill) if kind.fill else "none"
     look = f'class="{mark.look}" fill="{fill}" stroke="{getattr(pen.look, kind.stroke)}" {_wide(kind.width, pen)}'
+    if kind.dashed:
+        look += f' stroke-dasharray="{5.0 * pen.unit:.1f} {3.0 * pen.unit:.1f}"'
     if mark.places.shape[1] == 1:
         return _dot(mark.places[:, 0], _PIN, look, mark.name, pen)
     return _line(mark.places, look, mark.name, pen)

@@ -36,11 +36,13 @@ _NO_RUN = "None of the best designs was simulated again, so there is no animatio
 _MOST_COLUMNS = 12
 _KEPT = (
     "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
-    "joint_position", "joint_direction", "spring_position", "point_station", "spring_station",
+    "joint_position", "joint_direction", "spring_position", "point_station", "spring_station", "gear_radius",
 )  # fmt: skip
 _STATIONS = ("point_station", "spring_station")
+_DIFFERING = (*_STATIONS, "gear_radius")
 _COORDINATES = (
     "time", "axis", "body", "motor", "joint", "end", "point", "spring", "station_body", "joint_kind", "joint_grounded",
+    "gear", "gear_joint",
 )  # fmt: skip
 
 
@@ -164,8 +166,8 @@ def _with_as_many_stations(runs: Sequence[xr.Dataset]) -> list[xr.Dataset]:
 
     A parameter that moves a point along a beam changes how many there are between its points.
     """
-    # They differ from run to run.
-    runs = [run.reset_coords([name for name in _STATIONS if name in run.coords]) for run in runs]
+    # They differ from run to run, and so do the radii of wheels.
+    runs = [run.reset_coords([name for name in _DIFFERING if name in run.coords]) for run in runs]
     names = [_station_bodies(run) for run in runs]
     if all(np.array_equal(each, names[0]) for each in names):
         return runs

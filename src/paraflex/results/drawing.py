@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
-from paraflex.mechanism import Body, Joint, Mechanism, PointRef, Pose, RigidBody, placed_poses
+from paraflex.mechanism import GROUND, Body, Gear, Joint, Mechanism, PointRef, Pose, RigidBody, placed_poses
+from paraflex.mechanism.poses import local_points
 from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape, turned
 
 Array = NDArray[np.float64]
@@ -165,6 +166,15 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
             "spring": [spring.name for spring in springs],
             "spring_station": (("spring", "end"), np.array(ends, dtype=np.int32)),
         }
+    of_gears: dict[str, Any] = {}
+    if mechanism.gears:
+        number = {joint.name: k for k, joint in enumerate(joints)}
+        held = [[number[name] for name in gear.joints] for gear in mechanism.gears]
+        of_gears = {
+            "gear": [gear.name for gear in mechanism.gears],
+            "gear_joint": (("gear", "end"), np.array(held, dtype=np.int32)),
+            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, gear) for gear in mechanism.gears])),
+        }
     return {
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
         "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
@@ -172,7 +182,27 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         "joint_kind": ("joint", [joint.symbol for joint in joints]),
         "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
         **of_springs,
+        **of_gears,
     }
+
+
+def pitch_radii(mechanism: Mechanism, gear: Gear) -> tuple[float, float]:
+    """Radii of two wheels that mesh outside, about joints that one body or the ground holds apart [m]; else NaN."""
+    first, second = (mechanism.joint(name) for name in gear.joints)
+    carriers = {first.a.body, first.b.body} & {second.a.body, second.b.body}
+    if not (first.holds == second.holds == ("points",) and len(carriers) == 1):
+        return np.nan, np.nan
+    (carrier,) = carriers
+    places = mechanism.ground if carrier == GROUND else local_points(mechanism.body(carrier))
+    (ref_1, sign_1), (ref_2, sign_2) = (
+        (joint.a, 1.0) if joint.a.body == carrier else (joint.b, -1.0) for joint in (first, second)
+    )
+    # Of the wheels' turns against what carries both.
+    ratio = gear.ratio * sign_1 * sign_2
+    if ratio > 0.0:
+        return np.nan, np.nan
+    apart = float(np.hypot(*np.subtract(places[ref_2.point], places[ref_1.point])))
+    return apart * ratio / (ratio - 1.0), apart / (1.0 - ratio)
 
 
 def _base(

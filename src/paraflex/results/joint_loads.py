@@ -1,8 +1,8 @@
 """What the bodies of a joint do to one another: all of it, whatever in the joint does it.
 
 Constraints have Phi of body b less that of body a and stand on the left of the equations, M q'' + ... + Phi_q^T lambda:
--lambda acts on body b. So do the multipliers of prescribed motions, springs, dampers and friction; a motor's torque or
-force acts on b as it is.
+-lambda acts on body b. So do the multipliers of prescribed motions, springs, dampers, friction and gears, of these
+the weights of their joints times these; a motor's torque or force acts on b as it is.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import System, axis_angle
-from paraflex.dynamics.constraints import Constraint, row_order
+from paraflex.dynamics.constraints import Term, row_order
 from paraflex.dynamics.coordinates import transverse_pieces
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.kernel.packed import ANGLE, POINT
@@ -39,7 +39,7 @@ class JointLoads(NamedTuple):
 
 
 def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> JointLoads:
-    """Forces and moments in joints by name: of what holds the joint, of its motors, springs, dampers and friction.
+    """Forces and moments in joints by name: of what holds the joint, of motors, springs, dampers, friction and gears.
 
     The second body does the opposite to the first at the same place. Springs and dampers between points (linear
     springs) are not in a joint and do not count.
@@ -57,16 +57,18 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
     force, moment = np.zeros((len(q), len(names), 2)), np.zeros((len(q), len(names)))
     row = 0
     for constraint in row_order(mechanism, system.index):
-        i, lam = place.get(constraint.joint), multipliers[:, row : row + len(constraint.labels)]
+        lam = multipliers[:, row : row + len(constraint.labels)]
         row += len(constraint.labels)
-        if i is None:
-            continue
-        if constraint.kind == POINT:
-            force[:, i] -= lam
-        elif constraint.kind == ANGLE:
-            moment[:, i] -= lam[:, 0]
-        else:
-            force[:, i] -= lam * _direction(system, constraint, q)
+        for term in constraint.terms:
+            i, load = place.get(term.joint), term.weight * lam
+            if i is None:
+                continue
+            if term.kind == POINT:
+                force[:, i] -= load
+            elif term.kind == ANGLE:
+                moment[:, i] -= load[:, 0]
+            else:
+                force[:, i] -= load * _direction(system, term, q)
     for motor, torque in zip(mechanism.motors, torques.T, strict=True):
         i, joint = place.get(motor.joint), mechanism.joint(motor.joint)
         if i is None:
@@ -78,12 +80,12 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
     return JointLoads(force, moment)
 
 
-def _direction(system: System, constraint: Constraint, q: Array) -> Array:
+def _direction(system: System, term: Term, q: Array) -> Array:
     """Derivative (k, 2) of a row along an axis by the place of point b."""
-    joint = system.mechanism.joint(constraint.joint)
+    joint = system.mechanism.joint(term.joint)
     along = axis_angle(system, joint, q)
-    direction = _unit(along + constraint.direction - joint.direction)
-    if constraint.carrier == "track":
+    direction = _unit(along + term.direction - joint.direction)
+    if term.carrier == "track":
         # Square to the beam where the point stands, bent as it is.
         direction -= _track_slope(system, joint, q)[:, None] * _unit(along)
     return direction

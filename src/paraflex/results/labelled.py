@@ -43,7 +43,7 @@ UNITS = {
     "point_position": ("position of a named point", "m"),
     "joint_force": ("force of a joint's first body on its second, ground frame", "N"),
     "joint_moment": ("moment of a joint's first body on its second", "N m"),
-    "multiplier": ("multiplier of a constraint row; torque or force of a spring, damper or friction", "N, N m"),
+    "multiplier": ("multiplier of a constraint row; torque or force of a spring, damper, friction or gear", "N, N m"),
     "kinetic_energy": ("kinetic energy", "J"),
     "strain_energy": ("strain energy of links and springs", "J"),
     "work": ("work of motors, prescribed motion, weight and loads, less what dampers and friction take", "J"),
@@ -59,6 +59,8 @@ UNITS = {
     "joint_kind": ("kind of joint", "1"),
     "joint_grounded": ("whether the joint is on the ground", "1"),
     "spring_station": ("drawn points that a spring is at; -1 on the ground", "1"),
+    "gear_joint": ("joints that a gear relates, counted from 0", "1"),
+    "gear_radius": ("pitch radii of its wheels, where it has two that mesh outside", "m"),
     "status": ("how the run ended", "1"),
     "message": ("why it is not complete", "1"),
     "factorisations": ("factorisations of the iteration matrix", "1"),
@@ -79,15 +81,17 @@ _COMMENTS = {
     "motor_power": "torque or force times the rate of the joint: positive drives the mechanism, negative brakes it",
     "joint_force": (
         "at the joint's point of the second body, in the ground frame: of the constraints and of motors, springs, "
-        "dampers, friction and prescribed motion along the joint; the opposite acts on the first body"
+        "dampers, friction, gears and prescribed motion along the joint; the opposite acts on the first body"
     ),
     "joint_moment": (
         "about the joint's point of the second body, positive anticlockwise: of the constraints and of motors, "
-        "springs, dampers, friction and prescribed motion that turn the joint; the opposite acts on the first body"
+        "springs, dampers, friction, gears and prescribed motion that turn the joint; the opposite acts on the first "
+        "body"
     ),
     "multiplier": (
         "stands on the left of the equations of motion: minus it acts on the joint's second body, in the ground frame, "
-        "anticlockwise, or along the joint's axis or normal; of least norm where constraints depend on one another"
+        "anticlockwise, or along the joint's axis or normal, of a gear at its second joint; of least norm where "
+        "constraints depend on one another"
     ),
     "torque": "on the joint's second body: positive turns it anticlockwise or moves it along the axis",
     "applied_torque": "as `torque` of a run along a path",

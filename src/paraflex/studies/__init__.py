@@ -1,5 +1,12 @@
 """Many runs as one result."""
 
+from paraflex.designs.derivatives.gradient import metric_gradients as metric_gradients
+from paraflex.designs.sweep import (
+    SweepResult as SweepResult,
+    SweepStudy as SweepStudy,
+    load_sweep as load_sweep,
+    sweep as sweep,
+)
 from paraflex.studies.agreement import (
     ModelRuns as ModelRuns,
     Refinement as Refinement,
@@ -17,32 +24,34 @@ from paraflex.studies.comparison import (
     MethodComparison as MethodComparison,
     Reference as Reference,
 )
-from paraflex.studies.optimisation import (
-    DesignStudy as DesignStudy,
+from paraflex.studies.optimisation.confidence import Confidence as Confidence
+from paraflex.studies.optimisation.identify import (
     IdentificationResult as IdentificationResult,
     IdentificationStudy as IdentificationStudy,
+    Reached as Reached,
+    identify as identify,
+    load_identification as load_identification,
+)
+from paraflex.studies.optimisation.indices import (
     IndicesResult as IndicesResult,
+    IndicesStudy as IndicesStudy,
+    indices as indices,
+    load_indices as load_indices,
+)
+from paraflex.studies.optimisation.objective import Objective as Objective, Target as Target
+from paraflex.studies.optimisation.optimise import (
     OptimisationResult as OptimisationResult,
     OptimisationStudy as OptimisationStudy,
-    identify as identify,
-    indices as indices,
-    load_identification as load_identification,
-    load_indices as load_indices,
     load_optimisation as load_optimisation,
     optimise as optimise,
 )
-from paraflex.studies.sensitivities import (
+from paraflex.studies.optimisation.result import SearchResult as SearchResult
+from paraflex.studies.optimisation.study import DesignStudy as DesignStudy, Search as Search
+from paraflex.studies.sensitivities.study import (
     Sensitivities as Sensitivities,
     SensitivityStudy as SensitivityStudy,
     load_sensitivities as load_sensitivities,
-    metric_gradients as metric_gradients,
     sensitivities as sensitivities,
-)
-from paraflex.studies.sweeps import (
-    SweepResult as SweepResult,
-    SweepStudy as SweepStudy,
-    load_sweep as load_sweep,
-    sweep as sweep,
 )
 from paraflex.studies.tracking import (
     Simulator as Simulator,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from paraflex.designs.sweep import SweepResult
 from paraflex.display import facts, page, sentence, table, view
 from paraflex.results import summary
 from paraflex.results.doubts import doubt_lines, verdict_of
@@ -12,9 +13,11 @@ from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 from paraflex.results.validity import validity_line
 from paraflex.studies.agreement import Verification
 from paraflex.studies.comparison import MethodComparison
-from paraflex.studies.optimisation import IdentificationResult, IndicesResult, OptimisationResult, SearchResult
-from paraflex.studies.sensitivities import Sensitivities
-from paraflex.studies.sweeps import SweepResult
+from paraflex.studies.optimisation.identify import IdentificationResult
+from paraflex.studies.optimisation.indices import IndicesResult
+from paraflex.studies.optimisation.optimise import OptimisationResult
+from paraflex.studies.optimisation.result import SearchResult
+from paraflex.studies.sensitivities.study import Sensitivities
 from paraflex.studies.tracking import StudyResult
 
 # Rows of tables that could be long.

@@ -134,5 +134,5 @@ def _axial_force(system: System, body: BodyCoordinates, line: _Line, solution: S
         if port["kind"] == POINT:
             x, y = solution.multipliers[:, port["row"] : port["row"] + 2].T
             # Multipliers have a pole at singular positions: NaN there.
-            largest = np.fmax(largest, np.abs(c * x + s * y))
+            largest = np.fmax(largest, np.abs(port["weight"] * (c * x + s * y)))
     return -largest

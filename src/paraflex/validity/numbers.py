@@ -167,7 +167,8 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
     given |= {f"spring.{one.name}.rest": one.rest for one in turning}
     given |= {
         f"assembly.{assembly.name}.{body}": angle
-        for assembly in mechanism.assemblies
+        # Gears count turns.
+        for assembly in (() if mechanism.gears else mechanism.assemblies)
         for body, angle in assembly.angles.items()
     }
     for place, angle in given.items():

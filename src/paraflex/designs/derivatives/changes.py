@@ -30,13 +30,13 @@ from paraflex.dynamics import (
 )
 from paraflex.errors import InputError, ParaflexError
 from paraflex.integrators.run import make_problem
-from paraflex.integrators.variation import Direction
+from paraflex.integrators.sensitivity import Direction
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
 from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
-from paraflex.kinematics.variation import MotionChange, Nearby, vary_motion
+from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
 from paraflex.mechanism import ActuationMode, Mechanism, RigidBody
 from paraflex.tracking import TrackingTask, path_knots
 
@@ -198,7 +198,7 @@ class Change:
     def plan(self, motion: RigidMotion, effort: Effort, d_times: Array) -> _Planned:
         """A planned motion whose times move."""
         path = self.known_path(stepped(motion.t, d_times))
-        change = vary_motion(self.closure, motion, self._nearby(motion, d_times, path))
+        change = motion_sensitivity(self.closure, motion, self._nearby(motion, d_times, path))
         return _Planned(self, motion, effort, path, stepped(motion.t, d_times), change)
 
     def known_path(self, times: Numbers) -> KnownPath:
@@ -254,8 +254,7 @@ class Change:
             times=part(sampled.times), gains=gains,
         )  # fmt: skip
         system = replace(self.system, packed=problem.system.packed)
-        motion = replace(sampled.motion, path=sampled.path, t=sampled.times)
-        task = replace(self.planned, mechanism=self.planned.mechanism, system=system, motion=motion)
+        task = replace(self.planned, mechanism=self.planned.mechanism, system=system, motion=sampled.with_step())
         error = max(self.stepped.error, _relative(signals, numbers_of(problem.signals)))
         condition = _condition(nominal.condition, sampled, nominal.torques)
         return ModeChange(direction, task, torques, condition, error)
@@ -331,6 +330,11 @@ class _Planned:
     path: KnownPath
     times: Numbers
     change: MotionChange
+
+    def with_step(self) -> RigidMotion:
+        """The motion with a complex step: what of it is no task coordinate is desired as it comes."""
+        changes = {name: stepped(getattr(self.motion, name), getattr(self.change, name)) for name in ("q", "v", "a")}
+        return replace(self.motion, system=self.owner.rigid, path=self.path, t=self.times, **changes)
 
     @cached_property
     def d_effort(self) -> tuple[Array, Array]:

@@ -17,8 +17,7 @@ from paraflex.designs.run import Task, plan_task
 from paraflex.designs.setting import Setting
 from paraflex.dynamics import numbers_of, with_numbers
 from paraflex.errors import InputError, Moment, NumericalError
-from paraflex.integrators.solution import Solution
-from paraflex.integrators.variation import (
+from paraflex.integrators.sensitivity import (
     Direction,
     Motion,
     RunDerivatives,
@@ -26,6 +25,7 @@ from paraflex.integrators.variation import (
     energies,
     run_derivatives,
 )
+from paraflex.integrators.solution import Solution
 from paraflex.results.run_traces import run_traces
 from paraflex.results.traces import Traces
 from paraflex.tracking import TrackingRun, simulate
@@ -46,7 +46,7 @@ class ModeGradients:
     errors : dict of str to (parameters,) array
         Estimates of what differences leave in `gradients`: those over numbers of the file and over signals.
     steps : int
-    unsettled : float
+    residual : float
         See `RunDerivatives`.
     """
 
@@ -55,7 +55,7 @@ class ModeGradients:
     gradients: dict[str, Array]
     errors: dict[str, Array]
     steps: int
-    unsettled: float
+    residual: float
 
 
 def metric_gradients(
@@ -123,7 +123,7 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Chan
         gradients=dict(zip(names, values, strict=True)),
         errors=dict(zip(names, errors, strict=True)),
         steps=found.steps,
-        unsettled=found.unsettled,
+        residual=found.residual,
     )
 
 

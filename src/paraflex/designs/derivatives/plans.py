@@ -17,7 +17,7 @@ from paraflex.dynamics import pack_signals
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
-from paraflex.integrators.variation import check_differentiable
+from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.tracking import TrackingTask
 
 Array = NDArray[np.float64]

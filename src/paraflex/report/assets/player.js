@@ -112,13 +112,15 @@ const player = (() => {
   // Symbols: lines, closed or not, and dots.
   function drawMarks({ pieces }, points) {
     for (const [look, , from, to] of pieces) {
-      const [fill, stroke, width] = film.looks[look];
+      const [fill, stroke, width, dashed] = film.looks[look];
+      pen.setLineDash(dashed ? [6, 4] : []);
       pen.lineWidth = 1.3 * width; pen.strokeStyle = colours[stroke];
       if (to - from > 1) trace(points, from, to);
       else { pen.beginPath(); pen.arc(px(points[2 * from]), py(points[2 * from + 1]), 4.2, 0, 2 * Math.PI); }
       if (fill) { pen.fillStyle = colours[fill]; pen.fill(); }
       pen.stroke();
     }
+    pen.setLineDash([]);
   }
 
   function drawNames(drawn, { pieces }, points) {

@@ -57,7 +57,7 @@ class Sensitivities(Result):
         In the units of a metric over those of a parameter's field.
     errors : (rows, metrics, parameters) array
         Estimates of what differences left in them: see docs/sensitivities.md.
-    unsettled : (rows,) array
+    residual : (rows,) array
         What the equations of a stage are solved to, as a part of the accelerations.
     content : str
         Digest of all that they depend on.
@@ -77,7 +77,7 @@ class Sensitivities(Result):
     values: Array
     derivatives: Array
     errors: Array
-    unsettled: Array
+    residual: Array
     content: str = ""
     verdict: Verdict = field(default_factory=lambda: Verdict(()))
 
@@ -97,7 +97,7 @@ class Sensitivities(Result):
                 "derivative": (of_metric, self.derivatives),
                 "relative": (of_metric, self.relative),
                 "error": (of_metric, self.errors),
-                "unsettled": ("run", self.unsettled),
+                "residual": ("run", self.residual),
             },
             {
                 "path": ("run", list(path)),
@@ -122,7 +122,7 @@ class Sensitivities(Result):
     def to_frame(self) -> pd.DataFrame:
         """One line for each row, metric and parameter."""
         dims = ["run", "metric", "parameter"]
-        return self.data.drop_vars("unsettled").to_dataframe(dims).reset_index().reindex(columns=list(_COLUMNS))
+        return self.data.drop_vars("residual").to_dataframe(dims).reset_index().reindex(columns=list(_COLUMNS))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values; None for what is no number."""
@@ -138,7 +138,7 @@ class Sensitivities(Result):
                 {
                     "path": path,
                     "mode": mode,
-                    "unsettled": float(self.unsettled[i]),
+                    "residual": float(self.residual[i]),
                     "metrics": {name: self._metric(i, j) for j, name in enumerate(self.metrics)},
                 }
                 for i, (path, mode) in enumerate(self.rows)
@@ -316,7 +316,7 @@ def _gathered(
         values=np.array([[each.values[name] for name in columns] for each in found]),
         derivatives=np.array([[each.gradients[name] for name in columns] for each in found]),
         errors=np.array([[each.errors[name] for name in columns] for each in found]),
-        unsettled=np.array([each.unsettled for each in found]),
+        residual=np.array([each.residual for each in found]),
         content=study.content(),
         verdict=study.setting.verdict(),
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from paraflex.kernel.arrays import add, apart, copy, largest
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import by_reference, inlined, kernel, lasting, routine
+from paraflex.kernel.compiling import by_reference, inlined, kernel, releases_lock, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
@@ -36,7 +36,7 @@ NOTHING = 1e-6
 class History(NamedTuple):
     """Steps of a run, one after the other, with the motion at every stage.
 
-    Until `settle_steps` has solved them accelerations and multipliers are guesses.
+    Until `solve_steps_to_rounding` has solved them accelerations and multipliers are guesses.
     """
 
     t: NDArray[np.float64]  # (steps,) when each begins
@@ -89,13 +89,13 @@ def relative(x, mu, a, lam, least_a, least_lam):
 
 
 @routine
-def prepare_matrix(p, b, q, v, a, lam, dependent_part, ws):
+def prepare_matrix(system, b, q, v, a, lam, dependent_part, work):
     """The iteration matrix for a stage at (q, v, a, lambda)."""
-    note_friction(p, q, v, ws.mu, ws.compliance)
-    if ws.step[0] != b or b == 0.0:
-        note_all_axial_forces(p, q, v, a, lam, ws, ws.geometric)
-        factor_bodies(p, b, q, ws)
-    orient(p, q, ws, dependent_part)
+    note_friction(system, q, v, work.mu, work.compliance)
+    if work.step[0] != b or b == 0.0:
+        note_all_axial_forces(system, q, v, a, lam, work, work.geometric)
+        factor_bodies(system, b, q, work)
+    orient(system, q, work, dependent_part)
 
 
 @inlined
@@ -105,7 +105,7 @@ def multiplier_unit(least):
 
 
 @routine
-def settle(p, signals, t, g, b, weights, dependent_part, m, a, lam, least, d, space, ws):
+def solve_to_rounding(system, signals, t, g, b, weights, dependent_part, march, a, lam, least, direction, space, work):
     """Solve a stage from m.qs and m.vs to rounding: a and lam, and its q and v in ws; the last relative correction.
 
     Where corrections with the iteration matrix do not get there, they begin anew from the guess with the exact one.
@@ -119,29 +119,29 @@ def settle(p, signals, t, g, b, weights, dependent_part, m, a, lam, least, d, sp
         if iteration == MOST_CORRECTIONS:
             copy(space.guess_a, a)
             copy(space.guess_lam, lam)
-        place(m.qs, m.vs, g, b, a, m.shift, ws)
+        place(march.qs, march.vs, g, b, a, march.shift, work)
         if iteration == 0 or exact:
-            prepare_matrix(p, b, ws.q, ws.v, a, lam, dependent_part, ws)
+            prepare_matrix(system, b, work.q, work.v, a, lam, dependent_part, work)
         if exact:
-            note_slopes(p, ws.q, ws.v, ws.mu, ws.compliance, d)
-        equations(p, signals, t, weights, ws.q, ws.v, a, lam, m.torques, ws)
-        right_hand_side(p, ws, scale)
-        solve_system(p, ws, ws.x, ws.mu)
+            note_slopes(system, work.q, work.v, work.mu, work.compliance, direction)
+        equations(system, signals, t, weights, work.q, work.v, a, lam, march.torques, work)
+        right_hand_side(system, work, scale)
+        solve_system(system, work, work.x, work.mu)
         if exact:
             unit = multiplier_unit(least)
-            exact_correction(p, g, b, weights, ws.q, ws.v, a, lam, m.torques, unit, d, space, ws)
-        add(ws.x, a)
-        add(ws.mu, lam)
-        change = relative(ws.x, ws.mu, a, lam, least[0], least[1])
+            exact_correction(system, g, b, weights, work.q, work.v, a, lam, march.torques, unit, direction, space, work)
+        add(work.x, a)
+        add(work.mu, lam)
+        change = relative(work.x, work.mu, a, lam, least[0], least[1])
         if ended(change, previous, iteration):
             break
         previous = change
-    place(m.qs, m.vs, g, b, a, m.shift, ws)
+    place(march.qs, march.vs, g, b, a, march.shift, work)
     return change
 
 
-@lasting
-def settle_steps(p, signals, tableau, controls, count, x, m, d, space, ws, out):
+@releases_lock
+def solve_steps_to_rounding(system, signals, tableau, controls, count, history, march, direction, space, work, out):
     """Solve the first `count` steps of a history again, each to rounding, from where m stands; samples into out.
 
     m holds q, v and, unless the first step restarts, the accelerations and multipliers of its first stage.
@@ -149,85 +149,85 @@ def settle_steps(p, signals, tableau, controls, count, x, m, d, space, ws, out):
     last = tableau.c.size - 1
     for k in range(count):
         for i in range(1, last + 1):
-            x.least[0] = max(x.least[0], NOTHING * largest(x.a[k, i]))
-            x.least[1] = max(x.least[1], NOTHING * largest(x.lam[k, i]))
+            history.least[0] = max(history.least[0], NOTHING * largest(history.a[k, i]))
+            history.least[1] = max(history.least[1], NOTHING * largest(history.lam[k, i]))
     for k in range(count):
-        t, h = x.t[k], x.h[k]
-        x.left[k] = 0.0
-        if x.restart[k] != 0:
-            copy(m.q, m.qs)
-            copy(m.v, m.vs)
+        t, h = history.t[k], history.h[k]
+        history.left[k] = 0.0
+        if history.restart[k] != 0:
+            copy(march.q, march.qs)
+            copy(march.v, march.vs)
             weights = baumgarte_weights(controls, controls.alpha, controls.beta, 0.0)
-            x.left[k] = settle(
-                p,
+            history.left[k] = solve_to_rounding(
+                system,
                 signals,
                 t,
                 0.0,
                 0.0,
                 weights,
                 controls.dependent_part,
-                m,
-                m.stage_a[1, 0],
-                m.stage_lam[0],
-                x.least,
-                d,
+                march,
+                march.stage_a[1, 0],
+                march.stage_lam[0],
+                history.least,
+                direction,
                 space,
-                ws,
+                work,
             )
-            m.power[0] = input_power(p, signals, t, m.q, m.v, m.stage_lam[0], m.torques, ws)
-        copy(m.q, m.stage_q[0])
-        copy(m.v, m.stage_v[0])
-        if m.counts[SAMPLE] == 0 and out.times[0] <= t:
-            copy(m.q, out.q[0])
-            copy(m.v, out.v[0])
-            copy(m.stage_a[1, 0], out.a[0])
-            copy(m.stage_lam[0], out.lam[0])
-            out.energy[0, 2] = weight_work(p, m.q, ws.scratch)
-            m.counts[SAMPLE] = 1
+            march.power[0] = input_power(system, signals, t, march.q, march.v, march.stage_lam[0], march.torques, work)
+        copy(march.q, march.stage_q[0])
+        copy(march.v, march.stage_v[0])
+        if march.counts[SAMPLE] == 0 and out.times[0] <= t:
+            copy(march.q, out.q[0])
+            copy(march.v, out.v[0])
+            copy(march.stage_a[1, 0], out.a[0])
+            copy(march.stage_lam[0], out.lam[0])
+            out.energy[0, 2] = weight_work(system, march.q, work.scratch)
+            march.counts[SAMPLE] = 1
         weights = baumgarte_weights(controls, controls.alpha, controls.beta, h)
         for i in range(1, last + 1):
-            time, g, b = stage_start(tableau, i, t, h, m)
-            copy(x.a[k, i], m.stage_a[1, i])
-            copy(x.lam[k, i], m.stage_lam[i])
-            left = settle(
-                p,
+            time, g, b = stage_start(tableau, i, t, h, march)
+            copy(history.a[k, i], march.stage_a[1, i])
+            copy(history.lam[k, i], march.stage_lam[i])
+            left = solve_to_rounding(
+                system,
                 signals,
                 time,
                 g,
                 b,
                 weights,
                 controls.dependent_part,
-                m,
-                m.stage_a[1, i],
-                m.stage_lam[i],
-                x.least,
-                d,
+                march,
+                march.stage_a[1, i],
+                march.stage_lam[i],
+                history.least,
+                direction,
                 space,
-                ws,
+                work,
             )
-            x.left[k] = max(x.left[k], left)
-            copy(ws.q, m.stage_q[i])
-            copy(ws.v, m.stage_v[i])
-            m.power[i] = input_power(p, signals, time, ws.q, ws.v, m.stage_lam[i], m.torques, ws)
+            history.left[k] = max(history.left[k], left)
+            copy(work.q, march.stage_q[i])
+            copy(work.v, march.stage_v[i])
+            march.power[i] = input_power(system, signals, time, work.q, work.v, march.stage_lam[i], march.torques, work)
         for i in range(last + 1):
-            copy(m.stage_q[i], x.q[k, i])
-            copy(m.stage_v[i], x.v[k, i])
-            copy(m.stage_a[1, i], x.a[k, i])
-            copy(m.stage_lam[i], x.lam[k, i])
-            x.power[k, i] = m.power[i]
-        write_samples(p, tableau, t, h, m, ws, out)
-        m.clock[WORK] += step_work(tableau, h, m)
-        copy(m.stage_q[last], m.q)
-        copy(m.stage_v[last], m.v)
-        copy(m.stage_a[1, last], m.stage_a[1, 0])
-        copy(m.stage_lam[last], m.stage_lam[0])
-        m.power[0] = m.power[last]
+            copy(march.stage_q[i], history.q[k, i])
+            copy(march.stage_v[i], history.v[k, i])
+            copy(march.stage_a[1, i], history.a[k, i])
+            copy(march.stage_lam[i], history.lam[k, i])
+            history.power[k, i] = march.power[i]
+        write_samples(system, tableau, t, h, march, work, out)
+        march.clock[WORK] += step_work(tableau, h, march)
+        copy(march.stage_q[last], march.q)
+        copy(march.stage_v[last], march.v)
+        copy(march.stage_a[1, last], march.stage_a[1, 0])
+        copy(march.stage_lam[last], march.stage_lam[0])
+        march.power[0] = march.power[last]
 
 
 @kernel
-def sample_energies(p, q, v, lam, scratch, out):
+def sample_energies(system, q, v, lam, scratch, out):
     """Kinetic energy, strain energy with that of springs, and what gravity has done at samples, into out (k, 3)."""
     for i in range(q.shape[0]):
-        out[i, 0], out[i, 1] = system_energy(p, q[i], v[i], scratch)
-        out[i, 1] += spring_energy(p, lam[i]) + line_energy(p, q[i], v[i])[0]
-        out[i, 2] = weight_work(p, q[i], scratch)
+        out[i, 0], out[i, 1] = system_energy(system, q[i], v[i], scratch)
+        out[i, 1] += spring_energy(system, lam[i]) + line_energy(system, q[i], v[i])[0]
+        out[i, 2] = weight_work(system, q[i], scratch)

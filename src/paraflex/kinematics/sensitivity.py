@@ -49,7 +49,7 @@ class MotionChange(NamedTuple):
     basis: Array
 
 
-def vary_motion(closure: PathClosure, motion: RigidMotion, nearby: Sequence[Nearby]) -> MotionChange:
+def motion_sensitivity(closure: PathClosure, motion: RigidMotion, nearby: Sequence[Nearby]) -> MotionChange:
     """Derivatives of the motion of closed loops by a parameter, exact but for rounding.
 
     F(x, s) = 0 gives dx = -F_x^-1 F_s for positions, then for velocities, the basis and the accelerations, in each of

@@ -19,11 +19,11 @@ from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Problem, empty_samples
 from paraflex.kernel.krylov import make_krylov
 from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
+from paraflex.kernel.rounding import History, make_history, sample_energies, solve_steps_to_rounding
 from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
-from paraflex.kernel.settle import History, make_history, sample_energies, settle_steps
+from paraflex.kernel.sensitivity import make_piece, sensitivity_steps
+from paraflex.kernel.sensitivity_samples import PLACES, STEP, Sensitivity, make_sensitivity
 from paraflex.kernel.tangent import make_tangent
-from paraflex.kernel.variation import make_piece, vary_steps
-from paraflex.kernel.variation_samples import PLACES, STEP, Variation, make_variation
 
 # Steps that are held at once.
 _CHUNK = 256
@@ -84,7 +84,7 @@ class RunDerivatives:
     derivatives : Motion
     steps : int
         Accepted ones.
-    unsettled : float
+    residual : float
         Largest last correction of any stage's equations, as a part of what it corrected: what they are solved to.
     """
 
@@ -92,7 +92,7 @@ class RunDerivatives:
     motion: Motion
     derivatives: Motion
     steps: int
-    unsettled: float
+    residual: float
 
 
 def check_differentiable(options: IntegrationOptions) -> None:
@@ -159,7 +159,7 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
         if derivatives
         else Motion(*empty),
         steps=int(run.state.counts[STEPS]),
-        unsettled=varied.unsettled,
+        residual=varied.residual,
     )
 
 
@@ -226,7 +226,7 @@ class _Varied:
     """A run solved to rounding, and its derivatives, as far as they have come."""
 
     def __init__(self, problem: Problem, run: NativeRun, directions: Sequence[Direction]) -> None:
-        self.problem, self.run, self.directions, self.unsettled = problem, run, directions, 0.0
+        self.problem, self.run, self.directions, self.residual = problem, run, directions, 0.0
         system, initial, stages = problem.system, problem.initial, run.scheme.c.size
         self.march = make_march(system.n, system.m, stages, len(system.mechanism.motors))
         self.march.q[:], self.march.v[:] = initial.q, initial.v
@@ -239,7 +239,7 @@ class _Varied:
         ]
         self.pieces = tuple(make_piece(problem.signals) for _ in PLACES)
         self.variations = [
-            make_variation(_CHUNK, stages, system.n, system.m, problem.times, np.ascontiguousarray(direction.times))
+            make_sensitivity(_CHUNK, stages, system.n, system.m, problem.times, np.ascontiguousarray(direction.times))
             for direction in directions
         ]
         gains = np.array([run.controls.alpha, run.controls.beta])
@@ -265,16 +265,18 @@ class _Varied:
         run, system = self.run, self.problem.system
         arguments = (run.scheme, run.controls, chunk.count, chunk.history)
         room = (self.tangent, self.space)
-        settle_steps(system.packed, chunk.signals, *arguments, self.march, *room, self.workspace, self.samples)
+        solve_steps_to_rounding(
+            system.packed, chunk.signals, *arguments, self.march, *room, self.workspace, self.samples
+        )
         self._check(chunk, chunk.history.left)
         torques = self.march.torques
         for y, direction, moved in zip(self.variations, self.directions, self.moved, strict=True):
             self._vary_times(chunk, y, direction)
             rest = (*arguments, y, *room, torques, self.workspace)
-            vary_steps(system.packed, chunk.signals, *moved, self.pieces, *rest)
+            sensitivity_steps(system.packed, chunk.signals, *moved, self.pieces, *rest)
             self._check(chunk, y.left)
 
-    def _vary_times(self, chunk: _Chunk, y: Variation, direction: Direction) -> None:
+    def _vary_times(self, chunk: _Chunk, y: Sensitivity, direction: Direction) -> None:
         """Derivatives of when steps begin and of their lengths: they share those of the stops around them."""
         stops = np.concatenate([[self.problem.initial.time], self.problem.stops])
         change = np.concatenate([[0.0], direction.stops])
@@ -286,8 +288,8 @@ class _Varied:
 
     def _check(self, chunk: _Chunk, left: Array) -> None:
         left = left[: chunk.count]
-        self.unsettled = max(self.unsettled, float(left.max()))
-        if not self.unsettled <= _LARGEST_RESIDUAL:
+        self.residual = max(self.residual, float(left.max()))
+        if not self.residual <= _LARGEST_RESIDUAL:
             worst = int(np.argmax(~(left <= _LARGEST_RESIDUAL)))
             raise IntegrationError(
                 "the equations of a step cannot be solved to rounding, as derivatives need,",
@@ -302,5 +304,5 @@ def _moved(record, change: Array) -> tuple:
     return tuple(with_numbers(record, numbers + place * STEP * change) for place in PLACES)
 
 
-def _motion(y: Variation) -> Motion:
+def _motion(y: Sensitivity) -> Motion:
     return Motion(y.sample_q, y.sample_v, y.sample_a, y.sample_lam, y.sample_work)

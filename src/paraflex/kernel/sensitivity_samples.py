@@ -17,7 +17,7 @@ PLACES, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, 
 
 
 @by_reference
-class Variation(NamedTuple):
+class Sensitivity(NamedTuple):
     """Derivatives of the motion by one parameter: what it moves, where the motion stands, and samples."""
 
     t: NDArray[np.float64]  # (steps,) of when steps begin
@@ -45,12 +45,12 @@ class Variation(NamedTuple):
     sample_work: NDArray[np.float64]  # (times,) without that of weight
 
 
-def make_variation(
+def make_sensitivity(
     steps: int, stages: int, n: int, m: int, times: NDArray[np.float64], sample_times: NDArray[np.float64]
-) -> Variation:
+) -> Sensitivity:
     """Room for the derivatives by one parameter; zero."""
     k = times.size
-    return Variation(
+    return Sensitivity(
         t=apart(steps),
         h=apart(steps),
         gains=apart((4, 2)),
@@ -78,17 +78,17 @@ def make_variation(
 
 
 @routine
-def vary_step_work(tableau, k, x, y):
+def work_sensitivity(tableau, k, history, sensitivity):
     """Work of the motors in step k, and its derivative."""
     last, work, d_work = tableau.c.size - 1, 0.0, 0.0
     for s in range(last + 1):
-        work += x.h[k] * tableau.A[last, s] * x.power[k, s]
-        d_work += tableau.A[last, s] * (x.h[k] * y.power[s] + y.h[k] * x.power[k, s])
+        work += history.h[k] * tableau.A[last, s] * history.power[k, s]
+        d_work += tableau.A[last, s] * (history.h[k] * sensitivity.power[s] + sensitivity.h[k] * history.power[k, s])
     return work, d_work
 
 
 @routine
-def vary_multipliers(tableau, k, fraction, d_fraction, x, y, out):
+def multiplier_sensitivity(tableau, k, fraction, d_fraction, history, sensitivity, out):
     """Derivative of the multipliers at a fraction of step k that moves itself: see `march.interpolate_multipliers`."""
     fill(out, 0.0)
     for s in tableau.nodes:
@@ -105,45 +105,63 @@ def vary_multipliers(tableau, k, fraction, d_fraction, x, y, out):
                         product *= (fraction - tableau.c[l]) / (tableau.c[s] - tableau.c[l])
                 slope += product
         for r in range(out.size):
-            out[r] += weight * y.lam[s, r] + slope * d_fraction * x.lam[k, s, r]
+            out[r] += weight * sensitivity.lam[s, r] + slope * d_fraction * history.lam[k, s, r]
 
 
 @routine
-def vary_samples(tableau, k, x, y):
+def sensitivity_at_samples(tableau, k, history, sensitivity):
     """Derivatives at every sample time within step k: those of what `march.write_samples` finds."""
-    t, h, last = x.t[k], x.h[k], tableau.c.size - 1
-    piece, i = 0, y.taken[0]
-    while i < y.times.size and y.times[i] <= t + h * (1.0 + 1e-12):
-        time, d_time = y.times[i], y.sample_times[i] - y.t[k]
+    t, h, last = history.t[k], history.h[k], tableau.c.size - 1
+    piece, i = 0, sensitivity.taken[0]
+    while i < sensitivity.times.size and sensitivity.times[i] <= t + h * (1.0 + 1e-12):
+        time, d_time = sensitivity.times[i], sensitivity.sample_times[i] - sensitivity.t[k]
         while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
             piece += 1
         s0, s1 = tableau.dense[piece], tableau.dense[piece + 1]
-        width, d_width = (tableau.c[s1] - tableau.c[s0]) * h, (tableau.c[s1] - tableau.c[s0]) * y.h[k]
+        width, d_width = (tableau.c[s1] - tableau.c[s0]) * h, (tableau.c[s1] - tableau.c[s0]) * sensitivity.h[k]
         z = min(max((time - t - tableau.c[s0] * h) / width, 0.0), 1.0)
-        d_z = (d_time - tableau.c[s0] * y.h[k] - z * d_width) / width
+        d_z = (d_time - tableau.c[s0] * sensitivity.h[k] - z * d_width) / width
         shifts = d_z != 0.0 or d_width != 0.0
-        for j in range(y.q.shape[1]):
-            y.sample_q[i, j], y.sample_v[i, j], y.sample_a[i, j] = interpolate(
-                y.q[s0, j], y.v[s0, j], y.a[s0, j], y.q[s1, j], y.v[s1, j], y.a[s1, j], width, z
+        for j in range(sensitivity.q.shape[1]):
+            sensitivity.sample_q[i, j], sensitivity.sample_v[i, j], sensitivity.sample_a[i, j] = interpolate(
+                sensitivity.q[s0, j],
+                sensitivity.v[s0, j],
+                sensitivity.a[s0, j],
+                sensitivity.q[s1, j],
+                sensitivity.v[s1, j],
+                sensitivity.a[s1, j],
+                width,
+                z,
             )
             if shifts:
                 for e in range(4):
                     q, v, a = interpolate(
-                        x.q[k, s0, j], x.v[k, s0, j], x.a[k, s0, j], x.q[k, s1, j], x.v[k, s1, j], x.a[k, s1, j],
+                        history.q[k, s0, j], history.v[k, s0, j], history.a[k, s0, j],
+                        history.q[k, s1, j], history.v[k, s1, j], history.a[k, s1, j],
                         width + PLACES[e] * STEP * d_width, z + PLACES[e] * STEP * d_z,
                     )  # fmt: skip
-                    y.sample_q[i, j] += WEIGHTS[e] * q / STEP
-                    y.sample_v[i, j] += WEIGHTS[e] * v / STEP
-                    y.sample_a[i, j] += WEIGHTS[e] * a / STEP
-        vary_multipliers(tableau, k, (time - t) / h, (d_time - (time - t) / h * y.h[k]) / h, x, y, y.sample_lam[i])
-        work, d_work = vary_step_work(tableau, k, x, y)
+                    sensitivity.sample_q[i, j] += WEIGHTS[e] * q / STEP
+                    sensitivity.sample_v[i, j] += WEIGHTS[e] * v / STEP
+                    sensitivity.sample_a[i, j] += WEIGHTS[e] * a / STEP
+        multiplier_sensitivity(
+            tableau,
+            k,
+            (time - t) / h,
+            (d_time - (time - t) / h * sensitivity.h[k]) / h,
+            history,
+            sensitivity,
+            sensitivity.sample_lam[i],
+        )
+        work, d_work = work_sensitivity(tableau, k, history, sensitivity)
         done = min(max((time - t) / h, 0.0), 1.0)
-        d_done, left = (d_time - done * y.h[k]) / h, 1.0 - done
-        first, end = x.power[k, 0], x.power[k, last]
-        y.sample_work[i] = y.work[1] + done * done * (3.0 - 2.0 * done) * d_work + 6.0 * done * left * d_done * work
+        d_done, left = (d_time - done * sensitivity.h[k]) / h, 1.0 - done
+        first, end = history.power[k, 0], history.power[k, last]
+        sensitivity.sample_work[i] = (
+            sensitivity.work[1] + done * done * (3.0 - 2.0 * done) * d_work + 6.0 * done * left * d_done * work
+        )
         bend = done * left * (left * first - done * end)
         d_bend = (left - done) * (left * first - done * end) - done * left * (first + end)
-        y.sample_work[i] += y.h[k] * bend + h * d_done * d_bend
-        y.sample_work[i] += h * done * left * (left * y.power[0] - done * y.power[last])
+        sensitivity.sample_work[i] += sensitivity.h[k] * bend + h * d_done * d_bend
+        sensitivity.sample_work[i] += h * done * left * (left * sensitivity.power[0] - done * sensitivity.power[last])
         i += 1
-    y.taken[0] = i
+    sensitivity.taken[0] = i

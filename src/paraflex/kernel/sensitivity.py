@@ -1,0 +1,271 @@
+"""Derivatives of a run by its parameters: its steps solved to rounding, and the linear equations of each stage.
+
+With the steps of a run as they are, the stages of a scheme are smooth functions of whatever the equations hold. Along
+a parameter s stage i of a step changes by
+
+    dv_i = dv_n + sum_j A_ij (h da_j + dh a_j),  dq_i = dq_n + sum_j A_ij (h dv_j + dh v_j)
+    R_q dq_i + R_v dv_i + R_a da_i + R_lambda dlambda_i + R_s = 0
+
+where R are the residuals of `kernel.stage.equations`. The first four terms are those of `kernel.tangent`, exact. R_s is
+what the residuals change by where the motion does not: they are polynomials of low degree in the numbers of a packed
+system, in signals and weights, so that a central difference over four places is exact but for rounding. Equations are
+solved with the iteration matrix of a run, turned to where each stage stands, until nothing is left but rounding.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paraflex.kernel.arrays import add, apart, copy, fill
+from paraflex.kernel.compiling import inlined, releases_lock, routine
+from paraflex.kernel.constraints import note_friction
+from paraflex.kernel.krylov import exact_correction
+from paraflex.kernel.linear import right_hand_side, solve_system
+from paraflex.kernel.packed import Signals
+from paraflex.kernel.rounding import (
+    MOST_CORRECTIONS,
+    MOST_EXACT,
+    baumgarte_weights,
+    ended,
+    multiplier_unit,
+    prepare_matrix,
+    relative,
+)
+from paraflex.kernel.sensitivity_samples import PLACES, STEP, WEIGHTS, sensitivity_at_samples, work_sensitivity
+from paraflex.kernel.signals import piece_at
+from paraflex.kernel.stage import equations, note_torques
+from paraflex.kernel.step import input_power
+from paraflex.kernel.tangent import note_slopes, residual_tangent
+
+
+def make_piece(signals: Signals) -> Signals:
+    """Room for one piece of every signal."""
+    count = signals.start.size - 1
+    return Signals(2 * np.arange(count + 1), apart(2 * count), apart((2 * count, signals.coefficients.shape[1])))
+
+
+@routine
+def take_pieces(signals, t, moved, pieces):
+    """The piece of every signal at a time alone, from moved signals: near a break no place may see the next piece."""
+    for k in range(signals.start.size - 1):
+        at = piece_at(signals, k, t)
+        for e in range(4):
+            pieces[e].breaks[2 * k] = moved[e].breaks[at]
+            copy(moved[e].coefficients[at], pieces[e].coefficients[2 * k])
+
+
+@inlined
+def gather_residual(system, signals, t, weights, q, v, a, lam, torques, share, sensitivity, work):
+    """Add a share of the residuals of a moved system to R_s."""
+    equations(system, signals, t, weights, q, v, a, lam, torques, work)
+    for j in range(sensitivity.f.size):
+        sensitivity.f[j] += share * work.f[j]
+    for r in range(sensitivity.rows.size):
+        sensitivity.rows[r] += share * work.rows[r]
+
+
+@routine
+def find_parametric(moved, signals, times, weights, q, v, a, lam, torques, sensitivity, work):
+    """R_s of a stage: by four moved systems, signals, times and weights."""
+    fill(sensitivity.f, 0.0)
+    fill(sensitivity.rows, 0.0)
+    p0, p1, p2, p3 = moved
+    s0, s1, s2, s3 = signals
+    # From the outside in: what is small first.
+    gather_residual(p0, s0, times[0], weights[0], q, v, a, lam, torques, WEIGHTS[0] / STEP, sensitivity, work)
+    gather_residual(p3, s3, times[3], weights[3], q, v, a, lam, torques, WEIGHTS[3] / STEP, sensitivity, work)
+    gather_residual(p1, s1, times[1], weights[1], q, v, a, lam, torques, WEIGHTS[1] / STEP, sensitivity, work)
+    gather_residual(p2, s2, times[2], weights[2], q, v, a, lam, torques, WEIGHTS[2] / STEP, sensitivity, work)
+
+
+@routine
+def respond_to_parameter(
+    system, g, b, weights, dependent_part, q, v, a, lam, least, i, torques, sensitivity, direction, space, work
+):
+    """Solve the linear equations of a stage for y.a[i] and y.lam[i]; the last relative correction.
+
+    y.q[i] and y.v[i] hold what they are without the stage's own y.a, and then all.
+    """
+    scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
+    da, dlam = sensitivity.a[i], sensitivity.lam[i]
+    prepare_matrix(system, b, q, v, a, lam, dependent_part, work)
+    note_slopes(system, q, v, work.mu, work.compliance, direction)
+    change, previous = 0.0, 0.0
+    for iteration in range(MOST_CORRECTIONS + MOST_EXACT):
+        if iteration == MOST_CORRECTIONS:
+            fill(da, 0.0)
+            fill(dlam, 0.0)
+        for j in range(da.size):
+            direction.q[j] = sensitivity.q[i, j] + b * da[j]
+            direction.v[j] = sensitivity.v[i, j] + g * da[j]
+            direction.a[j] = da[j]
+        copy(dlam, direction.lam)
+        residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, 0, system.bodies.size, direction)
+        for j in range(da.size):
+            work.f[j] = direction.f[j] + sensitivity.f[j]
+        for r in range(dlam.size):
+            work.rows[r] = direction.rows[r] + sensitivity.rows[r]
+        right_hand_side(system, work, scale)
+        solve_system(system, work, work.x, work.mu)
+        if iteration >= MOST_CORRECTIONS:
+            exact_correction(
+                system, g, b, weights, q, v, a, lam, torques, multiplier_unit(least), direction, space, work
+            )
+        add(work.x, da)
+        add(work.mu, dlam)
+        change = relative(work.x, work.mu, da, dlam, least[0], least[1])
+        if ended(change, previous, iteration):
+            break
+        previous = change
+    for j in range(da.size):
+        sensitivity.q[i, j] += b * da[j]
+        sensitivity.v[i, j] += g * da[j]
+    return change
+
+
+@inlined
+def moved_power(system, signals, t, place, i, q, v, lam, torques, sensitivity, work):
+    """Power of the motors and all else at one place of the difference."""
+    for j in range(q.size):
+        sensitivity.moved_q[j] = q[j] + place * STEP * sensitivity.q[i, j]
+        sensitivity.moved_v[j] = v[j] + place * STEP * sensitivity.v[i, j]
+    for r in range(lam.size):
+        sensitivity.moved_lam[r] = lam[r] + place * STEP * sensitivity.lam[i, r]
+    note_torques(signals, t, torques)
+    return input_power(
+        system, signals, t, sensitivity.moved_q, sensitivity.moved_v, sensitivity.moved_lam, torques, work
+    )
+
+
+@routine
+def power_sensitivity(moved, signals, times, i, q, v, lam, torques, sensitivity, work):
+    """Derivative of the power at stage i."""
+    p0, p1, p2, p3 = moved
+    s0, s1, s2, s3 = signals
+    total = WEIGHTS[0] * moved_power(p0, s0, times[0], PLACES[0], i, q, v, lam, torques, sensitivity, work)
+    total += WEIGHTS[3] * moved_power(p3, s3, times[3], PLACES[3], i, q, v, lam, torques, sensitivity, work)
+    total += WEIGHTS[1] * moved_power(p1, s1, times[1], PLACES[1], i, q, v, lam, torques, sensitivity, work)
+    total += WEIGHTS[2] * moved_power(p2, s2, times[2], PLACES[2], i, q, v, lam, torques, sensitivity, work)
+    sensitivity.power[i] = total / STEP
+
+
+@releases_lock
+def sensitivity_steps(
+    system,
+    signals,
+    moved,
+    moved_signals,
+    pieces,
+    tableau,
+    controls,
+    count,
+    history,
+    sensitivity,
+    direction,
+    space,
+    torques,
+    ws,
+):
+    """Derivatives of the motion by one parameter over the first `count` steps of a history.
+
+    Parameters
+    ----------
+    moved, moved_signals : tuples of 4
+        The packed system and the signals at the PLACES times STEP of the parameter.
+    pieces : tuple of 4 Signals
+        Scratch, from `make_piece`.
+    history : History
+        After `solve_steps_to_rounding`.
+    sensitivity : Sensitivity
+        Where the last steps left it: y.q[0] and y.v[0] and, unless the first step restarts, y.a[0] and y.lam[0].
+    direction : Tangent
+    """
+    last = tableau.c.size - 1
+    # Another parameter left its factor.
+    ws.step[0] = -1.0
+    for k in range(count):
+        h, sensitivity.left[k] = history.h[k], 0.0
+        dt, dh = sensitivity.t[k], sensitivity.h[k]
+        for i in range(0 if history.restart[k] != 0 else 1, last + 1):
+            length = h if i > 0 else 0.0
+            t, d_t = history.t[k] + tableau.c[i] * length, dt + (tableau.c[i] * dh if i > 0 else 0.0)
+            g = tableau.A[i, i] * length
+            if i > 0:
+                start_sensitivity(tableau, i, k, g, history, sensitivity)
+                copy(sensitivity.a[i - 1], sensitivity.a[i])
+                copy(sensitivity.lam[i - 1], sensitivity.lam[i])
+            times = (
+                t + PLACES[0] * STEP * d_t, t + PLACES[1] * STEP * d_t,
+                t + PLACES[2] * STEP * d_t, t + PLACES[3] * STEP * d_t,
+            )  # fmt: skip
+            d_length = dh if i > 0 else 0.0
+            weights = (
+                baumgarte_weights(
+                    controls, sensitivity.gains[0, 0], sensitivity.gains[0, 1], length + PLACES[0] * STEP * d_length
+                ),
+                baumgarte_weights(
+                    controls, sensitivity.gains[1, 0], sensitivity.gains[1, 1], length + PLACES[1] * STEP * d_length
+                ),
+                baumgarte_weights(
+                    controls, sensitivity.gains[2, 0], sensitivity.gains[2, 1], length + PLACES[2] * STEP * d_length
+                ),
+                baumgarte_weights(
+                    controls, sensitivity.gains[3, 0], sensitivity.gains[3, 1], length + PLACES[3] * STEP * d_length
+                ),
+            )
+            q, v, a, lam = history.q[k, i], history.v[k, i], history.a[k, i], history.lam[k, i]
+            note_friction(system, q, v, ws.mu, ws.compliance)
+            take_pieces(signals, t, moved_signals, pieces)
+            find_parametric(moved, pieces, times, weights, q, v, a, lam, torques, sensitivity, ws)
+            note_torques(signals, t, torques)
+            here = baumgarte_weights(controls, controls.alpha, controls.beta, length)
+            left = respond_to_parameter(
+                system,
+                g,
+                g * g,
+                here,
+                controls.dependent_part,
+                q,
+                v,
+                a,
+                lam,
+                history.least,
+                i,
+                torques,
+                sensitivity,
+                direction,
+                space,
+                ws,
+            )
+            sensitivity.left[k] = max(sensitivity.left[k], left)
+            power_sensitivity(moved, pieces, times, i, q, v, lam, torques, sensitivity, ws)
+        if sensitivity.taken[0] == 0 and sensitivity.times[0] <= history.t[k]:
+            copy(sensitivity.q[0], sensitivity.sample_q[0])
+            copy(sensitivity.v[0], sensitivity.sample_v[0])
+            copy(sensitivity.a[0], sensitivity.sample_a[0])
+            copy(sensitivity.lam[0], sensitivity.sample_lam[0])
+            sensitivity.taken[0] = 1
+        sensitivity_at_samples(tableau, k, history, sensitivity)
+        work, d_work = work_sensitivity(tableau, k, history, sensitivity)
+        sensitivity.work[0] += work
+        sensitivity.work[1] += d_work
+        copy(sensitivity.q[last], sensitivity.q[0])
+        copy(sensitivity.v[last], sensitivity.v[0])
+        copy(sensitivity.a[last], sensitivity.a[0])
+        copy(sensitivity.lam[last], sensitivity.lam[0])
+        sensitivity.power[0] = sensitivity.power[last]
+
+
+@routine
+def start_sensitivity(tableau, i, k, g, history, sensitivity):
+    """What y.q[i] and y.v[i] are without the stage's own accelerations: the derivative of `step.stage_start`."""
+    h, dh = history.h[k], sensitivity.h[k]
+    for j in range(sensitivity.q.shape[1]):
+        dv, dq = sensitivity.v[0, j], sensitivity.q[0, j]
+        for s in range(i):
+            dv += tableau.A[i, s] * (h * sensitivity.a[s, j] + dh * history.a[k, s, j])
+            dq += tableau.A[i, s] * (h * sensitivity.v[s, j] + dh * history.v[k, s, j])
+        dv += tableau.A[i, i] * dh * history.a[k, i, j]
+        dq += tableau.A[i, i] * dh * history.v[k, i, j]
+        sensitivity.v[i, j] = dv
+        sensitivity.q[i, j] = dq + g * dv

@@ -1,0 +1,57 @@
+"""Gears: one joint's coordinate follows another's in a constant ratio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from paraflex.arguments import CheckedFields
+from paraflex.mechanism.quantities import AT_JOINT, finite, not_zero, said
+
+
+@dataclass(frozen=True)
+class Gear(CheckedFields):
+    """The coordinate of the second joint is ratio times that of the first, plus phase.
+
+    Of two wheels with fixed centres the ratio is -r1/r2 where they mesh outside, r1/r2 where one lies within the other,
+    or where a belt or a chain joins them. A joint that slides has a travel: of a pinion and its rack the ratio is the
+    pinion's radius [m/rad]. Angles count turns. Like a motor a gear acts on the material at the joints, by torques
+    about them (a force along the axis where a joint slides); what teeth press on the bearings besides is not in it.
+
+    Attributes
+    ----------
+    name : str
+    first_joint, second_joint : str
+        Their coordinates are those of body b against body a, slopes of beams included.
+    ratio : float
+        By the kinds of the joints without unit, in m/rad or in rad/m.
+    phase : float, optional
+        Coordinate of the second joint where that of the first is zero [rad or m]. By default as the first assembly
+        stands; a mechanism has the number.
+    """
+
+    _table = "gear"
+
+    name: str
+    first_joint: str = field(metadata=AT_JOINT)
+    second_joint: str = field(metadata=AT_JOINT)
+    ratio: float = field(
+        metadata=said(
+            "the second joint's angle by the first's, negative where wheels mesh outside; of a rack the radius of its "
+            "pinion",
+            not_zero,
+            "as the second joint's angle or travel by the first's",
+        )
+    )
+    phase: float | None = field(
+        default=None,
+        metadata=said(
+            "the coordinate of the second joint where that of the first is zero in rad, or m; by default as the first "
+            "assembly stands",
+            finite,
+        ),
+    )
+
+    @property
+    def joints(self) -> tuple[str, str]:
+        """Names of the two, the first first."""
+        return self.first_joint, self.second_joint
