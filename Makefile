@@ -15,8 +15,11 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check src tests benchmarks examples docs/hooks docs/notebooks
 	$(BIN)/ruff check src tests benchmarks examples docs/hooks docs/notebooks
 
+# The second looks at the installed package as those who import it do: every public name has a type.
 types: $(VENV)/.dev
 	$(BIN)/pyright
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/pyright --verifytypes paraflex --ignoreexternal >$(VENV)/.types \
+		|| { cat $(VENV)/.types; exit 1; }
 
 imports: $(VENV)/.dev
 	$(BIN)/lint-imports

@@ -22,6 +22,7 @@ import documented  # noqa: E402
         ("first-mechanism.md", 7),
         ("modes.md", 3),
         ("index.md", 2),
+        ("interface.md", 3),
         ("validity.md", 1),
         ("findings.md", 2),
     ],
@@ -146,6 +147,23 @@ def test_every_public_name_stands_on_one_page():
             assert _origin(package, name) in origins, (package, name)
     index = pages["reference/api/index.md"]
     assert all(f"`pf.{name}`" in index for name in paraflex.__all__)
+
+
+def test_the_page_of_the_interface_has_the_public_names_in_their_groups_and_no_others():
+    import paraflex
+
+    stub = (ROOT / "src" / "paraflex" / "__init__.pyi").read_text(encoding="utf-8")
+    page = (DOCS / "interface.md").read_text(encoding="utf-8")
+    listed, shown = {}, {}
+    for group, text in re.findall(r"^# (.*)\n((?:(?!# ).*\n)+)", stub, re.MULTILINE):
+        listed[group.split(":")[0]] = sorted(re.findall(r"(\w+) as \1", text))
+    for title, text in re.findall(r"^##? (.*)\n((?:(?!##? ).*\n)+)", page, re.MULTILINE):
+        for rows in re.findall(r"^\| Name \| \|\n.*\n((?:\|.*\n)+)", text, re.MULTILINE):
+            shown[title] = sorted(re.findall(r"`(\w+)`", " ".join(row.split("|")[1] for row in rows.splitlines())))
+    assert list(shown.values()) == list(listed.values())
+    assert list(shown)[1:] == list(listed)[1:]
+    assert sorted(name for names in shown.values() for name in names) == sorted(paraflex.__all__)
+    assert set(re.findall(r"\bpf\.(\w+)", page)) <= set(paraflex.__all__)
 
 
 class _Config:

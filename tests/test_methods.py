@@ -1,6 +1,5 @@
 """Our own methods on a stiff flexible mechanism with a loop: orders, treatments of constraints, steps, bad input."""
 
-import importlib.util
 import pickle
 import sys
 from dataclasses import replace
@@ -18,12 +17,9 @@ from paraflex.mechanism import Geometry
 from paraflex.studies import tracking_case
 from paraflex.tracking import plan_tracking
 
-_SPEC = importlib.util.spec_from_file_location("orders", Path(__file__).parents[1] / "benchmarks" / "orders.py")
-assert _SPEC is not None
-assert _SPEC.loader is not None
-study = importlib.util.module_from_spec(_SPEC)
-sys.modules["orders"] = study
-_SPEC.loader.exec_module(study)
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+
+import orders as study
 
 NATIVE = [name for name, method in METHODS.items() if method.family in (Family.ESDIRK, Family.NEWMARK)]
 ESDIRK = [name for name in NATIVE if METHODS[name].family is Family.ESDIRK]

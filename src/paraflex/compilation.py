@@ -127,8 +127,8 @@ if __name__ == "__main__":
         LOG.setLevel(logging.ERROR)
         # Nothing that compiling makes is garbage before the end.
         gc.disable()
-        for given in sys.argv[1:]:
-            name, part = given.split(":")
-            _PARTS[part](Geometry(name))
+        for _given in sys.argv[1:]:
+            _name, _part = _given.split(":")
+            _PARTS[_part](Geometry(_name))
     else:
         compile_all_kernels()

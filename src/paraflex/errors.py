@@ -44,7 +44,11 @@ class InputError(ParaflexError, ValueError):
     """
 
     def __init__(self, problem: str, *, field: str, value: object = None, remedy: str = "", source: str = "") -> None:
-        self.problem, self.field, self.value, self.remedy, self.source = problem, field, value, remedy, source
+        self.problem = problem
+        self.field = field
+        self.value = value
+        self.remedy = remedy
+        self.source = source
         super().__init__(self._text())
 
     def _text(self) -> str:
@@ -160,7 +164,10 @@ class NumericalError(ParaflexError, ArithmeticError):
     """
 
     def __init__(self, cause: str, moment: Moment | None = None, partial: Any = None, remedy: str = "") -> None:
-        self.cause, self.moment, self.partial, self.remedy = cause, moment, partial, remedy
+        self.cause = cause
+        self.moment = moment
+        self.partial = partial
+        self.remedy = remedy
         super().__init__(cause)
 
     @property
@@ -199,7 +206,9 @@ class UnreachablePathError(AssemblyError):
         shortfall_angle: float = 0.0,
     ) -> None:
         super().__init__(cause, moment, partial, remedy)
-        self.detail, self.shortfall, self.shortfall_angle = detail, shortfall, shortfall_angle
+        self.detail = detail
+        self.shortfall = shortfall
+        self.shortfall_angle = shortfall_angle
 
     @property
     def problem(self) -> str:

@@ -79,7 +79,7 @@ class Engine:
         """How many tasks run at once."""
         return self._workers
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Call a function with arguments elsewhere."""
         return self._pool.submit(function, *arguments)
 
@@ -101,7 +101,7 @@ class Threads(Engine):
         self._switching = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH)
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """See `Engine`; the function is given what it tells the time reached, too."""
         return super().submit(function, *arguments, self._watch)
 
@@ -289,11 +289,11 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Future:
+def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Future[Any]:
     try:
         return engine.submit(function, task)
     except BrokenExecutor as error:
-        broken: Future = Future()
+        broken: Future[Any] = Future()
         broken.set_exception(error)
         return broken
 

@@ -16,7 +16,7 @@ from paraflex.cli.commands.requests import with_options
 from paraflex.cli.commands.shell import COMMANDS
 from paraflex.errors import InputError, ParaflexError
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     name="paraflex",
     help="Rigid-flexible dynamics of planar mechanisms with closed loops and several actuation modes.",
     no_args_is_help=True,

@@ -28,9 +28,8 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
 from paraflex.fem.eigen import eigenpairs
 from paraflex.mechanism import GROUND, Damping, Joint, Mechanism, PointRef, RigidBody, stiffness_proportional
@@ -65,7 +64,7 @@ def damping_matrix(
     return _without_rounding(_by_modes(described.damping, squares, *_held_modes(body, held)))
 
 
-def _by_modes(damping: Damping, squares: NDArray, omega: NDArray, modes: NDArray) -> NDArray:
+def _by_modes(damping: Damping, squares: Numbers, omega: Numbers, modes: Numbers) -> Numbers:
     """D of modes (nf, k) with these frequencies, in coordinates with stiffness diag(squares)."""
     lost = damping.coefficients(omega) / omega**2
     forces = squares[:, None] * modes / omega
@@ -73,7 +72,7 @@ def _by_modes(damping: Damping, squares: NDArray, omega: NDArray, modes: NDArray
     return (forces * (lost - rest)) @ forces.T + np.diag(rest * squares)
 
 
-def _without_rounding(matrix: NDArray) -> NDArray:
+def _without_rounding(matrix: Numbers) -> Numbers:
     """The matrix symmetric, with zeros for off-diagonal entries that are rounding."""
     sizes = np.sqrt(np.abs(np.real(np.diag(matrix))))
     small = np.abs(np.real(matrix)) <= _ROUNDING * np.outer(sizes, sizes)
@@ -81,7 +80,7 @@ def _without_rounding(matrix: NDArray) -> NDArray:
     return np.where(small, 0.0, 0.5 * (matrix + matrix.T))
 
 
-def _held_modes(body: BodyCoordinates, held: NDArray) -> tuple[NDArray, NDArray]:
+def _held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]:
     """Frequencies (k,) and flexible part (nf, k) of the mass-normalised elastic modes of a body held by conditions.
 
     `held` has a row a condition on its coordinates (r, phi, u), which are zero together.
@@ -101,7 +100,7 @@ def _held_modes(body: BodyCoordinates, held: NDArray) -> tuple[NDArray, NDArray]
     return np.sqrt(values[rigid:]), (basis @ vectors[:, rigid:])[3:]
 
 
-def _null_space(rows: NDArray) -> tuple[NDArray, int]:
+def _null_space(rows: Numbers) -> tuple[Numbers, int]:
     """Columns that span the null space of conditions on (r, phi, u), and how many rigid motions are in it."""
     n = rows.shape[1]
     if not rows.size:
@@ -119,7 +118,7 @@ def _null_space(rows: NDArray) -> tuple[NDArray, int]:
 
 def _conditions(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
-) -> Iterator[NDArray]:
+) -> Iterator[Numbers]:
     """Rows on (r, phi, u) of the undeformed body that its joints hold at zero: see the module."""
     pinned: list[Marker] = []
     across: list[Marker] = []
@@ -154,11 +153,11 @@ def _along_itself(joint: Joint, here: PointRef) -> bool:
     return joint.slides and "angle" not in joint.holds and here is joint.a
 
 
-def _place(marker: Marker) -> NDArray:
+def _place(marker: Marker) -> Numbers:
     """Derivative of a marker's place in the undeformed body by (r, phi, u), (2, 3 + nf)."""
     x, y = marker.x0
     return np.hstack([np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]), marker.N])
 
 
-def _slope(marker: Marker) -> NDArray:
+def _slope(marker: Marker) -> Numbers:
     return np.concatenate([[0.0, 0.0, 1.0], marker.slope])

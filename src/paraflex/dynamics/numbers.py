@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 
-R = TypeVar("R", bound=tuple)
+R = TypeVar("R", bound=tuple[Any, ...])
 
 
-def numbers_of(record: tuple) -> Array:
+def numbers_of(record: tuple[Any, ...]) -> Array:
     """Every floating-point number of a named tuple of arrays, records and numbers, in order: a vector."""
     return np.concatenate([np.zeros(0), *(np.ravel(part) for part in _parts(record))])
 
@@ -27,12 +27,12 @@ def with_numbers(record: R, numbers: Array) -> R:
     return type(record)(*fields)
 
 
-def same_layout(a: tuple, b: tuple) -> bool:
+def same_layout(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
     """Whether two named tuples of a kind differ in nothing but their floating-point numbers."""
     return all(_same(x, y) for x, y in zip(a, b, strict=True))
 
 
-def _parts(record: tuple) -> Iterator[Any]:
+def _parts(record: tuple[Any, ...]) -> Iterator[Any]:
     for field in record:
         if isinstance(field, float | complex):
             yield np.array([field])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -318,7 +319,7 @@ def _mass_records(bodies: tuple[BodyCoordinates, ...]) -> NDArray[np.void]:
     return records(MASS, values)
 
 
-def records(dtype: np.dtype, values: list[dict]) -> NDArray[np.void]:
+def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:
     """Records of dictionaries by field, zero where one has none; complex where a number is."""
     blank = dict.fromkeys(dtype.names or (), 0)
     rows = [tuple((blank | value).values()) for value in values]

@@ -57,7 +57,7 @@ class SingularityMeasure:
             return columns if values.size == columns else 0
         return int(np.sum(values > _DEPENDENT))
 
-    def _values(self, q: Array) -> NDArray:
+    def _values(self, q: Array) -> NDArray[np.floating]:
         rows = self._scaled(q)
         return np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
 

@@ -37,7 +37,7 @@ _POSITION_STIFFNESS, _VELOCITY_STIFFNESS = 1.0, 1e3
 def start_state(
     system: System,
     start: Start,
-    assembly: Assembly | str | None = None,
+    assembly: str | Assembly | None = None,
     *,
     q: Array | None = None,
     time: float = 0.0,

@@ -106,7 +106,7 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
     return q
 
 
-def point_position(system: System, q: Array, ref) -> Array:
+def point_position(system: System, q: Array, ref: PointRef) -> Array:
     """Ground-frame position (2,) of a named point at q [m]."""
     marker = system.marker(ref)
     if ref.on_ground:
@@ -210,7 +210,7 @@ def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Ar
 @checked_arguments()
 def consistent_state(
     system: System,
-    assembly: Assembly | str | None,
+    assembly: str | Assembly | None,
     *,
     deflection: Mapping[str, Array] | None = None,
     velocity: Array | None = None,

@@ -11,7 +11,7 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import greedy_colours, neighbours, tied_bodies, without_stiffness
 from paraflex.dynamics.state import point_position
 from paraflex.dynamics.system import System
-from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING
+from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING, PackedSystem, Signals, Workspace
 from paraflex.kernel.stage import equations
 
 # Differences of fourth order: places and weights, for a step of one.
@@ -28,11 +28,14 @@ class RestingForces:
     """
 
     def __init__(self, system: System, time: float) -> None:
-        self.packed, self.time = without_stiffness(system.packed), time
-        self.signals, self.workspace = moment_signals(system.mechanism, time), system.workspace()
-        self.v, self.a = np.zeros((2, system.n))
-        self.torques = np.zeros(len(system.mechanism.motors))
-        self.springs = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
+        self.packed: PackedSystem = without_stiffness(system.packed)
+        self.time = time
+        self.signals: Signals = moment_signals(system.mechanism, time)
+        self.workspace: Workspace = system.workspace()
+        self.v: Array = np.zeros(system.n)
+        self.a: Array = np.zeros(system.n)
+        self.torques: Array = np.zeros(len(system.mechanism.motors))
+        self.springs: NDArray[np.intp] = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
 
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
         """At coordinates (n,) with multipliers (m,)."""

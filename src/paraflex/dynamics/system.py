@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
@@ -103,14 +102,14 @@ class System:
         """A fresh workspace for the kernels."""
         return make_workspace(self.packed)
 
-    def constraints(self, signals: Signals, t: float, q: NDArray, v: NDArray | None = None) -> tuple[NDArray, NDArray]:
+    def constraints(self, signals: Signals, t: float, q: Array, v: Array | None = None) -> tuple[Array, Array]:
         """Phi and Phi' at (t, q, v), each (m,), at rest without v; zero in the rows of springs."""
         phi, rate = np.zeros(self.m), np.zeros(self.m)
         v = np.zeros(self.n) if v is None else v
         constraint_values(self.packed, signals, t, q, v, make_scratch(self.packed), phi, rate)
         return phi, rate
 
-    def jacobian(self, q: NDArray) -> Array:
+    def jacobian(self, q: Array) -> Array:
         """Phi_q at q, dense (m, n); zero in the rows of springs."""
         jacobian = np.zeros((self.m, self.n))
         fill_jacobian(self.packed, q, jacobian)

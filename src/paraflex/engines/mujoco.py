@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arrays import Array
@@ -248,7 +247,7 @@ def _control_of(mujoco: Any, control: Any) -> Iterator[list[str]]:
 
 
 def _solution(
-    task: TrackingTask, q: NDArray, v: NDArray, a: NDArray, motion: _JointMotion, count: int, wall_time: float
+    task: TrackingTask, q: Array, v: Array, a: Array, motion: _JointMotion, count: int, wall_time: float
 ) -> Solution:
     system, times = task.system, task.motion.t
     still = constant_signals([0.0] * len(task.mechanism.motors), float(times[-1]))

@@ -13,9 +13,8 @@ from typing import NamedTuple, cast
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
 from paraflex.fem.integrals import ShapeIntegrals, SpanProperties, bar_integrals
 
@@ -179,7 +178,7 @@ def _basis(moving: Array, strains: Array, field: str) -> Array:
     return basis
 
 
-def _triangle(matrix: NDArray) -> NDArray:
+def _triangle(matrix: Numbers) -> Numbers:
     """R of a matrix Q R, of a complex step with its derivative: R^T R = A^T A."""
     R = np.asarray(np.linalg.qr(np.real(matrix), mode="r"))
     if not np.iscomplexobj(matrix):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from paraflex.arrays import Numbers
 from paraflex.errors import InputError
 
 # Two eigenvalues closer than this part of them are one, whose modes have no derivatives if a parameter couples them;
@@ -15,7 +15,7 @@ _ONE, _COUPLED = 1e-9, 1e-9
 _APART = 0.1
 
 
-def eigenpairs(K: NDArray, M: NDArray) -> tuple[NDArray, NDArray]:
+def eigenpairs(K: Numbers, M: Numbers) -> tuple[Numbers, Numbers]:
     """Eigenvalues, ascending, and eigenvectors V of K x = lambda M x, with V^T M V = 1.
 
     Matrices K + i h dK and M + i h dM with a tiny h give values and vectors plus i h times their derivatives.
@@ -41,7 +41,7 @@ def eigenpairs(K: NDArray, M: NDArray) -> tuple[NDArray, NDArray]:
     return values + 1j * d_values, vectors + 1j * d_vectors
 
 
-def eigen_derivatives(values: NDArray, vectors: NDArray, dK: NDArray, dM: NDArray) -> tuple[NDArray, NDArray]:
+def eigen_derivatives(values: Numbers, vectors: Numbers, dK: Numbers, dM: Numbers) -> tuple[Numbers, Numbers]:
     """Derivatives of eigenvalues and of eigenvectors with unit modal mass, by those of the matrices.
 
     dlambda_j = v_j^T (dK - lambda_j dM) v_j and dv_j = sum_i v_i C_ij, where C_ij (lambda_j - lambda_i) is
@@ -70,7 +70,7 @@ def eigen_derivatives(values: NDArray, vectors: NDArray, dK: NDArray, dM: NDArra
     return np.diag(coupling).copy(), vectors @ mixing
 
 
-def _refined(K: NDArray, M: NDArray, values: NDArray, vectors: NDArray) -> tuple[NDArray, NDArray]:
+def _refined(K: Numbers, M: Numbers, values: Numbers, vectors: Numbers) -> tuple[Numbers, Numbers]:
     """One correction of all pairs (Ogita and Aishima 2018): what errs by a part of the stiffest errs by one of its own.
 
     The stiffness of a beam's modes spans many powers of ten, and the error of a dense solver is a part of the largest.

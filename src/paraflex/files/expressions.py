@@ -35,7 +35,8 @@ class ExpressionError(ValueError):
     """What is wrong with an expression, and what to do about it."""
 
     def __init__(self, problem: str, remedy: str) -> None:
-        self.problem, self.remedy = problem, remedy
+        self.problem = problem
+        self.remedy = remedy
         super().__init__(problem)
 
 

@@ -87,7 +87,8 @@ class Jet:
     def __pos__(self) -> Jet:
         return self
 
-    __radd__, __rmul__ = __add__, __mul__
+    __radd__ = __add__
+    __rmul__ = __mul__
 
 
 def exp(x: Jet) -> Jet:

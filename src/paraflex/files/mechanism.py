@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import MISSING, fields
 from typing import Any
 
@@ -27,7 +28,7 @@ from paraflex.mechanism import (
 )
 
 # What paths are called in files.
-PATHS = {"polygon": Polygon, "line": Line, "circle": Circle, "points": PointPath}
+PATHS: dict[str, Callable[..., Path]] = {"polygon": Polygon, "line": Line, "circle": Circle, "points": PointPath}
 
 
 def read_mechanism(table: ModelTable) -> Mechanism:

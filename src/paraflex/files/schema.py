@@ -13,7 +13,7 @@ from enum import Enum
 from functools import reduce
 from operator import or_
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo, create_model
 from pydantic_core import PydanticCustomError
@@ -71,7 +71,7 @@ Rows = Annotated[list[Pair], BeforeValidator(lambda value: value, json_schema_in
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
 
 
 TwoPoints = TwoJoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
@@ -312,7 +312,7 @@ class PrescribedTable(_Table):
 class AssemblyTable(BaseModel):
     """Approximate angles of bodies by name, and places of points from which the other angles follow."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, Number] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
     points: dict[str, Pair] = Field(default={}, description='[x, y] in m for each "body.point"')

@@ -50,7 +50,7 @@ class BeamEnds:
                 raise _off_at_start(function, start.time, start.q)
             else:
                 self._left.append(Leaving(function, start.time))
-        self.functions = tuple(within)
+        self.functions: tuple[EventFunction, ...] = tuple(within)
 
     def pass_over(
         self, crossing: Crossing, functions: Sequence[EventFunction]

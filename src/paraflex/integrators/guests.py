@@ -22,7 +22,7 @@ class Guest(Method):
     """
 
     form = ODE
-    treatments = (Treatment.BAUMGARTE,)
+    treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.BAUMGARTE,)
     error_factor: ClassVar[float] = 0.1
     solver: ClassVar[str]
 
@@ -45,27 +45,37 @@ class SciPyMethod(Guest):
 class RK45(SciPyMethod):
     """The explicit pair of Dormand and Prince."""
 
-    name, title = "rk45", "Runge-Kutta 4(5)"
+    name = "rk45"
+    title = "Runge-Kutta 4(5)"
     source = "Dormand and Prince (1980), through SciPy"
-    solver, places, evaluations = "RK45", 5, 0
+    solver = "RK45"
+    places = 5
+    evaluations = 0
     # The root of |R(iy)| = 1 of its polynomial.
-    stability_limit = 0.997
+    stability_limit: ClassVar[float | None] = 0.997
 
 
 class Radau(SciPyMethod):
     """Radau IIA of order 5."""
 
-    name, title = "radau", "Radau IIA"
+    name = "radau"
+    title = "Radau IIA"
     source = "Hairer and Wanner (1996), IV.8, through SciPy"
-    error_factor, solver, places, evaluations = 5.0, "Radau", 3, 3
+    error_factor: ClassVar[float] = 5.0
+    solver = "Radau"
+    places = 3
+    evaluations = 3
 
 
 class NDF(SciPyMethod):
     """Numerical differentiation formulas of orders 1 to 5, which cannot be held at a lower one."""
 
-    name, title = "ndf", "NDF"
+    name = "ndf"
+    title = "NDF"
     source = "Shampine and Reichelt (1997), SIAM J. Sci. Comput. 18, 1-22, through SciPy"
-    solver, places, evaluations = "BDF", 1, 1
+    solver = "BDF"
+    places = 1
+    evaluations = 1
     multistep = True
 
 
@@ -80,11 +90,14 @@ class SundialsMethod(Guest):
 class Adams(SundialsMethod):
     """Adams-Moulton formulas of CVODE."""
 
-    name, title, order = "adams", "Adams", 12
+    name = "adams"
+    title = "Adams"
+    order = 12
     source = "CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"
-    error_factor, solver = 0.5, "Adams"
+    error_factor: ClassVar[float] = 0.5
+    solver = "Adams"
     # What steps of orders up to 12 come to on RAParM-I; the order follows the frequencies.
-    stability_limit = 0.75
+    stability_limit: ClassVar[float | None] = 0.75
 
     max_order: int = parameter(12, 1, 12, "highest order; up to 2 stiffness limits no step")
 
@@ -98,7 +111,9 @@ class Adams(SundialsMethod):
 class BDF(SundialsMethod):
     """Gear's backward difference formulas, by CVODE."""
 
-    name, title, order = "bdf", "BDF (Gear)", 2
+    name = "bdf"
+    title = "BDF (Gear)"
+    order = 2
     source = "CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"
     solver = "BDF"
 
@@ -110,7 +125,8 @@ class BDF(SundialsMethod):
 class IDA(BDF):
     """Backward difference formulas on the equations as they are, multipliers among the unknowns."""
 
-    name, title = "ida", "IDA"
+    name = "ida"
+    title = "IDA"
     form = INDEX_1
-    treatments = (Treatment.BAUMGARTE, Treatment.GGL)
+    treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.BAUMGARTE, Treatment.GGL)
     source = "IDA, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"

@@ -117,12 +117,12 @@ class _Condensed(NamedTuple):
     rank: NDArray[np.int64]
 
 
-def _inverses(blocks: Sequence[Block], weight: float) -> list[NDArray]:
+def _inverses(blocks: Sequence[Block], weight: float) -> list[NDArray[np.floating]]:
     """A^-1 = (M + b K)^-1 of every block."""
     return [np.linalg.inv(block.mass + weight * block.stiffness) for block in blocks]
 
 
-def _condense(blocks: Sequence[Block], inverses: Sequence[NDArray], C: Array, forces: Array) -> _Condensed:
+def _condense(blocks: Sequence[Block], inverses: Sequence[NDArray[np.floating]], C: Array, forces: Array) -> _Condensed:
     """Factor the Schur complements C A^-1 C^T."""
     k, m, n = C.shape
     load, react, schur, close = np.zeros((k, n)), np.zeros((k, n, m)), np.zeros((k, m, m)), np.zeros((k, m, n))
@@ -154,7 +154,7 @@ def _pseudo_inverses(schur: Array) -> tuple[Array, NDArray[np.int64]]:
     return size[:, :, None] * inverse * size[:, None, :], rank
 
 
-def _regular(matrices: Array) -> NDArray | None:
+def _regular(matrices: Array) -> NDArray[np.floating] | None:
     """Inverses where none is near singular: several times cheaper than eigenvectors."""
     try:
         inverse = np.linalg.inv(matrices)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class NewmarkMethod(NativeMethod):
     family = Family.NEWMARK
     form = INDEX_3
     order = 2
-    treatments = (Treatment.POSITION,)
+    treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.POSITION,)
 
     @property
     @abstractmethod
@@ -83,7 +84,9 @@ class NewmarkMethod(NativeMethod):
 class Newmark(NewmarkMethod):
     """Newmark's method; beta, where it is not given, is the one that damps high frequencies most."""
 
-    name, title, order = "newmark", "Newmark", 1
+    name = "newmark"
+    title = "Newmark"
+    order = 1
     source = "Newmark (1959), J. Eng. Mech. 85, 67-94"
 
     gamma: float = parameter(0.6, 0.5, 1.0, "velocity weight: 1/2 does not damp, above that the order is 1")
@@ -110,8 +113,9 @@ class Newmark(NewmarkMethod):
 class Wilson(NewmarkMethod):
     """Acceleration linear up to theta h, where equilibrium is asked for."""
 
-    name, title = "wilson-theta", "Wilson theta"
-    treatments = (Treatment.PROJECTION,)
+    name = "wilson-theta"
+    title = "Wilson theta"
+    treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.PROJECTION,)
     source = "Wilson, Farhoomand and Bathe (1973), Earthq. Eng. Struct. Dyn. 1, 241-252"
 
     theta: float = parameter(1.42, 1.366025403784439, 2.0, "where equilibrium is asked for")
@@ -126,7 +130,8 @@ class Wilson(NewmarkMethod):
 class HHT(NewmarkMethod):
     """Forces of both ends of the step are mixed by alpha."""
 
-    name, title = "hht-alpha", "HHT alpha"
+    name = "hht-alpha"
+    title = "HHT alpha"
     source = "Hilber, Hughes and Taylor (1977), Earthq. Eng. Struct. Dyn. 5, 283-292"
 
     alpha: float = parameter(-0.1, -1.0 / 3.0, 0.0, "damping of high frequencies, most at -1/3")
@@ -141,7 +146,8 @@ class HHT(NewmarkMethod):
 class GeneralisedAlpha(NewmarkMethod):
     """Forces and accelerations are mixed so that low frequencies are damped least for a given radius."""
 
-    name, title = "generalised-alpha", "Generalised alpha"
+    name = "generalised-alpha"
+    title = "Generalised alpha"
     source = "Chung and Hulbert (1993), J. Appl. Mech. 60, 371-375"
 
     spectral_radius: float = parameter(0.7, 0.0, 1.0, "at infinite frequency: 0 annihilates, 1 keeps")

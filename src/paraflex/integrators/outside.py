@@ -20,7 +20,7 @@ from paraflex.integrators.sundials import CvodeStepper, IdaStepper
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.ode import stored_energy
 from paraflex.kernel.packed import make_scratch
-from paraflex.kernel.run_state import FINISHED, PAUSED
+from paraflex.kernel.run_state import FINISHED, PAUSED, Samples
 
 # With order p errors add up to h^p where a step's is h^(p + 1): multistep methods are held to the tolerance at this
 # one, and to a power (p + 1) / p of it elsewhere [m].
@@ -33,12 +33,13 @@ class OutsideRun:
     """A run by a solver of others: a `Run`."""
 
     def __init__(self, problem: Problem, options: IntegrationOptions, stepper: Stepper) -> None:
-        self.problem, self.samples, self._stepper = problem, empty_samples(problem.times, problem.system), stepper
-        self._options, self._scratch = options, make_scratch(problem.system.packed)
+        self.problem = problem
+        self.samples: Samples = empty_samples(problem.times, problem.system)
+        self._stepper, self._options, self._scratch = stepper, options, make_scratch(problem.system.packed)
         packed, initial = problem.system.packed, problem.initial
-        self.dependent_rows = int(factor_system(packed, 0.0, initial.q, problem.system.workspace()))
-        self.reached, self._steps = 0, 0
-        self._violation, self._balance, self._energy = np.zeros(2), 0.0, np.zeros(3)
+        self.dependent_rows: int = int(factor_system(packed, 0.0, initial.q, problem.system.workspace()))
+        self.reached: int = 0
+        self._steps, self._balance, self._violation, self._energy = 0, 0.0, np.zeros(2), np.zeros(3)
         self._passages: list[tuple[float, float]] = []
         self._instant = Instant(
             initial.time, initial.q, initial.v, np.zeros(problem.system.n), np.zeros(problem.system.m), 0.0

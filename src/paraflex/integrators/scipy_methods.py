@@ -25,7 +25,8 @@ class ScipyStepper:
         # Loaded when one runs.
         self._class = getattr(scipy.integrate, method.solver)
         self._places, self._stages = method.places, method.evaluations
-        self.form, self._tolerances, self._steps = form, tolerances, steps
+        self.form = form
+        self._tolerances, self._steps = tolerances, steps
         self._seen: list[float] = []
         self._past, self._rejected, self._dense = SolverCounts(0, 0, 0, 0), 0, None
 

@@ -49,6 +49,8 @@ class SundialsStepper:
     """What CVODE and IDA have in common: see `Stepper`."""
 
     form: OdeForm
+    t: float
+    y: Array
 
     def __init__(self, tolerances: Array, steps: Steps) -> None:
         self._package = load_sundials()
@@ -115,7 +117,8 @@ class CvodeStepper(SundialsStepper):
 
     def __init__(self, method: Guest, form: OdeForm, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.form, self._method = form, method.solver
+        self.form = form
+        self._method = method.solver
 
     def _create(self, options: dict[str, Any]) -> Any:
         return self._package.cvode.CVODE(self._rates, method=self._method, jacfn=self._jacobian, **options)

@@ -53,8 +53,8 @@ class Kernel:
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         # The cache goes by this name.
         entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
-        self.from_python = compiled(entry, **_OPTIONS, **options)
-        self.inner = routine(function)
+        self.from_python: Any = compiled(entry, **_OPTIONS, **options)
+        self.inner: Any = routine(function)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""

@@ -6,12 +6,16 @@ Numba takes a named tuple apart into its fields, and arrays into seven words eac
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, models, register_model, typeof_impl, unbox
+
+R = TypeVar("R", bound=type)
 
 
 class _Reference(types.Type):
@@ -38,7 +42,7 @@ class _Attributes(AttributeTemplate):
         return typ.fields.get(attr)
 
 
-def by_reference(record):
+def by_reference(record: R) -> R:
     """Let kernels take a named tuple by reference."""
 
     @typeof_impl.register(record)

@@ -228,6 +228,9 @@ def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
 class PathClosure:
     """The rigid system with its task marker: what closes its loops."""
 
+    packed: PackedSystem
+    marker: int
+
     def __init__(self, mechanism: Mechanism, orientation: float, end: float) -> None:
         effector = mechanism.end_effector
         assert effector is not None
@@ -235,15 +238,15 @@ class PathClosure:
         # Springs, dampers and friction do not constrain.
         acts = mechanism.springs or mechanism.dampers or mechanism.frictions
         free = replace(mechanism, springs=(), dampers=(), frictions=()) if acts else mechanism
-        self.system = system = build_system(free)
+        self.system: System = build_system(free)
         self.orientation = orientation
         end = end if end > 0.0 else 1.0
         self.signals: Signals = pack_signals(
-            system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), end), end
+            self.system.mechanism, constant_signals([0.0] * len(free.motors), end), end
         )[0]
-        self.coordinates = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
-        self.packed, self.marker = with_marker(system, effector.point)
-        self.reach = PoseSearch(system, effector.point, self.coordinates, self.signals)
+        self.coordinates: NDArray[np.int64] = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
+        self.packed, self.marker = with_marker(self.system, effector.point)
+        self.reach: PoseSearch = PoseSearch(self.system, effector.point, self.coordinates, self.signals)
 
     def check_degrees_of_freedom(self, assembly: Assembly) -> None:
         """Raise unless there are as many task coordinates as degrees of freedom, and no row follows from others."""
@@ -285,7 +288,9 @@ class PathClosure:
         full = np.concatenate([np.stack(motion), turning[:, :, None]], axis=2)
         return np.ascontiguousarray(full[:, :, self.coordinates].transpose(1, 0, 2))
 
-    def run(self, times: Array, target: Array, pose: Array):
+    def run(
+        self, times: Array, target: Array, pose: Array
+    ) -> tuple[int, int, float, tuple[Array, Array, Array, Array]]:
         """Closure along targets; status, index, residual, and what was computed."""
         k, n = times.size, self.system.n
         q, v, a = apart((3, k, n))
@@ -325,7 +330,7 @@ class PathClosure:
             cause, detail = "the path's start is not reached from the assembly's pose", _OTHER
         raise self._unreachable(cause, detail, found, start, 0, None)
 
-    def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]):
+    def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]) -> RigidMotion:
         """The motion at the instants of the grid to keep, with more instants between where steps prove too long."""
         stretches = []
         while True:

@@ -41,8 +41,11 @@ class Sketch:
     """A scene on Matplotlib's axes: what stays is drawn once, what moves is put in place picture by picture."""
 
     def __init__(self, axes: Axes, shown: Scene, limits: Limits, look: Theme, width: float = 1.0) -> None:
-        self.scene, self.look = shown, look
-        self.axes, self.limits, self._width = axes, limits, width
+        self.scene = shown
+        self.look = look
+        self.axes = axes
+        self.limits = limits
+        self._width = width
         for kind, marks in by_look(still_marks(shown, limits)).items():
             ground = self._symbols(kind, 1.0)
             ground.set_label(f"_{kind}")
@@ -53,11 +56,11 @@ class Sketch:
         self._trail = self._line(look.trail, 1.3, 2.2)
         self._stiff = self._polygons("none", look.faint, 1.2, 2.4)
         self._plates = self._polygons("none", "none", 0.0, 2.6)
-        self.links = LineCollection([], zorder=3.0, capstyle="round", joinstyle="round")
+        self.links: LineCollection = LineCollection([], zorder=3.0, capstyle="round", joinstyle="round")
         self.links.set(clip_on=False, in_layout=False, snap=False)
         axes.add_collection(self.links, autolim=False)
         self._moving = by_look(moving_marks(shown, limits))
-        self.marks = {
+        self.marks: dict[str, Line2D | PolyCollection] = {
             kind: self._dots(look.ground, look.ink, _PIN, LOOKS[kind].width, 3.9)
             if marks[0].places.shape[1] == 1
             else self._symbols(kind, 3.1)

@@ -20,8 +20,8 @@ DESIRED: dict[str, Any] = {
     "color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 0.8, "zorder": 2.5, "label": "desired",
 }  # fmt: skip
 _MARK: dict[str, Any] = {"color": BLACK, "linestyle": "none", "markersize": 4.5}
-STOPPED = _MARK | {"marker": "x", "markeredgewidth": 1.2, "zorder": 3.0, "label": "the run stopped"}
-START = _MARK | {"marker": "s", "zorder": 4.0, "label": "start"}
+STOPPED: dict[str, Any] = _MARK | {"marker": "x", "markeredgewidth": 1.2, "zorder": 3.0, "label": "the run stopped"}
+START: dict[str, Any] = _MARK | {"marker": "s", "zorder": 4.0, "label": "start"}
 # Lines that can still be told apart in one panel.
 MOST_LINES = 7
 # Variables of the end-effector's motion, what they are, and what their values are multiplied by.

@@ -19,7 +19,9 @@ from paraflex.plots.style import ZERO, journal_style
 
 # Of multistep methods the orders at which they start to differ; IDA's roots are those of BDF.
 _ORDERS = {"adams": (4,), "bdf": (2, 5), "ndf": (2,)}
-CURVES = tuple((name, order) for name in METHODS if name != "ida" for order in _ORDERS.get(name, (None,)))
+CURVES: tuple[tuple[str, int | None], ...] = tuple(
+    (name, order) for name in METHODS if name != "ida" for order in _ORDERS.get(name, (None,))
+)
 # Frequencies at which a step still describes a vibration; and up to where modes are only to vanish.
 _RESOLVED, _HIGH = np.geomspace(0.1, 3.0, 120), np.geomspace(0.1, 1e4, 240)
 # Fractions shown, and a radius beyond which all that is to be said is said.

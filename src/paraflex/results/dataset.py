@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -26,7 +27,7 @@ def tracking_dataset(
     runs: Sequence[TrackingRun | Record],
     *,
     options: IntegrationOptions | None = None,
-    parameters: dict | None = None,
+    parameters: dict[str, Any] | None = None,
     error: ErrorSpan | str = ErrorSpan.MOTION,
     findings: Iterable[Finding] = (),
 ) -> xr.Dataset:

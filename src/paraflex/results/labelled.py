@@ -168,7 +168,9 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
             data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")
 
 
-def provenance(mechanism: Mechanism, method: str, options: IntegrationOptions, parameters: dict | None) -> dict:
+def provenance(
+    mechanism: Mechanism, method: str, options: IntegrationOptions, parameters: dict[str, Any] | None
+) -> dict[str, Any]:
     """What results came from: mechanism, method, options of our own methods, the model as read, versions."""
     # Other models and engines integrate in ways of their own.
     ours = options.to_dict() if method == options.method.title else {}

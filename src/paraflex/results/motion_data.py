@@ -31,7 +31,7 @@ def motion_dataset(
     run: MotionRun,
     *,
     options: IntegrationOptions | None = None,
-    parameters: dict | None = None,
+    parameters: dict[str, Any] | None = None,
     findings: Iterable[Finding] = (),
 ) -> xr.Dataset:
     """A run without a path, labelled.

@@ -80,7 +80,8 @@ class Verification(Result):
         whole run.
     """
 
-    data_file, values_file = "verify.nc", "verify.json"
+    data_file = "verify.nc"
+    values_file = "verify.json"
     task: TrackingTask
     models: tuple[str, ...]
     runs: Mapping[str, Mapping[str, ModelRuns]]

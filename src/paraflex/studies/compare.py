@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +99,7 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
     case: Case
     methods: Sequence[Method | str] | None = None
     options: ComparisonOptions | None = None
-    parameters: dict | None = None
+    parameters: dict[str, Any] | None = None
 
     def run(
         self,

@@ -48,7 +48,8 @@ class StudyResult(Result):
         Whether the user stopped it.
     """
 
-    data_file, values_file = "results.nc", "summary.json"
+    data_file = "results.nc"
+    values_file = "summary.json"
     dataset: xr.Dataset | None
     failed: dict[str, str]
     interrupted: bool
@@ -97,7 +98,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
     task: TrackingTask
     modes: Sequence[str | ActuationMode]
     options: IntegrationOptions | None = None
-    parameters: dict | None = None
+    parameters: dict[str, Any] | None = None
     method: Simulator | None = None
     error: ErrorSpan | str = ErrorSpan.MOTION
     warning: bool = True

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.campaign import OnProgress, Progress, Study, Workers, no_workers
@@ -80,7 +81,7 @@ class VerificationStudy(Study[Verification], CheckedFields):
     modes: Sequence[str | ActuationMode]
     models: Sequence[str] = FIDELITIES
     options: VerificationOptions | None = None
-    parameters: dict | None = None
+    parameters: dict[str, Any] | None = None
     error: ErrorSpan | str = ErrorSpan.MOTION
 
     def run(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paraflex.actuation import Effort, FeedForward, required_effort
 from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
+from paraflex.arrays import Numbers
 from paraflex.designs.derivatives.plans import Given
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
 from paraflex.designs.derivatives.steps import Stepped, complex_step, part, stepped, with_fields
@@ -36,7 +37,7 @@ from paraflex.kernel.packed import make_scratch
 from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
 from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
-from paraflex.mechanism import Mechanism, RigidBody
+from paraflex.mechanism import ActuationMode, Mechanism, RigidBody
 from paraflex.tracking import TrackingTask, path_knots
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ class KnownPath:
     """A path known at some times alone, with a complex step."""
 
     motion: PathMotion
-    angles: NDArray | None
+    angles: Numbers | None
     duration: float
 
     @property
@@ -69,7 +70,7 @@ class KnownPath:
         """The motion at these times."""
         return self.motion
 
-    def turning(self, t: Array) -> NDArray | None:
+    def turning(self, t: Array) -> Numbers | None:
         """How the end-effector turns, where the path says so."""
         return self.angles
 
@@ -94,7 +95,7 @@ class ModeChange:
     direction: Direction
     task: TrackingTask
     torques: FeedForward
-    condition: NDArray
+    condition: Numbers
     error: float
 
 
@@ -118,19 +119,24 @@ class Change:
         A parameter that has no derivative.
     """
 
+    stencil: Stencil
+    near: list[Described]
+
     def __init__(self, setting: Setting, task: Task, planned: TrackingTask, k: int, size: float) -> None:
-        self.name, self.size, self.planned = setting.names[k], size, planned
+        self.name: str = setting.names[k]
+        self.size = size
+        self.planned = planned
         here = _described(setting, task, planned.mechanism)
         self.stencil, self.near = self._near(setting, task, k)
         try:
             self.stepped: Stepped[Described] = complex_step(here, self.near, self.stencil)
-            self.there = self.stepped.value
-            self.system = build_system(self.there.mechanism, planned.system)
+            self.there: Described = self.stepped.value
+            self.system: System = build_system(self.there.mechanism, planned.system)
             self._check_layout()
         except InputError as error:
             raise error.at(f"vary.{self.name}") from None
-        self.closure = PathClosure(planned.mechanism.rigid(), here.orientation, here.end)
-        self.end = here.end
+        self.closure: PathClosure = PathClosure(planned.mechanism.rigid(), here.orientation, here.end)
+        self.end: float = here.end
 
     def _near(self, setting: Setting, task: Task, k: int) -> tuple[Stencil, list[Described]]:
         """Designs to both sides of this one, or to one where the other cannot be."""
@@ -139,7 +145,7 @@ class Change:
             try:
                 near = [_described(setting, _moved(task, k, place * self.size)) for place in stencil.places]
                 # What a mesh refuses is refused here.
-                self.beside = [build_system(each.mechanism) for each in (near[0], near[-1])]
+                self.beside: list[System] = [build_system(each.mechanism) for each in (near[0], near[-1])]
                 return stencil, near
             except ParaflexError as error:
                 trouble = trouble or error
@@ -178,7 +184,7 @@ class Change:
         return self.plan(self.planned.motion, self.planned.effort, t * (part(self.there.end) / self.end))
 
     @cached_property
-    def knots(self) -> NDArray:
+    def knots(self) -> Numbers:
         """Of the path, with a complex step."""
         knots = path_knots(self.there.path, self.there.end)
         if knots.size != self.planned.plan.knots.size:
@@ -195,7 +201,7 @@ class Change:
         change = motion_sensitivity(self.closure, motion, self._nearby(motion, d_times, path))
         return _Planned(self, motion, effort, path, stepped(motion.t, d_times), change)
 
-    def known_path(self, times: NDArray) -> KnownPath:
+    def known_path(self, times: Numbers) -> KnownPath:
         """The path at times with a complex step."""
         path, here = self.there.path, self.planned.path
         duration = self.planned.path.duration
@@ -322,7 +328,7 @@ class _Planned:
     motion: RigidMotion
     effort: Effort
     path: KnownPath
-    times: NDArray
+    times: Numbers
     change: MotionChange
 
     def with_step(self) -> RigidMotion:
@@ -342,7 +348,7 @@ class _Planned:
         required = np.einsum("kij,kj->ki", transposed, forces)
         return part(required), part(transposed @ motor_rows(moved))
 
-    def _forces(self) -> NDArray:
+    def _forces(self) -> Numbers:
         """Of inertia, weight and loads, with a complex step."""
         motion, change, here = self.motion, self.change, self.motion.system.packed
         numbers, d_numbers = numbers_of(here), part(numbers_of(self.owner.rigid.packed))
@@ -357,7 +363,7 @@ class _Planned:
         stencil = STENCILS[0]
         return stepped(at(0.0), stencil.derivative([at(place) for place in stencil.places]).value)
 
-    def torques(self, mode) -> tuple[Array, Array]:
+    def torques(self, mode: ActuationMode) -> tuple[Array, Array]:
         """Torques (k, motors) of minimum norm and their derivative.
 
         tau = B^T y, B B^T y = Q: d tau = B^+ (dQ - dB tau) + (1 - B^+ B) dB^T y.
@@ -376,7 +382,7 @@ class _Planned:
         return torques, changes
 
 
-def _condition(values: Array, planned: _Planned, torques: FeedForward) -> NDArray:
+def _condition(values: Array, planned: _Planned, torques: FeedForward) -> Numbers:
     """Condition numbers of the actuation matrix with a complex step: singular values change by u^T dB v."""
     active = planned.effort.active(torques.mode)
     if not active.any():

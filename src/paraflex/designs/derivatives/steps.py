@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Numbers
 from paraflex.designs.derivatives.stencil import Stencil
 from paraflex.errors import InputError
 
@@ -36,7 +37,7 @@ def part(values: Any) -> NDArray[np.float64]:
     return np.imag(values) / STEP
 
 
-def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> NDArray[Any]:
+def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> Numbers:
     """Numbers with a complex step along a derivative."""
     return values + 1j * STEP * derivative
 
@@ -101,7 +102,7 @@ class _Walk:
         self.error = max(self.error, float(found.error / max(abs(found.value), abs(here))))
         return np.complex128(complex(here, STEP * float(found.value)))
 
-    def array(self, here: NDArray, near: list[NDArray]) -> NDArray:
+    def array(self, here: Numbers, near: list[Numbers]) -> Numbers:
         if here.dtype.kind != "f" or all(np.array_equal(each, here) for each in near):
             return here
         return stepped(here, self.stencil.derivative(near).value)

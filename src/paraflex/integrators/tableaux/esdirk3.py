@@ -1,6 +1,8 @@
 """ESDIRK3(2)4L[2]SA of Kennedy and Carpenter (2003), Appl. Numer. Math. 44, 139-181: order 3, L-stable."""
 
-from paraflex.integrators.tableaux.make import ESDIRK, make_tableau
+from typing import ClassVar
+
+from paraflex.integrators.tableaux.make import ESDIRK, Tableau, make_tableau
 
 _D = "1767732205903/4055673282236"
 
@@ -8,11 +10,13 @@ _D = "1767732205903/4055673282236"
 class ESDIRK3(ESDIRK):
     """ESDIRK3(2)4L[2]SA: L-stable."""
 
-    name, title, order = "esdirk3", "ESDIRK 3(2)", 3
+    name = "esdirk3"
+    title = "ESDIRK 3(2)"
+    order = 3
     source = "Kennedy and Carpenter (2003), Appl. Numer. Math. 44, 139-181"
-    newton_fraction = 1e-3
+    newton_fraction: ClassVar[float] = 1e-3
 
-    tableau = make_tableau(
+    tableau: ClassVar[Tableau] = make_tableau(
         [
             ["0"],
             [_D, _D],

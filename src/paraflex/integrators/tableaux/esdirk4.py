@@ -1,6 +1,8 @@
 """ESDIRK4(3)6L[2]SA of Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244: order 4, L-stable."""
 
-from paraflex.integrators.tableaux.make import ESDIRK, make_tableau, paired_rows
+from typing import ClassVar
+
+from paraflex.integrators.tableaux.make import ESDIRK, Tableau, make_tableau, paired_rows
 
 _HAT = "-71925161075/3900939759889"
 
@@ -8,11 +10,13 @@ _HAT = "-71925161075/3900939759889"
 class ESDIRK4(ESDIRK):
     """ESDIRK4(3)6L[2]SA: L-stable."""
 
-    name, title, order = "esdirk4", "ESDIRK 4(3)", 4
+    name = "esdirk4"
+    title = "ESDIRK 4(3)"
+    order = 4
     source = "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"
-    newton_fraction = 1e-3
+    newton_fraction: ClassVar[float] = 1e-3
 
-    tableau = make_tableau(
+    tableau: ClassVar[Tableau] = make_tableau(
         paired_rows("1/4", [
             ["-1356991263433/26208533697614"],
             ["-1778551891173/14697912885533", "7325038566068/12797657924939"],

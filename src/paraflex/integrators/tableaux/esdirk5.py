@@ -1,6 +1,8 @@
 """ESDIRK5(4)7L[2]SA2 of Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244: order 5, L-stable."""
 
-from paraflex.integrators.tableaux.make import ESDIRK, make_tableau, paired_rows
+from typing import ClassVar
+
+from paraflex.integrators.tableaux.make import ESDIRK, Tableau, make_tableau, paired_rows
 
 _HAT = "-582099335757/7214068459310"
 
@@ -8,11 +10,13 @@ _HAT = "-582099335757/7214068459310"
 class ESDIRK5(ESDIRK):
     """ESDIRK5(4)7L[2]SA2: L-stable."""
 
-    name, title, order = "esdirk5", "ESDIRK 5(4)", 5
+    name = "esdirk5"
+    title = "ESDIRK 5(4)"
+    order = 5
     source = "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"
-    newton_fraction = 1e-3
+    newton_fraction: ClassVar[float] = 1e-3
 
-    tableau = make_tableau(
+    tableau: ClassVar[Tableau] = make_tableau(
         paired_rows("23/125", [
             ["791020047304/3561426431547"],
             ["-158159076358/11257294102345", "-85517644447/5003708988389"],

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from paraflex.integrators.method import INDEX_1, Family, NativeMethod, Treatment
-from paraflex.kernel.run_state import Tableau
+from paraflex.kernel.run_state import Tableau as Tableau
 
 Number = str | float
 
@@ -25,7 +25,7 @@ class ESDIRK(NativeMethod):
 
     family = Family.ESDIRK
     form = INDEX_1
-    treatments = (Treatment.BAUMGARTE, Treatment.PROJECTION, Treatment.GGL)
+    treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.BAUMGARTE, Treatment.PROJECTION, Treatment.GGL)
     tableau: ClassVar[Tableau]
 
     @property

@@ -5,8 +5,9 @@ both stages one diagonal, d = gamma / 2, and makes the scheme L-stable. Its comp
 """
 
 from math import sqrt
+from typing import ClassVar
 
-from paraflex.integrators.tableaux.make import ESDIRK, make_tableau
+from paraflex.integrators.tableaux.make import ESDIRK, Tableau, make_tableau
 
 _D = 1.0 - sqrt(2.0) / 2.0
 _W = sqrt(2.0) / 4.0
@@ -15,10 +16,12 @@ _W = sqrt(2.0) / 4.0
 class TRBDF2(ESDIRK):
     """The trapezoidal rule and the second backward difference formula in turn: L-stable."""
 
-    name, title, order = "tr-bdf2", "TR-BDF2", 2
+    name = "tr-bdf2"
+    title = "TR-BDF2"
+    order = 2
     source = "Hosea and Shampine (1996), Appl. Numer. Math. 20, 21-37"
 
-    tableau = make_tableau(
+    tableau: ClassVar[Tableau] = make_tableau(
         [[0.0], [_D, _D], [_W, _W, _D]],
         [(1.0 - _W) / 3.0, (3.0 * _W + 1.0) / 3.0, _D / 3.0],
         error_order=2,

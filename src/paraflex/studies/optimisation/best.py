@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from paraflex.campaign.study import Result
 from paraflex.designs.overlay import overlaid
 from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.writing import write_text
@@ -12,7 +13,7 @@ from paraflex.writing import write_text
 BEST = "best.toml"
 
 
-def write_best(folder: Path, study: DesignStudy, design: tuple[float, ...]) -> Path:
+def write_best(folder: Path, study: DesignStudy[Result], design: tuple[float, ...]) -> Path:
     """Write the mechanism's file with a design's numbers in it.
 
     Raises

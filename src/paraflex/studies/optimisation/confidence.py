@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.campaign.study import Result
 from paraflex.studies.optimisation.evaluate import Evaluated
 from paraflex.studies.optimisation.fit import residuals
 from paraflex.studies.optimisation.objective import Target
@@ -96,7 +97,7 @@ def student_factor(freedom: int) -> float:
 
 
 def confidence(
-    study: DesignStudy, targets: Sequence[Target], design: Evaluated, jacobian: Array, bound: Mapping[str, str]
+    study: DesignStudy[Result], targets: Sequence[Target], design: Evaluated, jacobian: Array, bound: Mapping[str, str]
 ) -> Confidence:
     """What a Jacobian says of a design found.
 
@@ -148,7 +149,7 @@ def confidence(
 
 
 def checked(
-    study: DesignStudy,
+    study: DesignStudy[Result],
     targets: Sequence[Target],
     evaluate: Callable[[Sequence[tuple[float, ...]]], list[Evaluated]],
     design: Evaluated,

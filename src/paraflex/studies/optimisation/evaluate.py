@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.campaign import Engine, Journal, LostWorker, Row, outcomes
+from paraflex.campaign.study import Result
 from paraflex.designs.run import COMPLETE, Outcome, Task, lost, run_id, run_task
 from paraflex.designs.setting import Setting
 from paraflex.studies.optimisation.study import DesignStudy
@@ -86,17 +87,21 @@ class Evaluate:
 
     def __init__(
         self,
-        study: DesignStudy,
+        study: DesignStudy[Result],
         journal: Journal,
         engine: Engine,
         run: RunTask = run_task,
         on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
         run_slopes: RunTask | None = None,
     ) -> None:
-        self.study, self.journal, self.engine, self.run, self.on_evaluated = study, journal, engine, run, on_evaluated
+        self.study = study
+        self.journal = journal
+        self.engine = engine
+        self.run = run
+        self.on_evaluated = on_evaluated
         self.run_slopes = run_slopes
         self.known: dict[Design, Evaluated] = {}
-        self.fresh = 0
+        self.fresh: int = 0
         self._rows = {row["id"]: row for row in journal.rows()}
         self._numbers: dict[Design, int] = {}
         self._single = {mode: replace(study.setting, modes=(mode,)) for mode in study.setting.modes}

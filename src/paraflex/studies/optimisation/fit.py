@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.campaign.study import Result
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.slopes import Slopes
@@ -35,7 +36,9 @@ def closest(targets: Sequence[Target], designs: Sequence[Evaluated]) -> Evaluate
     return min(complete, key=lambda each: (root_mean_square(targets, each), each.number), default=None)
 
 
-def fit(study: DesignStudy, targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: Evaluated) -> str:
+def fit(
+    study: DesignStudy[Result], targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: Evaluated
+) -> str:
     """Reduce the residuals from a start; why it stopped, in words.
 
     A trial that does not run has infinite residuals, which SciPy's trust region answers by a shorter step.

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.campaign.study import Result
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
 from paraflex.studies.optimisation.objective import Objective
@@ -39,11 +40,13 @@ class DesignProblem:
         The start cannot be run, or a metric of it that others would be divided by is zero.
     """
 
-    def __init__(self, study: DesignStudy, objective: Objective, evaluate: Evaluate, slopes: Slopes) -> None:
-        self.study, self.evaluate, self.slopes = study, evaluate, slopes
+    def __init__(self, study: DesignStudy[Result], objective: Objective, evaluate: Evaluate, slopes: Slopes) -> None:
+        self.study = study
+        self.evaluate = evaluate
+        self.slopes = slopes
         self.objective = objective
-        self.scales = start_scales(study, objective, evaluate)
-        self.start = study.unit(study.start)
+        self.scales: Mapping[str, float] = start_scales(study, objective, evaluate)
+        self.start: Array = study.unit(study.start)
         # Slopes of designs that fail lead back to the last one that did not.
         self._safe = self.start
 
@@ -98,7 +101,7 @@ class DesignProblem:
         return self.objective.value(design, self.scales)
 
 
-def start_scales(study: DesignStudy, objective: Objective, evaluate: Evaluate) -> Mapping[str, float]:
+def start_scales(study: DesignStudy[Result], objective: Objective, evaluate: Evaluate) -> Mapping[str, float]:
     """What metrics are divided by.
 
     Raises
@@ -117,7 +120,7 @@ def start_scales(study: DesignStudy, objective: Objective, evaluate: Evaluate) -
     return scales
 
 
-def running_start(study: DesignStudy, evaluate: Evaluate) -> Evaluated:
+def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> Evaluated:
     """The start, evaluated.
 
     Raises

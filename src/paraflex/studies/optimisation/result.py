@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from paraflex.campaign import KeptResult
+from paraflex.campaign.study import Result
 from paraflex.studies.optimisation.best import write_best
 from paraflex.studies.optimisation.evaluate import Evaluated
 from paraflex.studies.optimisation.session import Session
@@ -76,14 +77,14 @@ class SearchResult(KeptResult):
         listed = {"history": [list(each) for each in self.history], "reasons": list(self.reasons)}
         return {"kind": self.kind} | out | listed
 
-    def write(self, study: DesignStudy) -> None:
+    def write(self, study: DesignStudy[Result]) -> None:
         """Write `result.json`, and the best design's mechanism where there is one."""
         write_json(self.folder / self.values_file, self.to_dict(), remedy=GO_ON)
         if self.values:
             write_best(self.folder, study, tuple(self.values.values()))
 
 
-def of_session(study: DesignStudy, folder: Path, session: Session, best: Evaluated | None) -> dict[str, Any]:
+def of_session(study: DesignStudy[Result], folder: Path, session: Session, best: Evaluated | None) -> dict[str, Any]:
     """What a `SearchResult` holds of a session and its best design, but for the history."""
     history, names = session.evaluate.history, study.setting.names
     reasons = [each.reason for each in history if not each.complete]
@@ -103,7 +104,7 @@ def of_session(study: DesignStudy, folder: Path, session: Session, best: Evaluat
     }
 
 
-def at_bounds(study: DesignStudy, design: Sequence[float]) -> dict[str, str]:
+def at_bounds(study: DesignStudy[Result], design: Sequence[float]) -> dict[str, str]:
     """Which numbers of a design are at an end of their range."""
     places = dict(zip(study.setting.names, study.unit(design), strict=True))
     low = {name: "low" for name, place in places.items() if place < _AT_BOUND}

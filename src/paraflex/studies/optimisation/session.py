@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from paraflex.campaign import Engine, open_campaign, write_table
+from paraflex.campaign.study import Result
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
 from paraflex.designs.run import run_task, table_schema
@@ -54,7 +55,7 @@ class Session:
 
 
 def search(
-    study: DesignStudy,
+    study: DesignStudy[Result],
     folder: Path,
     open_workers: Callable[[], Engine],
     solve: Callable[[Evaluate], str],
@@ -99,7 +100,7 @@ def search(
     return Session(evaluate, stopped, interrupted, time.perf_counter() - began)
 
 
-def record_schema(study: DesignStudy, *, slopes: bool) -> pa.Schema:
+def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
     """Columns of the table: a sweep's, and derivatives of the metrics that count where they are exact."""
     import pyarrow as pa
 
@@ -111,7 +112,7 @@ def record_schema(study: DesignStudy, *, slopes: bool) -> pa.Schema:
 
 
 def sampled_start(
-    study: DesignStudy, evaluate: Evaluate, best: Callable[[list[Evaluated]], Evaluated | None]
+    study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[Evaluated]], Evaluated | None]
 ) -> Evaluated:
     """The start, or what is best of it and the samples that the study wants looked at first."""
     number, asked = study.search.samples, [study.start]
@@ -130,7 +131,7 @@ def _solved(evaluate: Evaluate, solve: Callable[[Evaluate], str]) -> str:
             return f"evaluations = {evaluate.study.search.evaluations} are done"
 
 
-def _slopes_run(study: DesignStudy, run: RunTask | None) -> RunTask | None:
+def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | None:
     """What is done for exact derivatives; None where differences are taken.
 
     Raises

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.campaign import Row
+from paraflex.campaign.study import Result
 from paraflex.designs.run import Outcome, Task, trouble
 from paraflex.designs.setting import Setting
 from paraflex.errors import InputError, NumericalError
@@ -38,7 +39,7 @@ class Slopes(Protocol):
         ...
 
 
-def slopes_of(study: DesignStudy, evaluate: Evaluate) -> Slopes:
+def slopes_of(study: DesignStudy[Result], evaluate: Evaluate) -> Slopes:
     """Derivatives as a study asks for them: exact ones where the evaluation makes such."""
     differing = Differences(study, evaluate)
     return differing if evaluate.run_slopes is None else ExactSlopes(study, evaluate, differing)
@@ -51,8 +52,10 @@ class Differences:
     metric bends by, if it bends by itself over a range, is its cubic root (Press et al., Numerical Recipes, 5.7).
     """
 
-    def __init__(self, study: DesignStudy, evaluate: Evaluate) -> None:
-        self.study, self.evaluate, self.step = study, evaluate, study.search.difference
+    def __init__(self, study: DesignStudy[Result], evaluate: Evaluate) -> None:
+        self.study = study
+        self.evaluate = evaluate
+        self.step = study.search.difference
 
     def __call__(self, at: Evaluated) -> Mapping[str, Array]:
         """See `Slopes`."""
@@ -61,12 +64,14 @@ class Differences:
         return differences(self.study, self.evaluate, at, self.step)
 
 
+@dataclass
 class ExactSlopes:
     """Exact derivatives of the runs; differences at designs that have none, with the reasons."""
 
-    def __init__(self, study: DesignStudy, evaluate: Evaluate, otherwise: Slopes) -> None:
-        self.study, self.evaluate, self.otherwise = study, evaluate, otherwise
-        self.reasons: list[str] = []
+    study: DesignStudy[Result]
+    evaluate: Evaluate
+    otherwise: Slopes
+    reasons: list[str] = field(default_factory=list)
 
     def __call__(self, at: Evaluated) -> Mapping[str, Array]:
         """See `Slopes`."""
@@ -79,7 +84,7 @@ class ExactSlopes:
         return exact_slopes(self.study, at)
 
 
-def relative_noise(study: DesignStudy, evaluate: Evaluate, at: Evaluated) -> float:
+def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated) -> float:
     """Largest noise of a metric that counts, as a part of its value: from designs close together on a line."""
     middle = study.unit(at.design)
     # Along the diagonal, inwards; as far in all as the least difference reaches.
@@ -96,7 +101,7 @@ def relative_noise(study: DesignStudy, evaluate: Evaluate, at: Evaluated) -> flo
     return noise
 
 
-def differences(study: DesignStudy, evaluate: Evaluate, at: Evaluated, step: float) -> Mapping[str, Array]:
+def differences(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated, step: float) -> Mapping[str, Array]:
     """Central differences, all designs of them evaluated at once.
 
     The step is a share of the range: long against what the choice of time steps makes of a metric, short against the
@@ -116,7 +121,7 @@ def differences(study: DesignStudy, evaluate: Evaluate, at: Evaluated, step: flo
     return columns
 
 
-def _moved(study: DesignStudy, at: Evaluated, k: int, place: float) -> tuple[float, ...]:
+def _moved(study: DesignStudy[Result], at: Evaluated, k: int, place: float) -> tuple[float, ...]:
     """A design with one of its numbers elsewhere in its range."""
     if place == study.unit(at.design)[k]:
         return at.design
@@ -124,7 +129,7 @@ def _moved(study: DesignStudy, at: Evaluated, k: int, place: float) -> tuple[flo
     return (*at.design[:k], moved, *at.design[k + 1 :])
 
 
-def exact_slopes(study: DesignStudy, at: Evaluated) -> Mapping[str, Array]:
+def exact_slopes(study: DesignStudy[Result], at: Evaluated) -> Mapping[str, Array]:
     """Derivatives that the rows hold; see `run_slopes`."""
     scale = study.per_unit(at.design)
     return {
@@ -133,12 +138,12 @@ def exact_slopes(study: DesignStudy, at: Evaluated) -> Mapping[str, Array]:
     }
 
 
-def _has_slopes(study: DesignStudy, at: Evaluated) -> bool:
+def _has_slopes(study: DesignStudy[Result], at: Evaluated) -> bool:
     columns = [slope_column(column, name) for column in study.columns for name in study.setting.names]
     return all(row.get(NO_SLOPES) or all(row.get(each) is not None for each in columns) for row in at.rows)
 
 
-def no_exact_slopes(study: DesignStudy) -> str:
+def no_exact_slopes(study: DesignStudy[Result]) -> str:
     """Why a study has no exact derivatives; empty where it has."""
     from paraflex.designs.derivatives.plans import check_differentiable_study
 
