@@ -29,6 +29,7 @@ from .mechanism import (
     LinearSpring as LinearSpring,
     TorsionalDamper as TorsionalDamper,
     JointFriction as JointFriction,
+    Gear as Gear,
     LossFactor as LossFactor,
     RayleighDamping as RayleighDamping,
     ModalDamping as ModalDamping,
