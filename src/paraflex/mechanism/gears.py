@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from paraflex.arguments import CheckedFields
-from paraflex.mechanism.quantities import AT_JOINT, finite, not_zero, said
+from paraflex.mechanism.quantities import finite, not_zero, said
 
 PHASE = said(
     "the coordinate of the second joint where that of the first is zero in rad, or m; by default as the first assembly "
@@ -70,8 +70,8 @@ class Gear(Relation):
     _table = "gear"
 
     name: str
-    first_joint: str = field(metadata=AT_JOINT)
-    second_joint: str = field(metadata=AT_JOINT)
+    first_joint: str = field(metadata=said("first joint", joint="moves"))
+    second_joint: str = field(metadata=said("second joint", joint="moves"))
     ratio: float = field(
         metadata=said(
             "the second joint's angle by the first's, negative where wheels mesh outside; of a rack the radius of its "
