@@ -211,14 +211,15 @@ def _run_shell(text: str) -> str:
 def apply_diff(path: Path, diff: str) -> None:
     """Change a file as a diff says: hunks of lines that stand there (blank or minus first) and of what they become.
 
-    The last line of a hunk may be cut short. Hunks are parted by `@@`, or where a minus follows a plus.
+    The last line of a hunk may be cut short. One of plus lines alone goes below the file's first line. Hunks are parted
+    by `@@`, or where a minus follows a plus.
     """
     text = path.read_text(encoding="utf-8")
     for hunk in _hunks(diff.splitlines()):
         old = "\n".join(line[1:] for line in hunk if line[0] != "+")
         new = "\n".join(line[1:] for line in hunk if line[0] != "-")
         assert f"\n{old}" in text, f"{path.name} does not have\n{old}"
-        text = text.replace(f"\n{old}", f"\n{new}", 1)
+        text = text.replace(f"\n{old}", f"\n{new}" if old else f"\n{new}\n", 1)
     path.write_text(text, encoding="utf-8")
 
 

@@ -107,6 +107,12 @@ def rack(radius=0.04, **more):
     )
 
 
+def turned(mechanism, name):
+    """The same with the points of a joint in the other order."""
+    joints = [replace(one, a=one.b, b=one.a) if one.name == name else one for one in mechanism.joints]
+    return replace(mechanism, joints=tuple(joints))
+
+
 def chain(ratio=-2.0, angles=(0.1, 0.5), **more):
     """Two links hanging in gravity, the second geared to the first."""
     links = [
@@ -486,17 +492,48 @@ fields = ["parameters.l1"]
 
 @pytest.mark.parametrize(
     ("make", "radii"),
-    [(planetary, (0.04, 0.03)), (lambda: train(-2.0), (0.2, 0.1)), (lambda: train(2.0), None), (rack, None)],
+    [
+        (planetary, (0.04, 0.03)),
+        (lambda: train(-2.0), (0.2, 0.1)),
+        (lambda: train(2.0), None),
+        (rack, (0.04, np.inf)),
+        (lambda: rack(-0.04), (0.04, -np.inf)),
+        (lambda: turned(rack(), "A"), (0.04, -np.inf)),
+        (lambda: turned(rack(), "rail"), (0.04, -np.inf)),
+    ],
 )
-def test_wheels_that_mesh_outside_have_pitch_circles(make, radii):
+def test_wheels_that_mesh_outside_and_racks_have_pitch_lines(make, radii):
     mechanism = make()
     (found,) = assembled_data(mechanism)["gear_radius"].values
     np.testing.assert_allclose(found, (np.nan, np.nan) if radii is None else radii)
     lines = [part for part in sketch(mechanism).split("<polyline")[1:] if 'class="gear"' in part]
-    assert [len(line.split('points="')[1].split('"')[0].split()) > 2 for line in lines] == [radii is not None] * (
-        1 if radii is None else 2
-    )
+    circles = [len(line.split('points="')[1].split('"')[0].split()) > 2 for line in lines]
+    assert circles == [False] if radii is None else [True, np.isfinite(radii[1])]
     assert all("stroke-dasharray" in line for line in lines)
+
+
+@pytest.mark.parametrize("first", ["A", "rail"])
+@pytest.mark.parametrize("radius", [0.04, -0.04])
+def test_a_rack_moves_as_its_pinion_does_where_they_touch(radius, first):
+    mechanism = rack(radius)
+    if first == "rail":
+        mechanism = replace(mechanism, gears=(Gear("mesh", "rail", "A", 1.0 / radius),))
+    force = PointForce("push", ref("rack.R"), (2.0 * np.cos(0.5), 2.0 * np.sin(0.5)))
+    run = simulate_motion(replace(mechanism, loads=(force,)), 0.3, samples=4, options=EXACT)
+    shown = scene(motion_dataset(run), run.times)
+    circle, line = (mark.places for mark in moving_marks(shown, shown.limits) if mark.look == "gear")
+    along = np.array([np.cos(0.5), np.sin(0.5)])
+    for k in range(4):
+        start, end = line[k]
+        np.testing.assert_allclose((end - start) / np.linalg.norm(end - start), along, atol=1e-9)
+        distance, foot = np.linalg.norm(circle[k], axis=1), start - (start @ along) * along
+        np.testing.assert_allclose(distance, 0.04, rtol=1e-9)
+        assert np.linalg.norm(foot) == pytest.approx(0.04)
+        # The pinion's velocity there, omega times the lever turned by a quarter, is the rack's.
+        omega, speed = run.solution.v[k, 2], run.solution.v[k, 3:5]
+        np.testing.assert_allclose(omega * np.array([-foot[1], foot[0]]), speed, rtol=1e-6, atol=1e-9)
+    low, high = [shown.limits.left, shown.limits.bottom], [shown.limits.right, shown.limits.top]
+    assert all(np.all(places >= low) and np.all(places <= high) for places in (circle, line))
 
 
 def test_pitch_circles_touch_and_move_with_their_wheels():

@@ -14,7 +14,7 @@ from paraflex.cli.inspect_tables import print_facts, print_library
 from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, closure_of, mobility
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
-from paraflex.mechanism import Gear, Mechanism, loops
+from paraflex.mechanism import Mechanism, Relation, grouped, loops
 
 # Loops and sets of motors listed at most.
 _LISTED = 1000
@@ -104,15 +104,15 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "assemblies": [assembly.name for assembly in mechanism.assemblies],
         "modes": [mode.name for mode in mechanism.modes],
         "paths": list(model.paths),
-        "gears": [_gear(gear) for gear in mechanism.gears],
+        **{group.words: list(map(_equation, members)) for group, members in grouped(mechanism) if group.relates},
     }
 
 
-def _gear(gear: Gear) -> str:
-    """What it holds, as an equation of the joints' coordinates."""
-    sign = "-" if gear.phase and gear.phase < 0.0 else "+"
-    phase = f" {sign} {abs(gear.phase):.4g}" if gear.phase else ""
-    return f"{gear.name}: {gear.second_joint} = {gear.ratio:.4g} {gear.first_joint}{phase}"
+def _equation(one: Relation) -> str:
+    """What a relation holds, as an equation of the joints' coordinates."""
+    sign = "-" if one.phase and one.phase < 0.0 else "+"
+    phase = f" {sign} {abs(one.phase):.4g}" if one.phase else ""
+    return f"{one.name}: {one.second_joint} = {one.transmission:.4g} {one.first_joint}{phase}"
 
 
 def _links(mechanism: Mechanism, system: System) -> list[dict[str, Any]]:

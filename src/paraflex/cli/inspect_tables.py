@@ -12,6 +12,7 @@ from rich.table import Table
 from paraflex.cli.tables import plain_console
 from paraflex.files import generator_names
 from paraflex.findings import Level
+from paraflex.mechanism import Mechanism, groups_of
 
 _FREQUENCIES_SHOWN = 3
 _LISTED = 12
@@ -75,6 +76,7 @@ def _table(title: str, headings: Sequence[str], right: Sequence[int] = ()) -> Ta
 
 def _counts(facts: dict[str, Any]) -> Table:
     table = Table(show_header=False, box=None)
+    related = [group.words for group in groups_of(Mechanism).values() if group.relates]
     for label, key in (
         ("bodies", "bodies"),
         ("joints", "joints"),
@@ -90,12 +92,12 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("degrees of freedom (3 bodies - rank)", "degrees_of_freedom"),
         ("total mass [kg]", "total_mass"),
         ("assemblies", "assemblies"),
-        ("gears", "gears"),
+        *((words, words) for words in related),
         ("modes", "modes"),
         ("paths", "paths"),
     ):
-        # Most mechanisms have no gears.
-        if key in facts and (facts[key] or key != "gears"):
+        # Most mechanisms have no gears and the like.
+        if key in facts and (facts[key] or key not in related):
             value = facts[key]
             table.add_row(label, (_some(value) or "none") if isinstance(value, list) else f"{value:g}")
     return table

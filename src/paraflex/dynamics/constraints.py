@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
-from paraflex.mechanism import Gear, Joint, Mechanism, PointRef
+from paraflex.mechanism import Joint, Mechanism, PointRef, Relation
 
 
 @dataclass(frozen=True)
@@ -124,15 +124,15 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
           for one in mechanism.frictions),
     ]  # fmt: skip
     constraints += [_along(mechanism.joint(one.joint), one.name, **keywords) for one, keywords in at_joints]
-    return constraints + [_gear_constraint(mechanism, gear) for gear in mechanism.gears]
+    return constraints + [_relation_constraint(mechanism, one) for one in mechanism.relations]
 
 
-def _gear_constraint(mechanism: Mechanism, gear: Gear) -> Constraint:
-    """Coordinate of the second joint less ratio times that of the first, less the phase."""
-    first, second = (mechanism.joint(name) for name in gear.joints)
-    assert gear.phase is not None
-    terms = (_coordinate(second), _coordinate(first, -gear.ratio))
-    return Constraint(gear.name, terms, (f"{gear.name} {_what(second)}",), rest=gear.phase)
+def _relation_constraint(mechanism: Mechanism, one: Relation) -> Constraint:
+    """Coordinate of the second joint less the transmission times that of the first, less the phase."""
+    first, second = (mechanism.joint(name) for name in one.joints)
+    assert one.phase is not None
+    terms = (_coordinate(second), _coordinate(first, -one.transmission))
+    return Constraint(one.name, terms, (f"{one.name} {_what(second)}",), rest=one.phase)
 
 
 def constraint_count(mechanism: Mechanism) -> int:

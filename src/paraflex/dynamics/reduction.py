@@ -77,7 +77,7 @@ def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
         (f"the {group.word} {one.name}", joint)
         for group, members in grouped(mechanism)
         for one in members
-        for _, name in joints_named(one)
+        for _, name, _ in joints_named(one)
         if not (joint := mechanism.joint(name)).slides
     ]
     for cause, joint in causes:

@@ -53,13 +53,15 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     for what, fields in beyond.items():
         if fields:
             refuse(_PRINTED[name], what, fields[0])
-    if name == "exudyn" and mechanism.gears:
-        refuse("Exudyn", "a gear", f"gear.{mechanism.gears[0].name}")
+    related = [(group, one) for group, members in grouped(mechanism) if group.relates for one in members]
+    if name == "exudyn":
+        for group, one in related:
+            refuse("Exudyn", f"a {group.word}", f"{group.table}.{one.name}")
     if name == "mujoco":
         closing = {joint.name for joint in spanning_tree(mechanism).closing}
-        for gear in mechanism.gears:
-            if closing.intersection(gear.joints):
-                refuse("MuJoCo", "a gear where a loop closes", f"gear.{gear.name}")
+        for group, one in related:
+            if closing.intersection(one.joints):
+                refuse("MuJoCo", f"a {group.word} where a loop closes", f"{group.table}.{one.name}")
         for spring in mechanism.springs:
             if spring.joint in closing:
                 refuse("MuJoCo", "a spring where a loop closes", f"spring.{spring.name}")

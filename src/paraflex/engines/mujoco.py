@@ -24,7 +24,7 @@ from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
-from paraflex.mechanism import GROUND, ActuationMode, Gear, Joint, Mechanism, proportional_segments
+from paraflex.mechanism import GROUND, ActuationMode, Joint, Mechanism, Relation, proportional_segments
 from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun, TrackingTask
 
@@ -126,8 +126,8 @@ def _model(mujoco: Any, system: System, tree: Tree, step: float) -> Any:
     _add_springs(spec, system.mechanism, tree)
     for joint in tree.closing:
         _close(mujoco, spec, system, joint, bodies, step)
-    for gear in system.mechanism.gears:
-        _add_gear(mujoco, spec, gear, tree, step)
+    for one in system.mechanism.relations:
+        _add_relation(mujoco, spec, one, tree, step)
     return spec.compile()
 
 
@@ -141,19 +141,19 @@ def _add_springs(spec: Any, mechanism: Mechanism, tree: Tree) -> None:
         joint.springref = link.sign * spring.rest
 
 
-def _add_gear(mujoco: Any, spec: Any, gear: Gear, tree: Tree, step: float) -> None:
+def _add_relation(mujoco: Any, spec: Any, one: Relation, tree: Tree, step: float) -> None:
     """The hinge of the second joint follows that of the first, as a polynomial of degree one."""
     hinge = {link.joint.name: link for link in tree.links}
-    first, second = (hinge[name] for name in gear.joints)
+    first, second = (hinge[name] for name in one.joints)
     equality = spec.add_equality(
-        name=gear.name,
+        name=one.name,
         type=mujoco.mjtEq.mjEQ_JOINT,
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
         name1=second.name,
         name2=first.name,
     )
-    assert gear.phase is not None
-    equality.data[:2] = second.sign * gear.phase, second.sign * gear.ratio * first.sign
+    assert one.phase is not None
+    equality.data[:2] = second.sign * one.phase, second.sign * one.transmission * first.sign
     _stiffen(equality, step)
 
 

@@ -72,7 +72,7 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
     InputError
         A body that nothing joins to the ground.
     """
-    held = {spring.joint for spring in mechanism.springs} | {name for gear in mechanism.gears for name in gear.joints}
+    held = {spring.joint for spring in mechanism.springs} | {name for one in mechanism.relations for name in one.joints}
     driven = {motor.joint for motor in mechanism.motors}
     ranked = sorted(mechanism.joints, key=lambda joint: (joint.name not in held, joint.name not in driven))
     kept, closing = _split(ranked)

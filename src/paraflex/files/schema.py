@@ -100,7 +100,8 @@ def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
         found["points"] = (TwoPoints, Field(description='["body.point", "body.point"]'))
         together += ["a", "b"]
     if joints := joint_pair(member):
-        found["joints"] = (TwoJoints, Field(description='["first joint", "second joint"]'))
+        pair = [f'"{each.metadata["description"]}"' for each in fields(member) if each.name in joints]
+        found["joints"] = (TwoJoints, Field(description=f"[{', '.join(pair)}]"))
         together += joints
     for each in fields(member):
         if each.name not in together:

@@ -28,7 +28,7 @@ def check_mechanism(mechanism: Members) -> None:
     check_ground(mechanism)
     check_joints(mechanism)
     check_members_at_joints(mechanism)
-    check_gears(mechanism)
+    check_relations(mechanism)
     check_assemblies(mechanism)
     check_connected(mechanism)
     check_task(mechanism)
@@ -78,23 +78,24 @@ def check_members_at_joints(mechanism: Members) -> None:
     joints = {joint.name: joint for joint in mechanism.joints}
     for group, members in grouped(mechanism):
         for member in members:
-            for name, joint in joints_named(member):
+            for name, joint, does in joints_named(member):
                 known(joint, joints, field := f"{group.table}.{member.name}.{name}", "joint")
-                joints[joint].check_moves(field)
+                joints[joint].check_moves(field, does)
     motors = [motor.name for motor in mechanism.motors]
     for mode in mechanism.modes:
         for name in mode.motors:
             known(name, motors, f"mode.{mode.name}", "motor")
 
 
-def check_gears(mechanism: Members) -> None:
-    """Gears relate two different joints."""
-    for gear in mechanism.gears:
-        if gear.first_joint == gear.second_joint:
-            raise InputError(
-                "a gear needs two different joints", field=f"gear.{gear.name}.joints", value=gear.first_joint,
-                remedy="name the two whose angles or travels belong together",
-            )  # fmt: skip
+def check_relations(mechanism: Members) -> None:
+    """Gears and the like relate two different joints."""
+    for group, members in grouped(mechanism):
+        for one in members if group.relates else ():
+            if one.first_joint == one.second_joint:
+                raise InputError(
+                    f"a {group.word} needs two different joints", field=f"{group.table}.{one.name}.joints",
+                    value=one.first_joint, remedy="name the two whose angles or travels belong together",
+                )  # fmt: skip
 
 
 def check_assemblies(mechanism: Members) -> None:

@@ -1,15 +1,53 @@
-"""Gears: one joint's coordinate follows another's in a constant ratio."""
+"""Gears and what else there is of relations: one joint's coordinate follows another's."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 from paraflex.arguments import CheckedFields
-from paraflex.mechanism.quantities import AT_JOINT, finite, not_zero, said
+from paraflex.mechanism.quantities import finite, not_zero, said
+
+PHASE = said(
+    "the coordinate of the second joint where that of the first is zero in rad, or m; by default as the first assembly "
+    "stands",
+    finite,
+)
+
+
+class Relation(CheckedFields):
+    """The coordinate of the second joint is the transmission times that of the first, plus the phase.
+
+    A kind of relation is a dataclass derived from this one. It has these fields, in its own words, and says what its
+    transmission is; all else asks that.
+
+    Attributes
+    ----------
+    name : str
+    first_joint, second_joint : str
+        Their coordinates are those of body b against body a, slopes of beams included.
+    phase : float, optional
+        Coordinate of the second joint where that of the first is zero [rad or m]. By default as the first assembly
+        stands; a mechanism has the number.
+    """
+
+    name: str
+    first_joint: str
+    second_joint: str
+    phase: float | None
+
+    @property
+    def transmission(self) -> float:
+        """What the second joint's coordinate grows by with the first's: without unit, in m/rad or in rad/m."""
+        raise NotImplementedError
+
+    @property
+    def joints(self) -> tuple[str, str]:
+        """Names of the two, the first first."""
+        return self.first_joint, self.second_joint
 
 
 @dataclass(frozen=True)
-class Gear(CheckedFields):
+class Gear(Relation):
     """The coordinate of the second joint is ratio times that of the first, plus phase.
 
     Of two wheels with fixed centres the ratio is -r1/r2 where they mesh outside, r1/r2 where one lies within the other,
@@ -32,8 +70,8 @@ class Gear(CheckedFields):
     _table = "gear"
 
     name: str
-    first_joint: str = field(metadata=AT_JOINT)
-    second_joint: str = field(metadata=AT_JOINT)
+    first_joint: str = field(metadata=said("first joint", joint="moves"))
+    second_joint: str = field(metadata=said("second joint", joint="moves"))
     ratio: float = field(
         metadata=said(
             "the second joint's angle by the first's, negative where wheels mesh outside; of a rack the radius of its "
@@ -42,16 +80,9 @@ class Gear(CheckedFields):
             "as the second joint's angle or travel by the first's",
         )
     )
-    phase: float | None = field(
-        default=None,
-        metadata=said(
-            "the coordinate of the second joint where that of the first is zero in rad, or m; by default as the first "
-            "assembly stands",
-            finite,
-        ),
-    )
+    phase: float | None = field(default=None, metadata=PHASE)
 
     @property
-    def joints(self) -> tuple[str, str]:
-        """Names of the two, the first first."""
-        return self.first_joint, self.second_joint
+    def transmission(self) -> float:
+        """The ratio."""
+        return self.ratio

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any
 
+from paraflex.mechanism.gears import Relation
+
 
 @dataclass(frozen=True)
 class Group:
@@ -35,6 +37,11 @@ class Group:
     plural: str = ""
     engines: bool = False
     resists: bool = False
+
+    @property
+    def relates(self) -> bool:
+        """Whether each of them is a relation between the coordinates of two joints."""
+        return bool(self.kinds) and all(issubclass(kind, Relation) for kind in self.kinds)
 
     @property
     def words(self) -> str:

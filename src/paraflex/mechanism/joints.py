@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import AT_JOINT, finite, said
+from paraflex.mechanism.quantities import AT_JOINT, JointThat, finite, said
 
 GROUND = "ground"
 
@@ -144,17 +144,21 @@ class Joint(CheckedFields, _Directions):
         cls.symbol = symbol or _SYMBOLS.get(holds, kind)
         JOINT_KINDS[kind] = cls
 
-    def check_moves(self, field: str) -> None:
-        """Check that the joint has an angle or a travel that is free.
+    def check_moves(self, field: str, does: JointThat = "moves") -> None:
+        """Check that the joint has an angle or a travel that is free, or the one of them that is asked for.
 
         Raises
         ------
         InputError
-            It has none, as a weld.
+            It has none, as a weld, or the other.
         """
         if not self.moves:
             problem = f"a {self.kind} does not {'move' if 'points' in self.holds else 'turn'}"
             raise InputError(problem, field=field, value=self.name, remedy="name another joint")
+        if does != "moves" and self.slides != (does == "slides"):
+            has, lacks = ("a travel", "an angle") if self.slides else ("an angle", "a travel")
+            problem = f"a {self.kind} joint has {has} and not {lacks}"
+            raise InputError(problem, field=field, value=self.name, remedy=f"name a joint that {does}")
 
 
 def points_named(member: Any) -> dict[str, PointRef]:

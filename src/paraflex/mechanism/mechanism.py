@@ -63,7 +63,8 @@ class Mechanism(Members, Shown):
         super().__post_init__()
         object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
-        object.__setattr__(self, "gears", with_phases(self))
+        for field, relations in with_phases(self).items():
+            object.__setattr__(self, field, relations)
 
     def save(self, path: str | Path) -> None:
         """Write the model file of this mechanism, from which `load` reads an equal one; see `Model.save`."""

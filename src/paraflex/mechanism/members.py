@@ -11,7 +11,7 @@ from typing import Self, TypeVar
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body
-from paraflex.mechanism.gears import Gear
+from paraflex.mechanism.gears import Gear, Relation
 from paraflex.mechanism.groups import Group, group, grouped
 from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
 from paraflex.mechanism.loads import (
@@ -164,6 +164,11 @@ class Members(CheckedFields):
     @cached_property
     def _joints_by_name(self) -> dict[str, Joint]:
         return {joint.name: joint for joint in self.joints}
+
+    @property
+    def relations(self) -> tuple[Relation, ...]:
+        """Gears, and all other members that relate the coordinates of two joints."""
+        return tuple(one for group, members in grouped(self) if group.relates for one in members)
 
     @cached_property
     def points(self) -> Mapping[str, Mapping[str, object]]:

@@ -1,46 +1,52 @@
-"""Phases of gears that are as an assembly stands."""
+"""Phases of gears and other relations that are as an assembly stands."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, sin
+from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.mechanism.gears import Gear
+from paraflex.mechanism.gears import Relation
+from paraflex.mechanism.groups import Group, groups_of
 from paraflex.mechanism.joints import Joint, PointRef
 from paraflex.mechanism.members import Members
 from paraflex.mechanism.poses import Place, Pose, approximate_poses, local_points, placed_in, placed_poses
 
 
-def with_phases(mechanism: Members) -> tuple[Gear, ...]:
-    """The gears of a mechanism, each with its phase.
+def with_phases(mechanism: Members) -> dict[str, tuple[Relation, ...]]:
+    """The relations of a mechanism by the fields that have them, each with its phase.
 
     Raises
     ------
     InputError
-        A gear without one where there is no assembly to take it from.
+        One without a phase where there is no assembly to take it from.
     """
-    if all(gear.phase is not None for gear in mechanism.gears):
-        return mechanism.gears
+    found = {}
+    for name, group in groups_of(type(mechanism)).items():
+        if group.relates:
+            members = getattr(mechanism, name)
+            found[name] = tuple(_with_phase(mechanism, group, one) if one.phase is None else one for one in members)
+    return found
+
+
+def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
+    """A relation with its phase as the first assembly stands."""
+    field = f"{group.table}.{relation.name}.phase"
     if not mechanism.assemblies:
-        gear = next(gear for gear in mechanism.gears if gear.phase is None)
         raise InputError(
-            "a gear's phase is not given, and there is no assembly to take it from", field=f"gear.{gear.name}.phase",
+            f"a {group.word}'s phase is not given, and there is no assembly to take it from", field=field,
             remedy="give it in rad (in m where the second joint slides), or an [assembly.NAME] table",
         )  # fmt: skip
     assembly = mechanism.assemblies[0]
     poses = approximate_poses(mechanism, assembly) | placed_poses(mechanism, assembly)
-
-    def phase(gear: Gear) -> float:
-        first, second = (_coordinate(mechanism, mechanism.joint(name), poses) for name in gear.joints)
-        if first is None or second is None:
-            raise InputError(
-                f"a gear's phase is not given, and assembly {assembly.name} does not tell where its joints stand",
-                field=f"gear.{gear.name}.phase", remedy="give it, or places of points in the assembly",
-            )  # fmt: skip
-        return second - gear.ratio * first
-
-    return tuple(replace(gear, phase=phase(gear)) if gear.phase is None else gear for gear in mechanism.gears)
+    first, second = (_coordinate(mechanism, mechanism.joint(name), poses) for name in relation.joints)
+    if first is None or second is None:
+        raise InputError(
+            f"a {group.word}'s phase is not given, and assembly {assembly.name} does not tell where its joints stand",
+            field=field, remedy="give it, or places of points in the assembly",
+        )  # fmt: skip
+    return replace(relation, phase=second - relation.transmission * first)
 
 
 def _coordinate(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:

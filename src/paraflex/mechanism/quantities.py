@@ -6,9 +6,12 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import fields
 from functools import partial
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from paraflex.errors import InputError, suggestion
+
+# What a joint that a member names does: it has an angle, a travel, or either.
+JointThat = Literal["moves", "turns", "slides"]
 
 
 def known(name: str, names: Collection[str], field: str, kind: str) -> None:
@@ -44,18 +47,18 @@ def not_zero(value: float, field: str, unit: str) -> None:
 
 
 def said(
-    description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: bool = False
+    description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: JointThat | None = None
 ) -> dict[str, Any]:
     """Metadata of a member's field: what model files, their schema and errors say of it, with the unit behind "in".
 
     A number is checked, unless it is None, by `finite`, or with a unit to ask for by `positive`, `not_negative` or
-    `not_zero`; a name may be a joint's.
+    `not_zero`; a name may be that of a joint that moves, turns or slides.
     """
     checked = partial(check, unit=unit) if check is not None and unit else check
     return {"description": description, "check": checked, "joint": joint}
 
 
-AT_JOINT = said("the name of a joint", joint=True)
+AT_JOINT = said("the name of a joint", joint="moves")
 
 
 def check_numbers(member: Any, place: str) -> None:
@@ -66,12 +69,12 @@ def check_numbers(member: Any, place: str) -> None:
             check(value, f"{place}.{each.name}")
 
 
-def joints_named(member: Any) -> Iterator[tuple[str, str]]:
-    """Joints that a member names, each with what files call the field."""
+def joints_named(member: Any) -> Iterator[tuple[str, str, JointThat]]:
+    """Joints that a member names, each with what files call the field before it and what it must do behind."""
     together = joint_pair(member)
     for each in fields(member):
-        if each.metadata.get("joint"):
-            yield "joints" if together else each.name, getattr(member, each.name)
+        if does := each.metadata.get("joint"):
+            yield "joints" if together else each.name, getattr(member, each.name), does
 
 
 def joint_pair(member: Any) -> list[str]:

@@ -1,3 +1,4 @@
+# Each figure from the module that its function is in.
 from .agreement import (
     compared_deflections as compared_deflections,
     compared_links as compared_links,

@@ -8,15 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.plots.scene import BLOCK, DrawnGear, DrawnJoint, Limits, Scene
+from paraflex.plots.scene import BLOCK, DrawnJoint, Limits, Scene
 
 Array = NDArray[np.float64]
 
 # Sizes as parts of the picture's larger side.
 PIN, TRIANGLE, RAIL = 0.008, 0.028, 0.02
 _TEETH = 14
-# Points of a circle.
-_CIRCLE = 61
 # A joint that moves by less than this part of the picture stays where it is.
 _STILL = 1e-3
 
@@ -65,20 +63,11 @@ def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
 
 def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of gears, springs and joints."""
-    out = [Mark("gear", gear.name, line) for gear in shown.gears for line in pitch_lines(gear)]
+    out = [Mark("gear", gear.name, line) for gear in shown.gears for line in gear.lines]
     out += [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
     parts = [(joint, look, shape) for joint in shown.joints for look, shape in SYMBOLS.get(joint.kind, {}).items()]
     out += [Mark(look, joint.name, shape(joint, limits)) for joint, look, shape in parts]
     return sorted(out, key=lambda mark: list(LOOKS).index(mark.look))
-
-
-def pitch_lines(gear: DrawnGear) -> list[Array]:
-    """Pitch circles (f, n, 2) of two wheels; where there are none, a line from joint to joint."""
-    if np.isnan(gear.radii).any():
-        return [gear.ends]
-    angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
-    rim = np.column_stack([np.cos(angle), np.sin(angle)])
-    return [gear.ends[:, end, None] + gear.radii[end] * rim for end in range(2)]
 
 
 def by_look(marks: Sequence[Mark]) -> dict[str, list[Mark]]:

@@ -18,6 +18,8 @@ from paraflex.plots.selection import names_of, select_run
 
 Array = NDArray[np.float64]
 
+# Points of a circle.
+_CIRCLE = 61
 # Length and width of what slides, as parts of the picture's larger side.
 BLOCK = (0.034, 0.022)
 _MARGIN = 0.07
@@ -66,11 +68,10 @@ class DrawnJoint:
 
 
 class DrawnGear(NamedTuple):
-    """A gear at f times: places of its two joints (f, 2, 2), and pitch radii (2,) where they are known, else NaN."""
+    """A gear or the like at f times: pitch circles and lines (f, n, 2), or a line from joint to joint."""
 
     name: str
-    ends: Array
-    radii: Array
+    lines: tuple[Array, ...]
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     )
     springs, followed = _springs(run, drawn), followed_station(run)
     seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
-    seen += [gear.ends + sign * gear.radii[:, None] for gear in _gears(run, places) for sign in (1.0, -1.0)]
+    seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
     return Scene(
         mechanism=str(run.attrs["mechanism"]),
         mode=str(run["mode"].item()) if "mode" in run.coords else "",
@@ -205,7 +206,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
         stiff={} if magnify == 1.0 else {name: at(figure_of(base[:, own])) for name, own in bodies.items()},
         joints=joints,
         springs={name: at(ends) for name, ends in springs.items()},
-        gears=_gears(run, at(places)),
+        gears=_gears(run, at(places), at(directions)),
         anchors=_anchors(run),
         followed=followed,
         trail=None if followed is None else at(drawn[:, followed]),
@@ -262,14 +263,43 @@ def _springs(run: xr.Dataset, drawn: Array) -> dict[str, Array]:
     return {str(name): places[:, i] for i, name in enumerate(run["spring"].values)}
 
 
-def _gears(run: xr.Dataset, joints: Array) -> tuple[DrawnGear, ...]:
-    """Gears between joints that stand at these places (f, joints, 2)."""
+def _gears(run: xr.Dataset, joints: Array, directions: Array) -> tuple[DrawnGear, ...]:
+    """Gears between joints that stand at these places (f, joints, 2) in these directions (f, joints)."""
     if "gear_joint" not in run:
         return ()
-    held, radii = run["gear_joint"].values, run["gear_radius"].values
+    names, related = run["gear"].values, run["gear_joint"].values.astype(int)
     return tuple(
-        DrawnGear(str(name), joints[:, held[i].astype(int)], radii[i]) for i, name in enumerate(run["gear"].values)
+        DrawnGear(str(name), pitch_lines(joints[:, held], directions[:, held], radii))
+        for name, held, radii in zip(names, related, run["gear_radius"].values, strict=True)
     )
+
+
+def pitch_lines(ends: Array, directions: Array, radii: Array) -> tuple[Array, ...]:
+    """Pitch circles (f, n, 2) of wheels and pitch lines of racks; where radii are NaN, a line from joint to joint.
+
+    Parameters
+    ----------
+    ends, directions : (f, 2, 2) and (f, 2) arrays
+        Of the two joints.
+    radii : (2,) array
+        See `results.drawing.pitch_radii`.
+    """
+    if np.isnan(radii).any():
+        return (ends,)
+    angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE)
+    rim = np.column_stack([np.cos(angle), np.sin(angle)])
+    circles = [ends[:, end, None] + radii[end] * rim for end in range(2) if np.isfinite(radii[end])]
+    return (*circles, *(_pitch_line(ends, directions, radii, end) for end in range(2) if np.isinf(radii[end])))
+
+
+def _pitch_line(ends: Array, directions: Array, radii: Array, rack: int) -> Array:
+    """The line (f, 2, 2) that a pinion rolls on, past what touches and to the joint of its rack."""
+    along = np.stack([np.cos(directions[:, rack]), np.sin(directions[:, rack])], axis=-1)
+    right, radius = along[:, ::-1] * [1.0, -1.0], radii[1 - rack]
+    touching = ends[:, 1 - rack] + np.sign(radii[rack]) * radius * right
+    reach = np.sum((ends[:, rack] - touching) * along, axis=-1)
+    first, last = np.minimum(reach, -radius), np.maximum(reach, radius)
+    return touching[:, None] + np.stack([first, last], axis=1)[..., None] * along[:, None]
 
 
 def _with_rails(places: Array, joints: tuple[DrawnJoint, ...]) -> Array:
@@ -319,7 +349,7 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
             replace(joint, place=joint.place[chosen], direction=joint.direction[chosen]) for joint in shown.joints
         ),
         springs={name: ends[chosen] for name, ends in shown.springs.items()},
-        gears=tuple(gear._replace(ends=gear.ends[chosen]) for gear in shown.gears),
+        gears=tuple(DrawnGear(gear.name, tuple(line[chosen] for line in gear.lines)) for gear in shown.gears),
         trail=None if shown.trail is None else shown.trail[chosen],
     )
 

@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
-from paraflex.mechanism import GROUND, Body, Gear, Joint, Mechanism, PointRef, Pose, RigidBody, placed_poses
+from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
 from paraflex.mechanism.poses import local_points
 from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape, turned
 
 Array = NDArray[np.float64]
+
+# What joints of wheels and of racks do: whether they slide, and what they hold.
+_WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
 
 
 @dataclass(frozen=True)
@@ -167,13 +170,13 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
             "spring_station": (("spring", "end"), np.array(ends, dtype=np.int32)),
         }
     of_gears: dict[str, Any] = {}
-    if mechanism.gears:
+    if related := mechanism.relations:
         number = {joint.name: k for k, joint in enumerate(joints)}
-        held = [[number[name] for name in gear.joints] for gear in mechanism.gears]
+        held = [[number[name] for name in one.joints] for one in related]
         of_gears = {
-            "gear": [gear.name for gear in mechanism.gears],
+            "gear": [one.name for one in related],
             "gear_joint": (("gear", "end"), np.array(held, dtype=np.int32)),
-            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, gear) for gear in mechanism.gears])),
+            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, one) for one in related])),
         }
     return {
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
@@ -186,22 +189,31 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     }
 
 
-def pitch_radii(mechanism: Mechanism, gear: Gear) -> tuple[float, float]:
-    """Radii of two wheels that mesh outside, about joints that one body or the ground holds apart [m]; else NaN."""
-    first, second = (mechanism.joint(name) for name in gear.joints)
+def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
+    """Radii of two wheels that mesh outside, or of a pinion and its rack, on joints that one body or the ground holds.
+
+    Of a rack, whose joint slides without turning, infinity: positive where its pitch line lies to the right of the
+    joint's direction as seen from the pinion, else negative. NaN of anything else [m].
+    """
+    unknown = np.nan, np.nan
+    joints = first, second = [mechanism.joint(name) for name in one.joints]
     carriers = {first.a.body, first.b.body} & {second.a.body, second.b.body}
-    if not (first.holds == second.holds == ("points",) and len(carriers) == 1):
-        return np.nan, np.nan
+    kinds = [(joint.slides, set(joint.holds)) for joint in joints]
+    if len(carriers) != 1 or any(kind not in (_WHEEL, _RACK) for kind in kinds):
+        return unknown
     (carrier,) = carriers
+    # Of their turns and travels against what carries both.
+    sides = [1.0 if joint.a.body == carrier else -1.0 for joint in joints]
+    ratio = one.transmission * sides[0] * sides[1]
+    if kinds == [_WHEEL, _RACK]:
+        return abs(ratio), np.copysign(np.inf, ratio)
+    if kinds == [_RACK, _WHEEL]:
+        return np.copysign(np.inf, ratio), abs(1.0 / ratio)
+    if kinds == [_RACK, _RACK] or ratio > 0.0:
+        return unknown
     places = mechanism.ground if carrier == GROUND else local_points(mechanism.body(carrier))
-    (ref_1, sign_1), (ref_2, sign_2) = (
-        (joint.a, 1.0) if joint.a.body == carrier else (joint.b, -1.0) for joint in (first, second)
-    )
-    # Of the wheels' turns against what carries both.
-    ratio = gear.ratio * sign_1 * sign_2
-    if ratio > 0.0:
-        return np.nan, np.nan
-    apart = float(np.hypot(*np.subtract(places[ref_2.point], places[ref_1.point])))
+    ends = [places[(joint.a if joint.a.body == carrier else joint.b).point] for joint in joints]
+    apart = float(np.hypot(*np.subtract(ends[1], ends[0])))
     return apart * ratio / (ratio - 1.0), apart / (1.0 - ratio)
 
 

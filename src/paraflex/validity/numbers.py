@@ -167,8 +167,8 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
     given |= {f"spring.{one.name}.rest": one.rest for one in turning}
     given |= {
         f"assembly.{assembly.name}.{body}": angle
-        # Gears count turns.
-        for assembly in (() if mechanism.gears else mechanism.assemblies)
+        # Gears and the like count turns.
+        for assembly in (() if mechanism.relations else mechanism.assemblies)
         for body, angle in assembly.angles.items()
     }
     for place, angle in given.items():
