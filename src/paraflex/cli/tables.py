@@ -53,8 +53,8 @@ def _study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Tab
     span = ErrorSpan(figures["error"])
     motors = [motor.name for motor in task.mechanism.motors]
     heads = [f"{name}\n[{unit}]" for name, unit in zip(motors, task.mechanism.motor_units(), strict=True)]
-    efforts = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
-    title = f"{figures['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {efforts}"
+    quantity = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
+    title = f"{figures['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {quantity}"
     table = plain_table("mode", numbers=("error\n[m]", *heads, "steps\n", "wall\n[s]"), title=title)
     for name, mode in figures["modes"].items():
         if "steps" not in mode:

@@ -14,12 +14,11 @@ from paraflex.arrays import Array
 from paraflex.dynamics import (
     System,
     build_system,
-    constant_signals,
-    pack_signals,
     project_position,
     records,
     redundant_rows,
     reference_pose,
+    still_signals,
 )
 from paraflex.dynamics.points import point_motion
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
@@ -238,9 +237,7 @@ class PathClosure:
         self.system = system = build_system(free)
         self.orientation = orientation
         end = end if end > 0.0 else 1.0
-        self.signals: Signals = pack_signals(
-            system.mechanism, constant_signals([0.0] * len(system.mechanism.motors), end), end
-        )[0]
+        self.signals: Signals = still_signals(system.mechanism, end)[0]
         self.coordinates = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
         self.packed, self.marker = with_marker(system, effector.point)
         self.reach = PoseSearch(system, effector.point, self.coordinates, self.signals)
