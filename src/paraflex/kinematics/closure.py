@@ -324,7 +324,7 @@ class PathClosure:
 
     def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]):
         """The motion at the instants of the grid to keep, with more instants between where steps prove too long."""
-        stretches = []
+        intervals = []
         while True:
             target = self.target(path, grid)
             status, index, _, found = self.run(grid, target, pose)
@@ -332,14 +332,14 @@ class PathClosure:
             if status in (CLOSED, SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
                 break
             # From the last instant reached, in shorter steps.
-            stretches.append([x[:last][keep[:last]] for x in (grid, *found)])
+            intervals.append([x[:last][keep[:last]] for x in (grid, *found)])
             pose = found[0][last]
             between = np.linspace(grid[last], grid[index], _PIECES + 1)[1:-1]
             grid = np.concatenate([grid[last:index], between, grid[index:]])
             keep = np.concatenate([keep[last:index], np.zeros(between.size, bool), keep[index:]])
-        stretches.append([x[:index][keep[:index]] for x in (grid, *found)])
+        intervals.append([x[:index][keep[:index]] for x in (grid, *found)])
         motion = RigidMotion(
-            self.mechanism, self.system, path, *(np.concatenate(parts) for parts in zip(*stretches, strict=True))
+            self.mechanism, self.system, path, *(np.concatenate(parts) for parts in zip(*intervals, strict=True))
         )
         if status == CLOSED:
             return motion
