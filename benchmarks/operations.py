@@ -20,7 +20,7 @@ def equations(p: PackedSystem) -> int:
         n = int(body["nf"])
         total += _bent_terms(p, body) if p.bending is not None and body["slopes"] else _linear_terms(n)
         # Each motor: its torque along [1, N2'].
-        total += int(body["effort_end"] - body["effort"]) * (2 + 2 * n)
+        total += int(body["motor_end"] - body["motor"]) * (2 + 2 * n)
         for port in p.ports[body["port"] : body["port_end"]]:
             total += _port(p, port, n)
     return total

@@ -8,7 +8,7 @@ import pytest
 import twins
 from conftest import make_linkage
 from paraflex.dynamics import build_system
-from paraflex.kernel.joints import body_efforts, body_joints, start_rows
+from paraflex.kernel.joints import body_joints, body_motors, start_rows
 from paraflex.kernel.packed import make_scratch
 
 SEEDS = (31, 32)
@@ -137,7 +137,7 @@ def test_power_of_a_motor_is_torque_times_the_relative_turning_rate_of_the_mater
     torques, f = np.zeros(4), np.zeros(linkage.n)
     torques[motor] = 1.7
     for i in range(len(linkage.bodies)):
-        body_efforts(linkage.packed, i, torques, make_scratch(linkage.packed), f)
+        body_motors(linkage.packed, i, torques, make_scratch(linkage.packed), f)
     joint = linkage.mechanism.joint(linkage.mechanism.motors[motor].joint)
     rate = turning_rate(linkage, joint.b, q, v) - turning_rate(linkage, joint.a, q, v)
     assert abs(rate) > 0.1
@@ -169,7 +169,7 @@ def test_torque_and_reaction_cancel_in_a_turn_of_everything(linkage):
         torques, f = np.zeros(4), np.zeros(linkage.n)
         torques[k] = 1.0
         for i in range(len(linkage.bodies)):
-            body_efforts(linkage.packed, i, torques, make_scratch(linkage.packed), f)
+            body_motors(linkage.packed, i, torques, make_scratch(linkage.packed), f)
         assert -f @ together == pytest.approx(expected[motor.name], abs=1e-15)
 
 

@@ -22,11 +22,11 @@ def report(tmp_path_factory):
 
 def drawn(page: Page) -> str:
     """What is on the canvas, after it is painted."""
-    settle(page)
+    wait_for_drawing(page)
     return page.evaluate("document.getElementById('canvas').toDataURL()")
 
 
-def settle(page: Page) -> None:
+def wait_for_drawing(page: Page) -> None:
     """Two frames of the screen: what has changed is drawn."""
     page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
 
@@ -35,7 +35,7 @@ def curves(page: Page, chart: str) -> list[list[float]]:
     """What Plotly draws in a chart, once it is in view and drawn."""
     page.locator(f"#chart-{chart}").scroll_into_view_if_needed()
     page.wait_for_function("(id) => document.querySelector(`#chart-${id} .js-plotly-plot .trace`)", arg=chart)
-    settle(page)
+    wait_for_drawing(page)
     return page.evaluate(
         "(id) => document.querySelector(`#chart-${id} .js-plotly-plot`).data.map((trace) => Array.from(trace.y))", chart
     )
@@ -103,7 +103,7 @@ def test_the_links_are_drawn_where_the_dataset_has_them(opened):
     page = opened()
     page.locator("#names").uncheck()
     page.evaluate("player.seek(0.04)")
-    settle(page)
+    wait_for_drawing(page)
     counts = coloured(page)
     assert min(counts) > 100
     # The longest link has most of the pixels: 0.25 m and 0.1 m.
@@ -165,7 +165,7 @@ def test_the_selector_of_modes_changes_curves_and_mechanism(opened):
     assert drawn(page) != picture
     # Another motor beside itself in all modes: the selected one is the thickest.
     page.locator("#chart-torques select").select_option(label="τ₁, all modes")
-    settle(page)
+    wait_for_drawing(page)
     assert len(curves(page, "torques")) == len(MODES)
     widths = page.evaluate("document.querySelector('#chart-torques .js-plotly-plot').data.map((t) => t.line.width)")
     assert widths.index(max(widths)) == 1
@@ -193,7 +193,7 @@ def test_a_line_in_every_chart_goes_with_time(opened):
     places = []
     for time in (0.02, 0.06):
         page.evaluate(f"player.seek({time})")
-        settle(page)
+        wait_for_drawing(page)
         box = page.locator("#chart-torques .cursor").bounding_box()
         assert box is not None
         places.append(box["x"])
@@ -201,7 +201,7 @@ def test_a_line_in_every_chart_goes_with_time(opened):
     assert places[1] - places[0] == pytest.approx(0.4 * plot, rel=0.02)
     # In the plane a dot goes along the path.
     page.locator("#chart-path").scroll_into_view_if_needed()
-    settle(page)
+    wait_for_drawing(page)
     assert page.locator("#chart-path .dot").first.is_visible()
 
 
@@ -227,14 +227,14 @@ def test_dark_and_light_follow_the_system_and_the_button(opened):
     ink = "document.querySelector('#chart-errors .js-plotly-plot').layout.font.color"
     dark = page.evaluate(ground), page.evaluate(ink), drawn(page)
     page.emulate_media(color_scheme="light")
-    settle(page)
+    wait_for_drawing(page)
     light = page.evaluate(ground), page.evaluate(ink), drawn(page)
     assert all(one != other for one, other in zip(dark, light, strict=True))
     button = page.locator("#theme")
     for expected in ("light", "dark"):
         button.click()
         assert button.get_attribute("aria-label") == f"Theme: {expected}"
-    settle(page)
+    wait_for_drawing(page)
     assert (page.evaluate(ground), page.evaluate(ink)) == dark[:2]
 
 

@@ -7,7 +7,7 @@ from conftest import DESKTOP, PHONE
 from paraflex.report import save_page
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
-from test_report_browser import drawn, settle
+from test_report_browser import drawn, wait_for_drawing
 
 STUDY = """
 mechanism = "raparm_i"
@@ -46,7 +46,7 @@ def traces(page: Page, chart: str) -> list[dict]:
     """What Plotly draws in a chart, once it is drawn."""
     page.locator(f"#chart-{chart}").scroll_into_view_if_needed()
     page.wait_for_function("(id) => charts.all.find((c) => c.told.identity === id).drawn", arg=chart)
-    settle(page)
+    wait_for_drawing(page)
     return page.evaluate(
         """(id) => document.querySelector(`#chart-${id} .js-plotly-plot`).data.map((trace) => ({
             mode: trace.mode || trace.type, name: trace.name,
@@ -66,7 +66,7 @@ def values(page: Page, identity: str) -> list[float]:
 
 def choose(page: Page, chart: str, which: str, name: str) -> None:
     page.locator(f"#chart-{chart} select[aria-label$=': {which}']").select_option(label=name)
-    settle(page)
+    wait_for_drawing(page)
 
 
 def test_every_chart_of_all_designs_is_drawn(opened):

@@ -119,20 +119,20 @@ def simulate_ked(
         status, message = "interrupted", f"interrupted at t = {times[steps]:.6g} s"
     except IntegrationError as error:
         status, message, failure = "failed", str(error), error
-    figures = _figures(task, torques, np.array(reached), kept)
+    fields = _fields(task, torques, np.array(reached), kept)
     if end is not None and reached[-1] == stop:
         status, event = "stopped", str(end.function.event)
-        message = f"{end.function.reached(figures['q'][-1])} at t = {stop:.6g} s"
+        message = f"{end.function.reached(fields['q'][-1])} at t = {stop:.6g} s"
     wall_time = time.perf_counter() - began
     solution = Solution(
-        **figures,
+        **fields,
         status=status,
         message=message,
         steps=steps,
         factorisations=steps + 1,
         wall_time=wall_time,
         event=event,
-        findings=beyond_ends(task.system, figures["t"], figures["q"], figures["v"]),
+        findings=beyond_ends(task.system, fields["t"], fields["q"], fields["v"]),
     )
     holding = _holding(task.system, torques.mode, kept[: len(kept) - bool(event)])
     run = TrackingRun(task, torques, condition, solution, method="KED, generalised-alpha", holding=holding)
@@ -271,7 +271,7 @@ def _until(stop: float, times: Array, responses: Iterable[Response]) -> Iterator
         earlier, before = t, response
 
 
-def _figures(task: TrackingTask, torques: FeedForward, t: Array, kept: list[Response]) -> dict[str, Any]:
+def _fields(task: TrackingTask, torques: FeedForward, t: Array, kept: list[Response]) -> dict[str, Any]:
     """What a Solution holds of the instants kept; violations are those of the nonlinear constraints there."""
     system = task.system
     xi, dxi, ddxi, mu = (np.array(values) for values in zip(*kept, strict=True))

@@ -19,9 +19,9 @@ from paraflex.dynamics import (
     balanced_state,
     brake,
     build_system,
-    constant_signals,
     joint_motions,
     pack_signals,
+    still_signals,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
@@ -106,13 +106,13 @@ class TrackingTask:
         """Feed-forward torques of a mode: minimum norm, smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
 
-    def driven(self, mode: str, efforts: Array, condition: Array, actual: Array | None = None) -> Driven:
+    def driven(self, mode: str, torques: Array, condition: Array, actual: Array | None = None) -> Driven:
         """What torques or forces (k, motors) of a mode do, at the first samples of the task.
 
         Parameters
         ----------
         mode : str
-        efforts : (k, motors) array
+        torques : (k, motors) array
             [N m, N]
         condition : (k,) array
             Of the actuation matrix.
@@ -127,7 +127,7 @@ class TrackingTask:
             desired=wanted,
             actual=wanted if actual is None else actual,
             acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
-            efforts=dict(zip(names, np.max(np.abs(efforts), axis=0).tolist(), strict=True)),
+            peaks=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
             units=dict(zip(names, mechanism.motor_units(), strict=True)),
             condition=float(np.max(condition)),
         )
@@ -255,7 +255,7 @@ class TrackingRun(Shown):
 
     @cached_property
     def driven(self) -> Driven | None:
-        """Path, efforts and condition number, where torques drive the mechanism along the path."""
+        """Path, largest torques and condition number, where torques drive the mechanism along the path."""
         task, solution = self.task, self.solution
         # The state at an event is a sample more than the task's times.
         k = solution.t.size - bool(solution.event)
@@ -447,18 +447,17 @@ def _drive_and_hold(
         return TrackingRun(task, torques, condition, driven, title)
     motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]
     braked = brake(task.system, State(float(until[-1]), driven.q[-1], driven.v[-1]), [motor.joint for motor in motors])
-    none = constant_signals([0.0] * len(task.mechanism.motors), float(times[-1]))
-    signals, knots = pack_signals(braked.system.mechanism, none, float(times[-1]))
+    signals, knots = still_signals(braked.system.mechanism, float(times[-1]))
     own = [braked.system.rows.index(row) for row in task.system.rows]
     columns = [task.mechanism.motors.index(motor) for motor in motors]
 
     def whole(held: Solution) -> TrackingRun:
         solution = driven.followed_by(held, count, held.multipliers[:, own], braked.energy)
-        efforts = np.zeros((held.t.size, len(task.mechanism.motors)))
-        efforts[:, columns] = braked.efforts(held.multipliers)
+        holding = np.zeros((held.t.size, len(task.mechanism.motors)))
+        holding[:, columns] = braked.holding(held.multipliers)
         # The state at an event is a sample more than the task's times.
-        efforts = np.concatenate([torques.evaluate(driven.t[:count]), efforts[: held.t.size - bool(held.event)]])
-        return TrackingRun(task, torques, condition, solution, title, holding=efforts)
+        holding = np.concatenate([torques.evaluate(driven.t[:count]), holding[: held.t.size - bool(held.event)]])
+        return TrackingRun(task, torques, condition, solution, title, holding=holding)
 
     try:
         held = integrate(

@@ -94,9 +94,9 @@ def write_text(path: Path, text: str, **options: Any) -> None:
         unfinished.write_text(text, encoding="utf-8")
 
 
-def write_json(path: Path, figures: Any, **options: Any) -> None:
+def write_json(path: Path, data: Any, **options: Any) -> None:
     """Write plain values as JSON, others as their text; see `whole_file` for the options and errors."""
-    write_text(path, json.dumps(figures, indent=2, default=str) + "\n", **options)
+    write_text(path, json.dumps(data, indent=2, default=str) + "\n", **options)
 
 
 def read_json(file: Path) -> dict[str, Any]:

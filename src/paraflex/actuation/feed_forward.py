@@ -22,7 +22,7 @@ _DEGREE = 5
 _ACCURACY = 1e-8
 # By how much an error falls with half the interval, at least: 2^6 where the torques are smooth.
 _GAIN = 32.0
-# Points of a smooth stretch to begin with, at least, and seconds between them at most.
+# Points of a smooth interval to begin with, at least, and seconds between them at most.
 _FEWEST, _SPACING = 12, 2e-3
 _REFINEMENTS = 6
 _IN_TIME = ("t", "q", "v", "a", "basis")

@@ -17,7 +17,7 @@ from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
 from paraflex.tracking import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import GRAVITY, mechanism_mass, mechanism_size
-from paraflex.validity.plausibility import doubtful_efforts
+from paraflex.validity.plausibility import doubtful_torques
 
 # Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
 ILL_CONDITIONED = 1e3
@@ -83,10 +83,10 @@ def study_findings(
         yield from _driven(model, task, modes)
 
 
-def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, efforts: bool = False) -> Iterator[Finding]:
+def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, magnitudes: bool = False) -> Iterator[Finding]:
     """How modes drive the mechanism along a planned path: singular positions, and friction beyond the motors.
 
-    With efforts also torques and forces that are far from plausible; a run says so of those it applied.
+    With `magnitudes` also torques and forces that are far from plausible; a run says so of those it applied.
     """
     for mode in modes:
         try:
@@ -103,8 +103,8 @@ def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, efforts
                 "move the path, or add motors to the mode",
             )  # fmt: skip
         yield from _friction(task.mechanism, mode, np.max(np.abs(torques), axis=0))
-        if efforts:
-            yield from doubtful_efforts(task.system, task.driven(mode.name, torques, condition))
+        if magnitudes:
+            yield from doubtful_torques(task.system, task.driven(mode.name, torques, condition))
 
 
 def path_findings(model: Model, path: Path, name: str, duration: float) -> Iterator[Finding]:
@@ -188,7 +188,7 @@ def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> It
             "mode-missing", "mode", f"there is a path and {what} to drive the mechanism along it",
             "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
         )  # fmt: skip
-    yield from task_findings(task, asked, efforts=True)
+    yield from task_findings(task, asked, magnitudes=True)
 
 
 def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:

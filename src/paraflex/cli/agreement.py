@@ -30,16 +30,16 @@ _SOUND = {
 _LINKS = {"angle": "angle [rad]", "angular_velocity": "angular velocity [rad/s]"}
 
 
-def print_agreement(console: Console, figures: dict[str, Any], mode: str) -> None:
+def print_agreement(console: Console, summary: dict[str, Any], mode: str) -> None:
     """How the models of a mode agree, the evidence that each is converged, and the differences of every link."""
-    models, distances = figures["modes"][mode]["models"], figures["modes"][mode]["distances"]
+    models, distances = summary["modes"][mode]["models"], summary["modes"][mode]["distances"]
     finished = {name: values for name, values in models.items() if "tracking_error" in values}
-    reference = figures["reference"]
+    reference = summary["reference"]
     compared = {name: values for name, values in finished.items() if "distance_max" in values and name != reference}
 
     short = [_SHORT[name] for name in finished]
-    where = f"{figures['mechanism']}, mode {mode}"
-    span = SPAN_WORDS[ErrorSpan(figures["error"])]
+    where = f"{summary['mechanism']}, mode {mode}"
+    span = SPAN_WORDS[ErrorSpan(summary["error"])]
     print_titled(
         console,
         f"{where}: tracking error {span}, and distance from the path of {_SHORT[reference]}",
@@ -55,7 +55,7 @@ def print_agreement(console: Console, figures: dict[str, Any], mode: str) -> Non
     print_titled(console, title, plain_table("model", numbers=_SOUND, rows=sound))
     for key, what in _LINKS.items() if compared else ():
         of_links = [one[f"{key}_difference_rms"] for one in compared.values()]
-        rows = ([link, *(number(each[link], ".1e") for each in of_links)] for link in figures["links"])
+        rows = ([link, *(number(each[link], ".1e") for each in of_links)] for link in summary["links"])
         table = plain_table("link", numbers=(_SHORT[name] for name in compared), rows=rows)
         print_titled(console, f"RMS difference of each link's {what} from {_SHORT[reference]}", table)
 

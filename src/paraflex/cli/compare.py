@@ -52,18 +52,18 @@ def compare_command(request: CompareRequest) -> int:
     study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
     with counting(console) as report:
         comparison = study.run(folder, on_progress=report)
-    figures = comparison.to_dict()
+    summary = comparison.to_dict()
     if comparison.measurements:
         from paraflex.plots import save_figures
 
-        save_figures(figures, folder / "figures")
+        save_figures(summary, folder / "figures")
 
     def show(out: Console) -> None:
-        print_comparison(out, figures)
+        print_comparison(out, summary)
         if comparison.measurements:
             say_where(began, "numbers and figure", folder)
 
-    tell(figures, show, as_json=request.json, doubts=())
+    tell(summary, show, as_json=request.json, doubts=())
     done = any(run.status == "complete" for run in comparison.measurements)
     return exit_code(done, interrupted=comparison.interrupted)
 

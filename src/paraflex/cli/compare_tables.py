@@ -24,32 +24,32 @@ _COUNTS = {
 _SETTING = "tol. [m],\nstep [s]"
 
 
-def print_comparison(console: Console, figures: dict[str, Any]) -> None:
+def print_comparison(console: Console, summary: dict[str, Any]) -> None:
     """Work of every run, what it kept, time of every method for an error, and the fastest."""
-    reference = figures["reference"]
+    reference = summary["reference"]
     if reference is None:
         return
     console.print(
-        f"{figures['mechanism']}, {figures['case']}, {figures['duration']:g} s. Errors are distances from "
+        f"{summary['mechanism']}, {summary['case']}, {summary['duration']:g} s. Errors are distances from "
         f"{reference['method']} at {reference['tolerance']:g} m, certain to {reference['uncertainty']:.0e} m "
         f"(as far as {reference['check_method']} at {reference['check_tolerance']:g} m is off).",
         soft_wrap=True,
     )
     done = {
         name: [run for run in method["runs"] if run["status"] == "complete"]
-        for name, method in figures["methods"].items()
+        for name, method in summary["methods"].items()
     }
     if any(done.values()):
-        _print_tables(console, figures, [(name, run) for name, runs in done.items() for run in runs])
-    _print_reasons(console, figures["methods"])
-    fastest = [f"{level} m {name}" for level, name in figures["fastest"].items() if name is not None]
+        _print_tables(console, summary, [(name, run) for name, runs in done.items() for run in runs])
+    _print_reasons(console, summary["methods"])
+    fastest = [f"{level} m {name}" for level, name in summary["fastest"].items() if name is not None]
     if fastest:
         console.print(f"Fastest: {', '.join(fastest)}", soft_wrap=True)
 
 
-def _print_tables(console: Console, figures: dict[str, Any], done: list[tuple[str, dict[str, Any]]]) -> None:
+def _print_tables(console: Console, summary: dict[str, Any], done: list[tuple[str, dict[str, Any]]]) -> None:
     """Tables of the complete runs, each with its method's name."""
-    uncertainty = figures["reference"]["uncertainty"]
+    uncertainty = summary["reference"]["uncertainty"]
     precision = (
         [
             name,
@@ -64,7 +64,7 @@ def _print_tables(console: Console, figures: dict[str, Any], done: list[tuple[st
     print_titled(console, "Error, time, violation of constraints, imbalance of energy", table)
     work = ([name, _setting(run), *(str(run[key]) for key in _COUNTS.values())] for name, run in done)
     print_titled(console, "Work", plain_table("method", numbers=(_SETTING, *_COUNTS), rows=work))
-    levels, methods = list(figures["fastest"]), {name: figures["methods"][name] for name, _ in done}
+    levels, methods = list(summary["fastest"]), {name: summary["methods"][name] for name, _ in done}
     times = (
         [name, *(number(one["time_to_reach"][level], ".3g") for level in levels), number(one["relative_time"], ".2f")]
         for name, one in methods.items()

@@ -75,14 +75,14 @@ def run_motion(
     }
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
-    figures = motion_summary(data)
-    write_run(data, figures, folder, report=request.report)
+    summary = motion_summary(data)
+    write_run(data, summary, folder, report=request.report)
 
     def show(out: Console) -> None:
-        _report(out, figures, data)
+        _report(out, summary, data)
         say_where(began, "results, figures", folder, report=request.report)
 
-    tell(figures, show, as_json=request.json)
+    tell(summary, show, as_json=request.json)
     finished = run.solution.status in FINISHED
     if not finished:
         console.print(f"error: {run.solution.message}", soft_wrap=True)
@@ -157,33 +157,33 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     return found if model.start is None else start_state(system, model.start, q=found.q)
 
 
-def _ended(figures: dict) -> str:
+def _ended(summary: dict) -> str:
     """How a run ended. When it failed its message says; the last sample is before that."""
-    status, steps, time = figures["status"], f"{figures['steps']} steps", figures["final"]["time"]
+    status, steps, time = summary["status"], f"{summary['steps']} steps", summary["final"]["time"]
     if status in FINISHED:
         return f"{status} at t = {time:g} s, {steps}"
     return f"{status}, {steps}; " + ("no sample was reached" if time is None else f"the last sample is t = {time:g} s")
 
 
-def _report(out: Console, figures: dict, data: xr.Dataset) -> None:
-    final = figures["final"]
-    out.print(f"{figures['mechanism']}: {_ended(figures)}")
-    if figures["event"]:
-        out.print(figures["message"], soft_wrap=True)
+def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
+    final = summary["final"]
+    out.print(f"{summary['mechanism']}: {_ended(summary)}")
+    if summary["event"]:
+        out.print(summary["message"], soft_wrap=True)
     # Points that segments made by the program hang together at are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
     for point, position in list(places.items())[:_POINTS]:
         out.print(f"  {point}: ({position[0]:.6g}, {position[1]:.6g}) m")
     if len(places) > _POINTS:
         out.print(f"  and {len(places) - _POINTS} more points in results.nc")
-    passed = [f"{t:.6g}" for t in figures["singular_positions"]]
+    passed = [f"{t:.6g}" for t in summary["singular_positions"]]
     if passed:
         more = f" and {len(passed) - _NAMED} more" if len(passed) > _NAMED else ""
         out.print(
             f"passed singular positions at t = {', '.join(passed[:_NAMED])} s{more}: joint forces have poles there"
         )
     out.print(
-        f"largest violation of constraints {figures['constraint_position_max']:.1e} m, "
-        f"imbalance of energy {figures['energy_balance_max']:.1e} J"
+        f"largest violation of constraints {summary['constraint_position_max']:.1e} m, "
+        f"imbalance of energy {summary['energy_balance_max']:.1e} J"
     )
-    validity(out, {"": figures["validity"]})
+    validity(out, {"": summary["validity"]})

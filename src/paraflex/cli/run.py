@@ -83,15 +83,15 @@ def run_command(request: RunRequest) -> int:
         failures(console, result)
         return exit_code(False, interrupted=result.interrupted)
     keep_findings(result.data, collected(verdict_of(result.data)))
-    figures = result.to_dict()
-    write_run(result.data, figures, folder, report=request.report)
+    summary = result.to_dict()
+    write_run(result.data, summary, folder, report=request.report)
 
     def show(out: Console) -> None:
-        print_study(out, figures, task, _model_name(request, mechanism))
-        validity(out, {name: mode.get("validity") for name, mode in figures["modes"].items()})
+        print_study(out, summary, task, _model_name(request, mechanism))
+        validity(out, {name: mode.get("validity") for name, mode in summary["modes"].items()})
         say_where(began, "results, figures", folder, report=request.report)
 
-    tell(figures, show, as_json=request.json)
+    tell(summary, show, as_json=request.json)
     failures(console, result)
     return exit_code(result.complete, interrupted=result.interrupted)
 

@@ -31,15 +31,15 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     study = replace(study, at=_values(request.at))
     # Told of the first path when the folder is seen to be this study's.
     found = study.run(folder, on_progress=lambda at: None if at.done else say_replaced(folder, "sensitivity"))
-    figures = found.to_dict()
-    save_figures(figures, folder / FIGURES)
+    summary = found.to_dict()
+    save_figures(summary, folder / FIGURES)
 
     def show(out: Console) -> None:
         for row in range(len(found.rows)):
             _print(out, found, row)
         out.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
 
-    tell(figures, show, as_json=request.json)
+    tell(summary, show, as_json=request.json)
     return COMPLETE
 
 

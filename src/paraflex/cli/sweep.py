@@ -29,7 +29,7 @@ def sweep_command(request: SweepRequest) -> int:
     result = _sweep(console, study, folder, request)
     has_report = request.report and bool(result.done) and _write_report(console, folder)
     verdict = study.setting.verdict()
-    parts = {path: part.figures() for path, part in study.setting.parts().items()}
+    parts = {path: part.to_dict() for path, part in study.setting.parts().items()}
 
     def show(out: Console) -> None:
         _report(console, result)

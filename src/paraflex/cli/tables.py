@@ -36,27 +36,27 @@ def warn_of(console: Console, findings: Iterable[Finding]) -> None:
     printed(findings)
 
 
-def print_study(console: Console, figures: dict[str, Any], task: TrackingTask, model: str) -> None:
+def print_study(console: Console, summary: dict[str, Any], task: TrackingTask, model: str) -> None:
     """What every mode came to in a model: tables, and a line for each mode that an event stopped."""
-    console.print(_study_table(figures, task, model))
-    if any(mode.get("tracking_rms_after") is not None for mode in figures["modes"].values()):
-        console.print(_after_table(figures, task))
-    for name, mode in figures["modes"].items():
+    console.print(_study_table(summary, task, model))
+    if any(mode.get("tracking_rms_after") is not None for mode in summary["modes"].values()):
+        console.print(_after_table(summary, task))
+    for name, mode in summary["modes"].items():
         if mode["status"] == "stopped":
             console.print(f'mode "{name}": {mode["message"]}', soft_wrap=True)
 
 
-def _study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Table:
+def _study_table(summary: dict[str, Any], task: TrackingTask, model: str) -> Table:
     """Tracking error and peak torques of every mode, and what the solver did."""
     from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 
-    span = ErrorSpan(figures["error"])
+    span = ErrorSpan(summary["error"])
     motors = [motor.name for motor in task.mechanism.motors]
     heads = [f"{name}\n[{unit}]" for name, unit in zip(motors, task.mechanism.motor_units(), strict=True)]
-    efforts = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
-    title = f"{figures['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {efforts}"
+    quantity = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
+    title = f"{summary['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {quantity}"
     table = plain_table("mode", numbers=("error\n[m]", *heads, "steps\n", "wall\n[s]"), title=title)
-    for name, mode in figures["modes"].items():
+    for name, mode in summary["modes"].items():
         if "steps" not in mode:
             table.add_row(name, "failed", *["" for _ in motors], "", "")
             continue
@@ -70,15 +70,15 @@ def _study_table(figures: dict[str, Any], task: TrackingTask, model: str) -> Tab
     return table
 
 
-def _after_table(figures: dict[str, Any], task: TrackingTask) -> Table:
+def _after_table(summary: dict[str, Any], task: TrackingTask) -> Table:
     """Errors during the motion and after it, what goes on then, and what brakes took."""
     held = task.holds
     motors = "held by brakes" if held else "free"
-    if figures["parameters"]["run"].get("ked"):
+    if summary["parameters"]["run"].get("ked"):
         motors = "held all the time"
     keys = {"motion\n[m]": "tracking_rms_motion", "after\n[m]": "tracking_rms_after", "drift\n[m/s]": "drift_speed",
             "vibration\n[m]": "residual_vibration"} | ({"brakes\n[J]": "brake_energy"} if held else {})  # fmt: skip
-    ran = {name: mode for name, mode in figures["modes"].items() if "steps" in mode}
+    ran = {name: mode for name, mode in summary["modes"].items() if "steps" in mode}
     rows = ([name, *(number(mode[key], ".2e") for key in keys.values())] for name, mode in ran.items())
     title = f"Tracking error during the motion and after it, the motors {motors}"
     return plain_table("mode", numbers=keys, rows=rows, title=title)

@@ -58,16 +58,16 @@ def verify_command(request: VerifyRequest) -> int:
     study = VerificationStudy(task, modes, models, options, parameters, model.study.error)
     with counting(console) as report:
         verification = study.run(on_progress=report)
-    figures = verification.to_dict()
+    summary = verification.to_dict()
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
-        _write(verification, figures, folder, report=request.report)
+        _write(verification, summary, folder, report=request.report)
 
     def show(out: Console) -> None:
-        for mode in figures["modes"]:
-            print_agreement(out, figures, mode)
+        for mode in summary["modes"]:
+            print_agreement(out, summary, mode)
         say_where(began, "numbers, figures", folder, report=request.report)
 
-    tell(figures, show, as_json=request.json)
+    tell(summary, show, as_json=request.json)
     for mode, by_model in verification.runs.items():
         for name, runs in by_model.items():
             if runs.failure:
@@ -92,7 +92,7 @@ def _models(request: VerifyRequest) -> list[str]:
     return list(dict.fromkeys([*(request.fidelities or FIDELITIES), *request.engines]))
 
 
-def _write(verification: Verification, figures: dict, folder: Path, *, report: bool) -> None:
+def _write(verification: Verification, summary: dict, folder: Path, *, report: bool) -> None:
     from paraflex.plots import save_figures
 
     verification.save(folder)
@@ -102,4 +102,4 @@ def _write(verification: Verification, figures: dict, folder: Path, *, report: b
     if report:
         from paraflex.report import save_page, verification_page
 
-        save_page(verification_page(data, figures), folder / "report.html")
+        save_page(verification_page(data, summary), folder / "report.html")

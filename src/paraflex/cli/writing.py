@@ -11,13 +11,13 @@ from paraflex.results import save_results
 from paraflex.writing import write_json
 
 
-def write_run(data: xr.Dataset, figures: dict[str, Any], folder: Path, *, report: bool) -> None:
+def write_run(data: xr.Dataset, summary: dict[str, Any], folder: Path, *, report: bool) -> None:
     """Write results, their summary, figures, and the report if it is wanted."""
     from paraflex.plots import save_figures
 
     folder.mkdir(parents=True, exist_ok=True)
     save_results(data, folder / "results.nc")
-    write_json(folder / "summary.json", figures)
+    write_json(folder / "summary.json", summary)
     save_figures(data, folder / "figures")
     if report:
         from paraflex.cli.report import page_of

@@ -18,14 +18,14 @@ _UNITS = (
     "rad/s", "rad", "Pa", "1/s", "m", "s", "N",
 )  # fmt: skip
 # Of "the length in m", "the torque in N m, or force in N": the first; the longest that fits stands first in the list.
-_TOLD = re.compile(rf"\bin ({'|'.join(map(re.escape, _UNITS))})(?=[\s,.)]|$)")
+_UNIT = re.compile(rf"\bin ({'|'.join(map(re.escape, _UNITS))})(?=[\s,.)]|$)")
 
 
 @cache
 def unit_of(place: Place) -> str:
     """The unit of a number of a mechanism's file, or of a study's [integration]; empty where none is given."""
     descriptions = list(_descriptions((ModelTable, IntegrationTable, SweepTable), place))
-    found = [match.group(1) for match in map(_TOLD.search, descriptions) if match]
+    found = [match.group(1) for match in map(_UNIT.search, descriptions) if match]
     return found[0] if found and len(set(found)) == 1 else ""
 
 
@@ -33,13 +33,13 @@ def _descriptions(kinds: tuple[Any, ...], place: Place) -> Iterator[str]:
     """What is said of the field at a place, by each of the tables that may stand there."""
     key, *rest = place
     for kind in kinds:
-        told = kind.model_fields.get(str(key)) if isinstance(kind, type) and issubclass(kind, BaseModel) else None
-        if told is None:
+        field = kind.model_fields.get(str(key)) if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+        if field is None:
             continue
-        models, depth = _inside(told.annotation)
+        models, depth = _inside(field.annotation)
         inner = tuple(rest[depth:])
-        if told.description and not (models and inner):
-            yield told.description
+        if field.description and not (models and inner):
+            yield field.description
         elif models and inner:
             yield from _descriptions(models, inner)
 

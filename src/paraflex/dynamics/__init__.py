@@ -10,6 +10,7 @@ from paraflex.dynamics.coordinates import (
 )
 from paraflex.dynamics.drive import Reach as Reach, reach as reach
 from paraflex.dynamics.equilibrium import static_equilibrium as static_equilibrium
+from paraflex.dynamics.inputs import Inputs as Inputs, inputs_of as inputs_of
 from paraflex.dynamics.joint_coordinates import (
     JointCoordinate as JointCoordinate,
     axis_angle as axis_angle,
@@ -33,6 +34,7 @@ from paraflex.dynamics.signals import (
     moment_signals as moment_signals,
     pack_signals as pack_signals,
     piecewise_quintic as piecewise_quintic,
+    still_signals as still_signals,
 )
 from paraflex.dynamics.singularity import SingularityMeasure as SingularityMeasure
 from paraflex.dynamics.soundness import (

@@ -50,7 +50,7 @@ class Braked:
     energy: float
     rows: tuple[int, ...]
 
-    def efforts(self, multipliers: Array) -> Array:
+    def holding(self, multipliers: Array) -> Array:
         """What the brakes hold with (k, joints), signed as motors' torques [N m, N], from multipliers (k, m)."""
         # Phi_q^T lambda stands on the left of the equations, a motor's torque on the right.
         return -multipliers[:, list(self.rows)]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from paraflex.dynamics.inputs import inputs_of
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
 from paraflex.mechanism import Joint, Mechanism, PointRef, Relation
 
@@ -115,9 +116,8 @@ def _along(joint: Joint, name: str, **keywords) -> Constraint:
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
     constraints = [part for joint in mechanism.joints for part in _joint_constraints(joint)]
-    # Signals are the motors' torques first, then the prescribed motions.
     at_joints: list[tuple[Any, dict[str, Any]]] = [
-        *((one, {"signal": len(mechanism.motors) + k}) for k, one in enumerate(mechanism.prescribed)),
+        *((one, {"signal": k}) for k, one in zip(inputs_of(mechanism).prescribed, mechanism.prescribed, strict=True)),
         *((one, {"row": SPRING, "compliance": 1.0 / one.stiffness, "rest": one.rest}) for one in mechanism.springs),
         *((one, {"row": DAMPER, "compliance": 1.0 / one.coefficient}) for one in mechanism.dampers),
         *((one, {"row": FRICTION, "compliance": 1.0 / (one.limit / one.speed), "limit": one.limit})

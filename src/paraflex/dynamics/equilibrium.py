@@ -103,12 +103,12 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
     n, m = system.n, system.m
     residual = _Residual(system, start, held)
     z = np.concatenate([start.q, np.zeros(m + len(held))])
-    # Without dimension: forces by an effort of the mechanism's mass and size, modes such that their stiffness is one.
-    effort, units = system.total_mass * system.size**2, np.append(1.0 / system.row_units, np.ones(len(held)))
-    scale, by_force = np.append(system.units, effort * units), np.append(system.units / effort, units)
+    # Without dimension: forces by the mechanism's inertia, mass at its size; modes such that their stiffness is one.
+    inertia, units = system.total_mass * system.size**2, np.append(1.0 / system.row_units, np.ones(len(held)))
+    scale, by_force = np.append(system.units, inertia * units), np.append(system.units / inertia, units)
     for body in system.bodies:
-        scale[body.flexible] = np.sqrt(effort) / np.maximum(body.modes.omega, 1.0)
-        by_force[body.flexible] = scale[body.flexible] / effort
+        scale[body.flexible] = np.sqrt(inertia) / np.maximum(body.modes.omega, 1.0)
+        by_force[body.flexible] = scale[body.flexible] / inertia
     for _ in range(_MAX_ITERATIONS):
         if motion is not None:
             residual.v, residual.a = motion(z[:n])
@@ -120,7 +120,7 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
         change = scale * np.linalg.lstsq(jacobian, -value, rcond=1e-12)[0]
         reach = _largest_move(system, change[:n])
         z += change * min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
-        if reach <= _SMALLEST_MOVE and effort * np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_torque:
+        if reach <= _SMALLEST_MOVE and inertia * np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_torque:
             return z[:n]
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), z[:n], _HOLD)
 

@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.dynamics.constraints import Constraint, Term, axis_of
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
+from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.scale import mechanism_size
 from paraflex.kernel.packed import (
     ANGLE,
     AXIS,
     AXIS_RECORD,
     BODY,
-    EFFORT,
     LINE,
     LOAD,
     MARKER,
     MASS,
+    MOTOR_SIDE,
     POINT,
     PORT,
     ROW,
@@ -42,7 +43,7 @@ def pack_system(
     packer = _Packer(mechanism, bodies, index, size)
     for constraint in constraints:
         packer.add_constraint(constraint)
-    for k, motor in enumerate(mechanism.motors):
+    for k, motor in zip(inputs_of(mechanism).motors, mechanism.motors, strict=True):
         packer.add_motor(mechanism.joint(motor.joint), k)
     lines = [
         {
@@ -59,10 +60,10 @@ def pack_system(
     tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
 
     packed = PackedSystem(
-        bodies=_body_records(bodies, packer.ports, packer.efforts, columns),
+        bodies=_body_records(bodies, packer.ports, packer.motor_sides, columns),
         markers=_marker_records(markers),
         ports=_port_records(packer.ports),
-        efforts=records(EFFORT, [effort for group in packer.efforts for effort in group]),
+        motor_sides=records(MOTOR_SIDE, [side for group in packer.motor_sides for side in group]),
         loads=records(LOAD, loads),
         lines=records(LINE, lines),
         axes=records(AXIS_RECORD, packer.axes),
@@ -100,7 +101,7 @@ class _Packer:
         self.mechanism, self.bodies, self.index, self.size = mechanism, bodies, index, size
         self.markers: list[Marker] = []
         self.ports: list[list[dict]] = [[] for _ in bodies]
-        self.efforts: list[list[dict]] = [[] for _ in bodies]
+        self.motor_sides: list[list[dict]] = [[] for _ in bodies]
         self.axes: list[dict] = []
         self.tracks: list[int] = []
         self.rows: list[dict] = []
@@ -194,7 +195,7 @@ class _Packer:
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
             if not ref.on_ground:
                 record = {"marker": self.add_marker(ref), "signal": signal, "sign": sign}
-                self.efforts[self.index[ref.body]].append(record)
+                self.motor_sides[self.index[ref.body]].append(record)
 
 
 def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
@@ -328,17 +329,17 @@ def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:
     return np.array(rows, dtype=dtype)
 
 
-def _body_records(bodies, ports, efforts, columns) -> NDArray[np.void]:
+def _body_records(bodies, ports, motor_sides, columns) -> NDArray[np.void]:
     values: list[dict] = []
     start: Counter[str] = Counter()
-    for body, body_ports, body_efforts, matrix in zip(bodies, ports, efforts, columns, strict=True):
+    for body, body_ports, body_motors, matrix in zip(bodies, ports, motor_sides, columns, strict=True):
         s, parts = body.integrals, sum(port["parts"] for port in body_ports)
-        own = _stretches(body, parts) | {"port": len(body_ports), "effort": len(body_efforts), "columns": matrix.size}
+        own = _own_sizes(body, parts) | {"port": len(body_ports), "motor": len(body_motors), "columns": matrix.size}
         starts = {name: start[name] for name in own}
         start.update(own)
         values.append(
             starts
-            | {f"{name}_end": start[name] for name in ("port", "effort", "mass")}
+            | {f"{name}_end": start[name] for name in ("port", "motor", "mass")}
             | {
                 "offset": body.offset,
                 "nf": body.nf,
@@ -364,7 +365,7 @@ def _lanes(parts: int) -> int:
     return padded(parts + 3)
 
 
-def _stretches(body: BodyCoordinates, parts: int) -> dict[str, int]:
+def _own_sizes(body: BodyCoordinates, parts: int) -> dict[str, int]:
     """How much of each array is a body's own, by the field that says where that starts."""
     size, full = 3 + body.nf, _is_full(body)
     masses, slopes = (0, 0) if body.points is None else body.points.weights.shape

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from paraflex.arrays import Array
+from paraflex.dynamics.inputs import inputs_of
 from paraflex.errors import InputError
 from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.mechanism import AngleLaw, Mechanism, PrescribedAngle
@@ -59,7 +60,7 @@ def constant_signals(values: Sequence[float], end: float) -> list[InputSignals]:
 
 def no_signals(packed: PackedSystem) -> Signals:
     """Zero for every motor torque and prescribed value that a packed system asks for."""
-    numbers = [packed.rows["signal"], packed.efforts["signal"]]
+    numbers = [packed.rows["signal"], packed.motor_sides["signal"]]
     return _pack(constant_signals([0.0] * (1 + max(int(group.max(initial=-1)) for group in numbers)), 1.0))
 
 
@@ -70,7 +71,7 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
     ----------
     mechanism : Mechanism
     torques : sequence of InputSignals
-        One a motor.
+        One a motor; see `Inputs` for their order.
     end : float
         Of the run [s].
 
@@ -101,14 +102,23 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
     return _pack(signals), knots
 
 
+def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float]]:
+    """What `pack_signals` returns where no motor drives."""
+    return pack_signals(mechanism, _no_torques(mechanism, end), end)
+
+
 def moment_signals(mechanism: Mechanism, time: float) -> Signals:
     """Signals at one time: no torques; laws with their rate and acceleration there, asked for at no other time."""
-    signals = constant_signals([0.0] * len(mechanism.motors), 1.0)
+    signals = _no_torques(mechanism, 1.0)
     for prescribed in mechanism.prescribed:
         value, rate, acceleration = (float(x[0]) for x in _evaluate(prescribed, np.array([time])))
         taylor = np.array([[value, rate, 0.5 * acceleration, 0.0, 0.0, 0.0]])
         signals.append(InputSignals(np.array([time, time + 1.0]), taylor))
     return _pack(signals)
+
+
+def _no_torques(mechanism: Mechanism, end: float) -> list[InputSignals]:
+    return constant_signals([0.0 for _ in inputs_of(mechanism).motors], end)
 
 
 def _grid(law: AngleLaw, a: float, b: float, end: float) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arrays import Array
-from paraflex.dynamics import System, constant_signals, pack_signals
+from paraflex.dynamics import System, still_signals
 from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
 from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
 from paraflex.errors import IntegrationError, Moment
@@ -250,8 +250,7 @@ def _solution(
     task: TrackingTask, q: Array, v: Array, a: Array, motion: _JointMotion, count: int, wall_time: float
 ) -> Solution:
     system, times = task.system, task.motion.t
-    still = constant_signals([0.0] * len(task.mechanism.motors), float(times[-1]))
-    signals, _ = pack_signals(task.mechanism, still, float(times[-1]))
+    signals, _ = still_signals(task.mechanism, float(times[-1]))
     gaps = [system.constraints(signals, t, *state) for t, *state in zip(times, q, v, strict=False)]
     # MuJoCo counts weight as potential energy; here it does work.
     scratch = make_scratch(system.packed)

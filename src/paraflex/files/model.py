@@ -60,13 +60,13 @@ class Model(CheckedFields):
         from paraflex.display import facts, page
 
         study = self.study
-        told = [
+        rows = [
             ("paths", list(self.paths)),
             ("study: path", study.path),
             ("study: modes", list(study.modes)),
             ("study: duration [s]", study.duration),
         ]
-        return page(f"Model {self.source or self.mechanism.name}", facts(told), self.mechanism._repr_html_())
+        return page(f"Model {self.source or self.mechanism.name}", facts(rows), self.mechanism._repr_html_())
 
     @checked_arguments()
     def path(self, name: str | None = None) -> Path:

@@ -112,12 +112,12 @@ class OdeForm:
         """
         system = self.system
         q = error * np.sqrt(system.total_mass / (self.size * diagonal_mass(system)))
-        rate = np.full(system.n, 1.0 / (MEMORY * span))
+        frequency = np.full(system.n, 1.0 / (MEMORY * span))
         for body, packed in zip(system.bodies, system.packed.bodies, strict=True):
             omega2 = system.packed.modal[OMEGA2, packed["flex"] : packed["flex"] + body.nf]
-            rate[body.flexible] = np.maximum(rate[body.flexible], np.sqrt(np.maximum(omega2, 0.0)))
+            frequency[body.flexible] = np.maximum(frequency[body.flexible], np.sqrt(np.maximum(omega2, 0.0)))
         out = np.full(self.size, _IGNORED)
-        out[: 2 * system.n] = np.concatenate([q, rate * q])
+        out[: 2 * system.n] = np.concatenate([q, frequency * q])
         return out
 
 

@@ -7,34 +7,31 @@ from math import perm
 import numpy as np
 
 from paraflex.arrays import Array
+from paraflex.dynamics import Inputs
 from paraflex.kernel.packed import Signals
 
 # A jump smaller than this fraction of the signal is rounding.
 _SMOOTH = 1e-9
 
 
-def jump_times(signals: Signals, n_torques: int, knots: Array) -> Array:
+def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:
     """The knots at which a torque jumps, or a prescribed law in its value, rate or acceleration.
 
     Parameters
     ----------
     signals : Signals
-        Torques first, then laws.
-    n_torques : int
+    inputs : Inputs
+        Whose they are.
     knots : (k,) array
         Times to look at [s].
     """
-    found = [t for t in knots if any(_jumps(signals, k, t, 1 if k < n_torques else 3) for k in range(_count(signals)))]
-    return np.array(found)
+    looked_at = [(k, 1) for k in inputs.motors] + [(k, 3) for k in inputs.prescribed]
+    return np.array([t for t in knots if any(_jumps(signals, k, t, derivatives) for k, derivatives in looked_at)])
 
 
 def hidden_from(signals: Signals, time: float) -> Signals:
     """The same signals, each going on after a time as it was before."""
     return signals._replace(breaks=np.where(signals.breaks >= time, np.inf, signals.breaks))
-
-
-def _count(signals: Signals) -> int:
-    return signals.start.size - 1
 
 
 def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:

@@ -189,7 +189,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     state.clock[TIME], state.clock[STEP] = initial.time, min(FIRST_STEP * span, options.max_step)
     workspace = system.workspace()
     controls = Controls(
-        rate=options.tolerance / span,
+        tolerance_per_second=options.tolerance / span,
         newton_fraction=options.newton_fraction or method.newton_fraction,
         newton_memory=_NEWTON_MEMORY * span,
         memory=MEMORY * span,

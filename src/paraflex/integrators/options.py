@@ -36,7 +36,7 @@ class IntegrationOptions(CheckedFields):
         which stands for the method with its default parameters.
     step : float, optional
         A fixed step [s]; by default steps are chosen by their errors. Where something given is not smooth steps end,
-        and each stretch between is divided evenly into steps no longer than this. One in which Newton's iteration does
+        and each interval between is divided evenly into steps no longer than this. One in which Newton's iteration does
         not converge is done in parts; `Solution.rejected` counts these.
     constraints : Treatment or str, optional
         What keeps them: "baumgarte", "projection" (of position and velocity after each step) or "ggl" (stabilised

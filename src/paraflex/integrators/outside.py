@@ -53,7 +53,7 @@ class OutsideRun:
     @property
     def attempts(self) -> int:
         """See `Run`."""
-        return self._steps + self._stepper.effort().rejected if self._steps else 0
+        return self._steps + self._stepper.counts().rejected if self._steps else 0
 
     def start(self) -> None:
         """See `Run`."""
@@ -80,13 +80,13 @@ class OutsideRun:
 
     def figures(self) -> Figures:
         """See `Run`."""
-        effort = self._stepper.effort()
+        counts = self._stepper.counts()
         return Figures(
             steps=self._steps,
-            rejected=effort.rejected,
-            newton_iterations=effort.iterations,
-            factorisations=effort.factorisations,
-            evaluations=effort.evaluations,
+            rejected=counts.rejected,
+            newton_iterations=counts.iterations,
+            factorisations=counts.factorisations,
+            evaluations=counts.evaluations,
             constraint_position_max=float(self._violation[0]),
             constraint_velocity_max=float(self._violation[1]),
             energy_balance_max=float(self._balance),

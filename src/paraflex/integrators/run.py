@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System
+from paraflex.dynamics import State, System, inputs_of
 from paraflex.errors import InputError
 from paraflex.integrators.jumps import hidden_from, jump_times
 from paraflex.kernel.arrays import apart
@@ -150,7 +150,7 @@ def make_problem(system: System, signals: Signals, initial: State, times: Array,
         raise InputError("times must ascend from the start", field="times", remedy="give at least one later time")
     inner = np.array([] if knots is None else knots, dtype=float)
     inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
-    jumps = jump_times(signals, len(system.mechanism.motors), inner)
+    jumps = jump_times(signals, inputs_of(system.mechanism), inner)
     return Problem(system, signals, initial, times, np.append(inner, times[-1]), jumps)
 
 

@@ -32,7 +32,7 @@ class ScipyStepper:
 
     def begin(self, t: float, y: Array, stop: float) -> None:
         """See `Stepper`."""
-        self._past = self.effort() if hasattr(self, "_solver") else self._past
+        self._past = self.counts() if hasattr(self, "_solver") else self._past
         self._rejected, self._dense = 0, None
         options = {"jac": self.form.jacobian} if self._stages else {}
         self._solver = self._class(
@@ -77,7 +77,7 @@ class ScipyStepper:
             self._dense = self._solver.dense_output()
         return self._dense(time)
 
-    def effort(self) -> SolverCounts:
+    def counts(self) -> SolverCounts:
         """See `Stepper`. SciPy counts evaluations; iterations follow from them."""
         solver = self._solver
         iterations = int(solver.nfev) // self._stages if self._stages else 0

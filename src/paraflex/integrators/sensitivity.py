@@ -125,7 +125,7 @@ def check_differentiable(options: IntegrationOptions) -> None:
 def run_derivatives(problem: Problem, options: IntegrationOptions, directions: Sequence[Direction]) -> RunDerivatives:
     """Derivatives of a run by parameters, its steps as they are.
 
-    Steps keep their share of the stretch between two stops: where a stop moves, they move with it.
+    Steps keep their share of the interval between two stops: where a stop moves, they move with it.
 
     Parameters
     ----------
@@ -281,10 +281,10 @@ class _Varied:
         stops = np.concatenate([[self.problem.initial.time], self.problem.stops])
         change = np.concatenate([[0.0], direction.stops])
         t, h = chunk.history.t[: chunk.count], chunk.history.h[: chunk.count]
-        stretch = np.clip(np.searchsorted(stops, t, side="right") - 1, 0, stops.size - 2)
+        interval = np.clip(np.searchsorted(stops, t, side="right") - 1, 0, stops.size - 2)
         slope = np.diff(change) / np.diff(stops)
-        y.t[: chunk.count] = change[stretch] + (t - stops[stretch]) * slope[stretch]
-        y.h[: chunk.count] = h * slope[stretch]
+        y.t[: chunk.count] = change[interval] + (t - stops[interval]) * slope[interval]
+        y.h[: chunk.count] = h * slope[interval]
 
     def _check(self, chunk: _Chunk, left: Array) -> None:
         left = left[: chunk.count]

@@ -62,7 +62,7 @@ class Stepper(Protocol):
         """The solution within the last step, by the solver's own interpolation."""
         ...
 
-    def effort(self) -> SolverCounts:
+    def counts(self) -> SolverCounts:
         """Since the run began."""
         ...
 

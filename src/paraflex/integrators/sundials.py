@@ -56,7 +56,7 @@ class SundialsStepper:
         self._package = load_sundials()
         self._tolerances, self._steps = tolerances, steps
         self._seen: list[float] = []
-        self._effort, self._here, self._matrices, self._last = SolverCounts(0, 0, 0, 0), None, 0, np.zeros(1)
+        self._counts, self._here, self._matrices, self._last = SolverCounts(0, 0, 0, 0), None, 0, np.zeros(1)
         self.t, self.y = 0.0, np.zeros(0)
 
     def begin(self, t: float, y: Array, stop: float) -> None:
@@ -83,7 +83,7 @@ class SundialsStepper:
         while result.status >= 0 and result.t <= before:
             result = self._call(stop, "onestep")
         tried = attempts(self._seen, before, 1)
-        self._effort += SolverCounts(len(self._seen), max(tried - 1, 0), len(self._seen), self._matrices)
+        self._counts += SolverCounts(len(self._seen), max(tried - 1, 0), len(self._seen), self._matrices)
         self._matrices = 0
         if not (np.all(np.isfinite(result.y)) and np.all(np.isfinite(self._last))):
             return NOT_FINITE
@@ -96,9 +96,9 @@ class SundialsStepper:
         """See `Stepper`."""
         return self._call(time, "normal").y
 
-    def effort(self) -> SolverCounts:
+    def counts(self) -> SolverCounts:
         """See `Stepper`. Every evaluation is of an iteration; factorisations are those with a new Jacobian."""
-        return self._effort
+        return self._counts
 
     def _call(self, time: float, method: str) -> Any:
         # Failures are printed as well as returned.

@@ -124,9 +124,9 @@ def second_order_energy(system, i, q, v, points):
 
 @routine
 def second_order_mass(system, i, q, work, points):
-    """Mass matrix of body i in its own frame into ws.mass, all of it: the sum of m J^T J, J = [1, E s, ds/du].
+    """Mass matrix of body i in its own frame into work.mass, all of it: the sum of m J^T J, J = [1, E s, ds/du].
 
-    `points` is ws.scratch.points.
+    `points` is work.scratch.points.
     """
     body = system.bodies[i]
     n, width, at, pitch = body.nf, 3 + body.nf, body.dense, body.pitch
@@ -200,9 +200,9 @@ def second_order_mass_row(system, i, l, mass, points):
 
 @routine
 def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
-    """Geometric stiffness of body i into ws.geometric: of its inertia forces and of its joints' forces along it.
+    """Geometric stiffness of body i into work.geometric: of its inertia forces and of its joints' forces along it.
 
-    `points` and `geometric` are those of ws.
+    `points` and `geometric` are those of work.
     """
     body = system.bodies[i]
     n, at, pitch = body.nf, body.square, body.pitch
@@ -235,7 +235,7 @@ def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
 
 @kernel
 def note_all_axial_forces(system, q, v, a, lam, work, geometric):
-    """Geometric stiffness of every body for the next factor; `geometric` is ws.geometric, None for linear geometry."""
+    """Geometric stiffness of every body for the next factor into work.geometric; that is None for linear geometry."""
     if geometric is None:
         return
     for i in range(system.bodies.size):
@@ -258,7 +258,7 @@ def subtract_geometric(system, i, geometric, scale, u, x):
 
 @routine
 def linear_mass(system, i, work):
-    """Mass matrix of body i of linear geometry into ws.mass, by what `factor.factor_body` noted."""
+    """Mass matrix of body i of linear geometry into work.mass, by what `factor.factor_body` noted."""
     body = system.bodies[i]
     n, k, width, at = body.nf, body.flex, 3 + body.nf, body.dense
     sx, sy, inertia = work.frame[i, 2], work.frame[i, 3], work.frame[i, 4]
@@ -279,7 +279,7 @@ def linear_mass(system, i, work):
 def factor_dense_body(system, i, b, q, work, dense):
     """Mass matrix of body i and Cholesky factor of M + g D + b (K + K_g), g^2 = b; without K_g if that is not definite.
 
-    Diagonals of the factor hold reciprocals. Returns whether the body's matrix is dense; `dense` is ws.dense, None
+    Diagonals of the factor hold reciprocals. Returns whether the body's matrix is dense; `dense` is work.dense, None
     where no body's is.
     """
     if dense is None:
@@ -341,9 +341,9 @@ def solve_dense(system, i, dense, source, target, at, pitch):
 
 @routine
 def respond_dense(system, i, work, dense, inverse):
-    """Response of body i to its constraint rows into ws.response, and the inverse of its iteration matrix.
+    """Response of body i to its constraint rows into work.response, and the inverse of its iteration matrix.
 
-    `dense` and `inverse` are those of ws, None where no body's matrix is dense.
+    `dense` and `inverse` are those of `work`, None where no body's matrix is dense.
     """
     if inverse is None:
         return
@@ -363,7 +363,7 @@ def respond_dense(system, i, work, dense, inverse):
 def inverse_times(system, i, inverse, y, x):
     """(M + b (K + K_g))^-1 x of body i in place, in its body frame; y is scratch.
 
-    `inverse` is ws.inverse, None where no body's matrix is dense.
+    `inverse` is work.inverse, None where no body's matrix is dense.
     """
     if inverse is None:
         return

@@ -99,7 +99,10 @@ def body_terms(system, i, q, v, a, f, scratch):
 
 @kernel
 def motion_forces(system, q, v, a, f, scratch):
-    """M q'' + h + K u of the whole system at every instant of a motion, less weight and loads: all (instants, n)."""
+    """M q'' + h + K u of the whole system at every instant of a motion, less weight and loads, into f.
+
+    q, v, a, f : (instants, n) arrays.
+    """
     for k in range(q.shape[0]):
         for i in range(system.bodies.size):
             body_terms(system, i, q[k], v[k], a[k], f[k], scratch)

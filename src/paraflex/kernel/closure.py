@@ -73,7 +73,10 @@ def make_closure_scratch(system: PackedSystem, tasks: int, signals: int) -> Clos
 
 @unoptimised
 def task_values(system, marker, coordinates, q, v, a, out):
-    """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker, into out (3, tasks)."""
+    """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker, into out (3, tasks).
+
+    `coordinates` (tasks,) are 0, 1 or 2.
+    """
     px, py, vx, vy, ax, ay, _, _ = marker_motion(system, marker, q, v, a)
     for i in range(coordinates.size):
         if coordinates[i] == 0:
@@ -188,7 +191,7 @@ def relative_change(work):
 def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
     """Close the loops at one instant by Newton's method, from the pose in q; whether they close, and what gap is left.
 
-    `known` says that ws.factors hold those of a pose nearby, which serve as long as they do it quickly.
+    `known` says that work.factors hold those of a pose nearby, which serve as long as they do it quickly.
     """
     gap = 0.0
     for iteration in range(MAX_ITERATIONS):

@@ -117,7 +117,7 @@ def dissipated_power(system, q, v, lam, rates):
 def note_friction(system, q, v, rates, compliance):
     """Inverse slopes of friction at the rates in v, for the iteration matrix; whether there is any.
 
-    `rates` is scratch (m,).
+    `rates` (m,) is scratch, `compliance` (m,) is written.
     """
     some = False
     if not joint_rates(system, q, v, rates):

@@ -50,7 +50,7 @@ def factor_dense(matrix, order):
 
 @kernel
 def solve_factored(factors, order, right):
-    """Solve matrix x = right in place of right (n, k), with what `factor_dense` left."""
+    """Solve matrix x = right in place of right (n, k), with what `factor_dense` left: factors (n, n), order (n,)."""
     n, columns = right.shape
     for i in range(n):
         pivot = order[i]

@@ -20,7 +20,7 @@ SLOW_AGE = 25
 
 @routine
 def embedded_error(tableau, h, march):
-    """Difference to the embedded formula, in q and v, into m.eq and m.ev."""
+    """Difference to the embedded formula, in q and v, into march.eq and march.ev."""
     fill(march.eq, 0.0)
     fill(march.ev, 0.0)
     for s in range(tableau.c.size):
@@ -32,7 +32,7 @@ def embedded_error(tableau, h, march):
 
 @routine
 def history_error(h, march):
-    """Difference to formulas of higher order through the last step's acceleration, into m.eq and m.ev.
+    """Difference to formulas of higher order through the last step's acceleration, into march.eq and march.ev.
 
     For v the integral of the parabola through the accelerations at t - h_0, t and t + h, for q that of the cubic with
     the velocities and accelerations at t and t + h.
@@ -57,8 +57,8 @@ def history_error(h, march):
 
 
 @routine
-def filtered_error(system, g, rates, memory, march, work, slow):
-    """The estimate in m.eq and m.ev in the mass norm, in position and by what its velocity error does later: metres.
+def filtered_error(system, g, gains, memory, march, work, slow):
+    """Mass norms [m] of the estimate in march.eq and march.ev: of position, and of what its velocity error does later.
 
     The velocity error is filtered once more, as if by a step as long as `memory`: what is left of it is the part that
     no elastic force turns round, and that moves the mechanism by memory times its size before the run ends.
@@ -66,9 +66,9 @@ def filtered_error(system, g, rates, memory, march, work, slow):
     With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
     (M + g D + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
     for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2. Where Phi' = 0 is
-    imposed, and no outcome of integration, Phi_q eps_v = 0. `rates` says which: 1 or 0, and alpha and beta.
+    imposed, and no outcome of integration, Phi_q eps_v = 0. `gains` says which: 1, alpha and beta, or zeros.
     """
-    filter_error(system, g, rates, march.eq, march.ev, work)
+    filter_error(system, g, gains, march.eq, march.ev, work)
     for j in range(march.q.size):
         march.eq[j] += g * work.x[j]
     position = mass_norm(system, work, march.eq)
@@ -78,14 +78,14 @@ def filtered_error(system, g, rates, memory, march, work, slow):
     for j in range(march.q.size):
         march.eq[j] = 0.0
         march.ev[j] = work.x[j]
-    filter_error(system, memory, rates, march.eq, march.ev, slow)
+    filter_error(system, memory, gains, march.eq, march.ev, slow)
     return position, memory * mass_norm(system, slow, slow.x)
 
 
 @routine
-def filter_error(system, g, rates, eq, ev, work):
-    """eps_v of (1 - g J) eps = (e_q, e_v) into ws.x, with the factor in ws made for b = g^2."""
-    of_v, alpha, beta = rates
+def filter_error(system, g, gains, eq, ev, work):
+    """eps_v of (1 - g J) eps = (e_q, e_v) into work.x, with the factor in `work` made for b = g^2."""
+    of_v, alpha, beta = gains
     scale = 1.0 + 2.0 * alpha * g + beta * beta * g * g
     for j in range(eq.size):
         work.x[j] = ev[j]

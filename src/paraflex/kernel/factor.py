@@ -73,7 +73,7 @@ def solve_rigid(fr, r0, r1, r2):
 
 @routine
 def respond(system, i, work):
-    """Response of body i to its constraint rows, (M + b K)^-1 J^T, and to its rigid coordinates, into ws.response."""
+    """Response of body i to its constraint rows, (M + b K)^-1 J^T, and to its rigid coordinates, into work.response."""
     body = system.bodies[i]
     n, k, lanes, fr = body.nf, body.flex, body.lanes, work.frame[i]
     for block in range(0, lanes, LANES):
@@ -111,7 +111,7 @@ def respond(system, i, work):
 
 @inlined
 def body_jacobian(system, i, q, work):
-    """The parts of body i's constraint rows in its own frame, [1, E s, N] and [0, 1, N2'], into the lanes of ws.jac."""
+    """Parts of body i's constraint rows in its own frame, [1, E s, N] and [0, 1, N2'], into the lanes of work.jac."""
     body = system.bodies[i]
     n, lanes, scratch = body.nf, body.lanes, work.scratch
     at = body.jac
@@ -148,7 +148,7 @@ def body_jacobian(system, i, q, work):
 
 @inlined
 def body_block(system, i, work):
-    """J M^-1 J^T of body i in its frame, into ws.blocks."""
+    """J M^-1 J^T of body i in its frame, into work.blocks."""
     body = system.bodies[i]
     lanes = body.lanes
     for r in range(body.parts):

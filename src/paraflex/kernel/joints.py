@@ -380,12 +380,12 @@ def share_torque(system, marker, torque, scratch, f):
 
 
 @inlined
-def add_efforts(system, i, torques, scratch, f):
+def add_motors(system, i, torques, scratch, f):
     """Subtract the generalised force of the motors on body i from f and the shares."""
     body = system.bodies[i]
-    for k in range(body.effort, body.effort_end):
-        effort = system.efforts[k]
-        share_torque(system, system.markers[effort.marker], -effort.sign * torques[effort.signal], scratch, f)
+    for k in range(body.motor, body.motor_end):
+        side = system.motor_sides[k]
+        share_torque(system, system.markers[side.marker], -side.sign * torques[side.signal], scratch, f)
 
 
 @kernel
@@ -398,8 +398,8 @@ def body_joints(system, i, q, v, a, lam, weights, scratch, f, rows):
 
 
 @kernel
-def body_efforts(system, i, torques, scratch, f):
+def body_motors(system, i, torques, scratch, f):
     """Subtract the generalised force of the motors on body i from f."""
     clear_shares(system, i, scratch)
-    add_efforts(system, i, torques, scratch, f)
+    add_motors(system, i, torques, scratch, f)
     hand_on(system, i, scratch, f)

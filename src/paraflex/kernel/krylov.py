@@ -109,7 +109,7 @@ def orthogonalise(space, k):
 
 @inlined
 def combine(space, count, unit, work):
-    """The solution in ws.x and ws.mu: back substitution, and the sum of the basis vectors."""
+    """The solution in work.x and work.mu: back substitution, and the sum of the basis vectors."""
     for i in range(count - 1, -1, -1):
         for k in range(i + 1, count):
             space.rest[i] -= space.hessenberg[k, i] * space.rest[k]
@@ -125,7 +125,7 @@ def combine(space, count, unit, work):
 
 @kernel
 def exact_correction(system, g, b, weights, q, v, a, lam, torques, unit, direction, space, work):
-    """Turn the correction of a run in ws.x and ws.mu to the one that the exact matrix asks for.
+    """Turn the correction of a run in work.x and work.mu to the one that the exact matrix asks for.
 
     Parameters
     ----------

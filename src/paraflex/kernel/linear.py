@@ -205,7 +205,7 @@ def to_ground_frame(system, i, work, x):
 
 @inlined
 def lanes_times(system, i, matrix, x, scratch):
-    """Sums of x over the coordinates of body i by the lanes of ws.jac or ws.response, into scratch.lanes."""
+    """Sums of x over the coordinates of body i by the lanes of work.jac or work.response, into scratch.lanes."""
     body = system.bodies[i]
     for block in range(0, body.lanes, LANES):
         total = zeros()
@@ -281,7 +281,7 @@ def solve_system(system, work, x, mu):
 
 @inlined
 def solve_all(system, work, inverse, x, mu):
-    """See `solve_system`; `inverse` is ws.inverse, None for linear geometry."""
+    """See `solve_system`; `inverse` is work.inverse, None for linear geometry."""
     lanes = work.scratch.lanes
     for r in range(mu.size):
         mu[r] = -mu[r]

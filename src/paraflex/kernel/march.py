@@ -275,7 +275,7 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
         h = min(march.clock[STEP], controls.max_step)
         landing = False
         if controls.fixed_step > 0.0:
-            # Stretches between stops are divided evenly.
+            # Intervals between stops are divided evenly.
             h = left / max(1.0, ceil(left / longest - 1e-6))
             # But for rounding the same step: its factor still serves.
             if abs(h - march.clock[STEP]) <= 1e-9 * h:

@@ -13,7 +13,7 @@ from paraflex.kernel.packed import MPF, S2X, S2Y
 def mass_times(system, i, work, mass, x):
     """M x of body i in place, with the mass matrix of the factor; x in the body frame.
 
-    `mass` is ws.mass, None for linear geometry.
+    `mass` is work.mass, None for linear geometry.
     """
     body = system.bodies[i]
     if mass is not None:

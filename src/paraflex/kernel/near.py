@@ -187,7 +187,7 @@ def begin_near(system, march, work):
 
 @routine
 def open_row(system, row, work):
-    """The least change of coordinates that opens one row by one unit, into ws.x: infinite at a singular position."""
+    """The least change of coordinates that opens one row by one unit, into work.x: infinite at a singular position."""
     fill(work.x, 0.0)
     fill(work.mu, 0.0)
     work.mu[row] = 1.0

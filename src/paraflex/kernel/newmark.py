@@ -21,7 +21,7 @@ from paraflex.kernel.stage import equations
 
 @routine
 def newmark_start(numbers, t, h, march):
-    """Explicit parts of the stage into m.qs and m.vs; its time, g and b of q = q* + b v', v = v* + g v'."""
+    """Explicit parts of the stage into march.qs and march.vs; its time, g and b of q = q* + b v', v = v* + g v'."""
     a0, theta = march.algorithmic[0], numbers[THETA]
     if theta > 1.0:
         h = theta * h
@@ -58,7 +58,7 @@ def restart_algorithmic(numbers, march):
 
 @routine
 def newmark_end(system, signals, numbers, varying, t, h, march, work):
-    """From the stage to the end of the step: q and v in ws.q and ws.v, the new algorithmic acceleration.
+    """From the stage to the end of the step: q and v in work.q and work.v, the new algorithmic acceleration.
 
     Where steps vary, and with Wilson's method, velocities and algorithmic accelerations are brought back to their
     constraints: what a step leaves of Phi' the next one takes back, and if that is shorter, by a larger force.
@@ -99,7 +99,7 @@ def wilson_end(theta, h, march, work):
 
 @routine
 def allow_acceleration(system, signals, t, a, march, work):
-    """Change an acceleration to the nearest one that the constraints allow at ws.q and ws.v."""
+    """Change an acceleration to the nearest one that the constraints allow at work.q and work.v."""
     equations(system, signals, t, INDEX_1, work.q, work.v, a, march.stage_lam[1], march.torques, work)
     for r in range(work.rows.size):
         if system.rows[r].kind != CONSTRAINT:

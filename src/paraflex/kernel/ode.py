@@ -24,7 +24,7 @@ INSTANT_B = 1e-36
 
 @kernel
 def accelerations(system, signals, t, weights, q, v, a, lam, torques, work, dependent_part):
-    """Accelerations (n,) and multipliers (m,) at (t, q, v), into a and lam; the factor stays in ws.
+    """Accelerations (n,) and multipliers (m,) at (t, q, v), into a and lam; the factor stays in work.
 
     Returns
     -------
@@ -49,7 +49,13 @@ def accelerations(system, signals, t, weights, q, v, a, lam, torques, work, depe
 
 @kernel
 def rates(system, signals, t, weights, y, a, lam, torques, work, dependent_part, dy):
-    """Derivative of y = (q, v, work) into dy; a and lam are left as `accelerations` has them. Dependent rows."""
+    """Derivative of y = (q, v, work done) into dy, both (2n + 1,); a and lam are left as `accelerations` has them.
+
+    Returns
+    -------
+    int
+        See `accelerations`.
+    """
     n = a.size
     q, v = y[:n], y[n : 2 * n]
     dependent = accelerations(system, signals, t, weights, q, v, a, lam, torques, work, dependent_part)
@@ -69,7 +75,7 @@ def stored_energy(system, q, v, lam, scratch):
 
 
 @kernel
-def rates_jacobian(system, weights, y, a, lam, torques, work, d, out):
+def rates_jacobian(system, weights, y, a, lam, torques, work, direction, out):
     """Derivative of `rates` by y, into out (2n + 1, 2n + 1), at the y it was last called with.
 
     The accelerations change by -[M, J^T; J, -C]^-1 (dF, dG). The row of the power is left zero: Newton's iteration
@@ -79,16 +85,16 @@ def rates_jacobian(system, weights, y, a, lam, torques, work, d, out):
     q, v = y[:n], y[n : 2 * n]
     for j in range(2 * n + 1):
         fill(out[j], 0.0)
-    note_slopes(system, q, v, work.mu, work.compliance, d)
+    note_slopes(system, q, v, work.mu, work.compliance, direction)
     for i in range(system.bodies.size):
         for j in range(system.bodies[i].offset, system.bodies[i].offset + 3 + system.bodies[i].nf):
             for part in range(2):
-                direction = d.q if part == 0 else d.v
-                direction[j] = 1.0
-                residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, i, i + 1, d)
-                direction[j] = 0.0
-                copy(d.f, work.f)
-                copy(d.rows, work.rows)
+                one = direction.q if part == 0 else direction.v
+                one[j] = 1.0
+                residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
+                one[j] = 0.0
+                copy(direction.f, work.f)
+                copy(direction.rows, work.rows)
                 right_hand_side(system, work, 1.0)
                 solve_system(system, work, work.x, work.mu)
                 column = part * n + j
@@ -99,7 +105,9 @@ def rates_jacobian(system, weights, y, a, lam, torques, work, d, out):
 
 @kernel
 def descriptor_residual(system, signals, t, weights, y, dy, dropped, torques, work, out):
-    """Residual of the equations as a DAE of index 1 in y = (q, v, lambda, work), into out.
+    """Residual of the equations as a DAE of index 1 in y = (q, v, lambda, work done), into out.
+
+    y, dy, out : (2n + m + 1,) arrays.
 
     q' - v, then those of `equations` with v' as the acceleration, then work' less the power. `dropped` (m,) says which
     rows follow from others: their multipliers are zero.
@@ -118,7 +126,10 @@ def descriptor_residual(system, signals, t, weights, y, dy, dropped, torques, wo
 
 @kernel
 def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direction, out):
-    """Derivative of `descriptor_residual` by y plus c times that by dy, into out, where it was last called."""
+    """Derivative of `descriptor_residual` by y plus c times that by dy, into out, where it was last called.
+
+    `out` is square, with a row for each entry of y; `direction` is scratch.
+    """
     n, m = work.f.size, work.rows.size
     q, v, a, lam = y[:n], y[n : 2 * n], dy[n : 2 * n], y[2 * n : 2 * n + m]
     for j in range(2 * n + m + 1):
@@ -165,7 +176,9 @@ def drop_rows(dropped, row, column, out):
 
 @kernel
 def stabilised_residual(system, signals, t, y, dy, dropped, weight, torques, idle, work, direction, phi, dphi, out):
-    """Residual of the stabilised form of index 2 in y = (q, v, lambda, mu, work), into out.
+    """Residual of the stabilised form of index 2 in y = (q, v, lambda, mu, work done), into out.
+
+    y, dy, out : (2n + 2m + 1,) arrays; phi, dphi are scratch (m,), `idle` (motors,) is zero.
 
     W (q' - v) + Phi_q^T mu, the equations of motion, Phi' and Phi, the power (Gear, Gupta and Leimkuhler 1985). W is
     the diagonal `weight` (n,). Rows that are no constraints stand in place of their Phi', and have no mu.
@@ -193,7 +206,10 @@ def stabilised_residual(system, signals, t, y, dy, dropped, weight, torques, idl
 
 @kernel
 def stabilised_jacobian(system, y, dy, c, dropped, weight, torques, idle, work, direction, out):
-    """Derivative of `stabilised_residual` by y plus c times that by dy, into out, where it was last called."""
+    """Derivative of `stabilised_residual` by y plus c times that by dy, into out, where it was last called.
+
+    `out` is square, with a row for each entry of y; `direction` is scratch.
+    """
     n, m = work.f.size, work.rows.size
     q, v, a = y[:n], y[n : 2 * n], dy[n : 2 * n]
     lam, mu = y[2 * n : 2 * n + m], y[2 * n + m : 2 * n + 2 * m]

@@ -1,8 +1,9 @@
 """Layout of what the kernels read (`PackedSystem`, `Signals`) and write (`Workspace`).
 
-One record a body, port, marker, effort and constraint row; flat arrays for what has a length of its own. A *marker*
-is a material point of a body with its shape rows; a constraint row is a weighted sum over *ports*, each an end on a
-moving body, of which several may be on one body; an *effort* is one side of a motor.
+One record a body, port, marker, side of a motor and constraint row; flat arrays for what has a length of its own.
+A *marker* is a material point of a body with its shape rows; a constraint row is a weighted sum over *ports*, each an
+end on a moving body, of which several may be on one body. A motor that turns is a *side* on each moving body of its
+joint; one that slides is an axis.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ BODY = np.dtype(
         ("square", np.int64),  # first entry of its nf x nf matrices
         ("port", np.int64),  # its ports: port .. port_end
         ("port_end", np.int64),
-        ("effort", np.int64),  # its efforts: effort .. effort_end
-        ("effort_end", np.int64),
+        ("motor", np.int64),  # its sides of motors that turn: motor .. motor_end
+        ("motor_end", np.int64),
         ("columns", np.int64),  # first entry of its nf x width matrix in `columns`
         ("width", np.int64),
         ("products", np.int64),  # first entry of its nf x 2 stride matrix in `products`
@@ -104,7 +105,7 @@ PORT = np.dtype(
     ],
     align=True,
 )
-EFFORT = np.dtype([("marker", np.int64), ("signal", np.int64), ("sign", np.float64)], align=True)
+MOTOR_SIDE = np.dtype([("marker", np.int64), ("signal", np.int64), ("sign", np.float64)], align=True)
 LOAD = np.dtype(
     [
         ("marker", np.int64),
@@ -176,7 +177,7 @@ class PackedSystem(NamedTuple):
     bodies: NDArray[np.void]
     markers: NDArray[np.void]
     ports: NDArray[np.void]
-    efforts: NDArray[np.void]
+    motor_sides: NDArray[np.void]
     loads: NDArray[np.void]
     lines: NDArray[np.void]  # springs and dampers between points
     axes: NDArray[np.void]

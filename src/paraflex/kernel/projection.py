@@ -44,7 +44,7 @@ def largest_violation(system, rows):
 
 @routine
 def least_change(system, violation, work):
-    """The least x with Phi_q x = -violation, into ws.x."""
+    """The least x with Phi_q x = -violation, into work.x."""
     for r in range(violation.size):
         work.mu[r] = -violation[r]
     fill(work.x, 0.0)

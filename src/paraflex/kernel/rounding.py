@@ -106,7 +106,7 @@ def multiplier_unit(least):
 
 @routine
 def solve_to_rounding(system, signals, t, g, b, weights, dependent_part, march, a, lam, least, direction, space, work):
-    """Solve a stage from m.qs and m.vs to rounding: a and lam, and its q and v in ws; the last relative correction.
+    """Solve a stage from march.qs and march.vs to rounding: a and lam, q and v in `work`; the last relative correction.
 
     Where corrections with the iteration matrix do not get there, they begin anew from the guess with the exact one.
     """
@@ -142,9 +142,9 @@ def solve_to_rounding(system, signals, t, g, b, weights, dependent_part, march, 
 
 @releases_lock
 def solve_steps_to_rounding(system, signals, tableau, controls, count, history, march, direction, space, work, out):
-    """Solve the first `count` steps of a history again, each to rounding, from where m stands; samples into out.
+    """Solve the first `count` steps of a history again, each to rounding, from where `march` stands; samples into out.
 
-    m holds q, v and, unless the first step restarts, the accelerations and multipliers of its first stage.
+    march holds q, v and, unless the first step restarts, the accelerations and multipliers of its first stage.
     """
     last = tableau.c.size - 1
     for k in range(count):
@@ -226,7 +226,10 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
 
 @kernel
 def sample_energies(system, q, v, lam, scratch, out):
-    """Kinetic energy, strain energy with that of springs, and what gravity has done at samples, into out (k, 3)."""
+    """Kinetic energy, strain energy with that of springs, and what gravity has done at samples, into out.
+
+    q, v : (k, n) arrays; lam : (k, m) array; out : (k, 3) array.
+    """
     for i in range(q.shape[0]):
         out[i, 0], out[i, 1] = system_energy(system, q[i], v[i], scratch)
         out[i, 1] += spring_energy(system, lam[i]) + line_energy(system, q[i], v[i])[0]

@@ -17,7 +17,8 @@ PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # Why `attempt` did so besides: the step comes near a singular position, and its start is to be prepared.
 ENTERS = 5
 # March.clock
-TIME, STEP, WORK, FACTOR_B, RATE, ENERGY_0, WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(12)
+TIME, STEP, WORK, FACTOR_B, CONTRACTION, ENERGY_0 = range(6)
+WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(6, 12)
 # and of a fixed step in which Newton's iteration did not converge: when it ends, and how long its parts are.
 PART_END, PART = range(15, 17)
 # and of the row nearest to dependence: the root of the part of its square left, how fast that changes [1/s], and the
@@ -64,11 +65,11 @@ class Tableau(NamedTuple):
 class Controls(NamedTuple):
     """What the user chooses of a run.
 
-    `rate` is the error allowed per second [m/s]: local errors of a run of duration T add up to the tolerance
-    when each step's stays below tolerance h / T.
+    The tolerance is that of a whole run of duration T: local errors add up to it when each step's stays below
+    tolerance h / T.
     """
 
-    rate: float
+    tolerance_per_second: float  # tolerance / T [m/s]
     newton_fraction: float  # of the error allowed in a step, the part left to Newton
     newton_memory: float  # how long a velocity error left by Newton is taken to last [s]
     memory: float  # how long a velocity error of a step does, where no vibration turns it round [s]
@@ -90,7 +91,7 @@ class March(NamedTuple):
 
     clock: NDArray[np.float64]
     counts: NDArray[np.int64]
-    q: NDArray[np.float64]
+    q: NDArray[np.float64]  # (n,)
     v: NDArray[np.float64]
     stage_t: NDArray[np.float64]  # (2, stages): of the last accepted step and of this one
     stage_q: NDArray[np.float64]  # (stages, n)
@@ -100,14 +101,12 @@ class March(NamedTuple):
     stage_a: NDArray[np.float64]  # (2, stages, n)
     stage_lam: NDArray[np.float64]  # (stages, m)
     power: NDArray[np.float64]  # (stages,)
-    qs: NDArray[np.float64]
+    qs: NDArray[np.float64]  # (n,) explicit parts of a stage
     vs: NDArray[np.float64]
-    eq: NDArray[np.float64]
+    eq: NDArray[np.float64]  # (n,) estimated errors of a step
     ev: NDArray[np.float64]
-    torques: NDArray[np.float64]
-    algorithmic: NDArray[
-        np.float64
-    ]  # (2, n) acceleration that the Newmark family carries, of the last step and of this
+    torques: NDArray[np.float64]  # (motors,) of the motors at a stage, or forces
+    algorithmic: NDArray[np.float64]  # (2, n) accelerations that the Newmark family carries, of the last step and this
     passages: NDArray[np.float64]  # (2, MOST_PASSAGES) from when to when more rows were dependent than at the start
     opening: NDArray[np.float64]  # (n,) near a singular position: what opens the row nearest to dependence by one unit
     guess_t: NDArray[np.float64]  # (3,) times of the stages a guess is extrapolated from

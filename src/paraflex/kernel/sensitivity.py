@@ -82,9 +82,9 @@ def find_parametric(moved, signals, times, weights, q, v, a, lam, torques, sensi
 def respond_to_parameter(
     system, g, b, weights, dependent_part, q, v, a, lam, least, i, torques, sensitivity, direction, space, work
 ):
-    """Solve the linear equations of a stage for y.a[i] and y.lam[i]; the last relative correction.
+    """Solve the linear equations of a stage for sensitivity.a[i] and sensitivity.lam[i]; the last relative correction.
 
-    y.q[i] and y.v[i] hold what they are without the stage's own y.a, and then all.
+    Its q[i] and v[i] hold what they are without the stage's own a, and then all.
     """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     da, dlam = sensitivity.a[i], sensitivity.lam[i]
@@ -164,7 +164,7 @@ def sensitivity_steps(
     direction,
     space,
     torques,
-    ws,
+    work,
 ):
     """Derivatives of the motion by one parameter over the first `count` steps of a history.
 
@@ -177,12 +177,12 @@ def sensitivity_steps(
     history : History
         After `solve_steps_to_rounding`.
     sensitivity : Sensitivity
-        Where the last steps left it: y.q[0] and y.v[0] and, unless the first step restarts, y.a[0] and y.lam[0].
+        Where the last steps left it: its q[0] and v[0] and, unless the first step restarts, its a[0] and lam[0].
     direction : Tangent
     """
     last = tableau.c.size - 1
     # Another parameter left its factor.
-    ws.step[0] = -1.0
+    work.step[0] = -1.0
     for k in range(count):
         h, sensitivity.left[k] = history.h[k], 0.0
         dt, dh = sensitivity.t[k], sensitivity.h[k]
@@ -214,9 +214,9 @@ def sensitivity_steps(
                 ),
             )
             q, v, a, lam = history.q[k, i], history.v[k, i], history.a[k, i], history.lam[k, i]
-            note_friction(system, q, v, ws.mu, ws.compliance)
+            note_friction(system, q, v, work.mu, work.compliance)
             take_pieces(signals, t, moved_signals, pieces)
-            find_parametric(moved, pieces, times, weights, q, v, a, lam, torques, sensitivity, ws)
+            find_parametric(moved, pieces, times, weights, q, v, a, lam, torques, sensitivity, work)
             note_torques(signals, t, torques)
             here = baumgarte_weights(controls, controls.alpha, controls.beta, length)
             left = respond_to_parameter(
@@ -235,10 +235,10 @@ def sensitivity_steps(
                 sensitivity,
                 direction,
                 space,
-                ws,
+                work,
             )
             sensitivity.left[k] = max(sensitivity.left[k], left)
-            power_sensitivity(moved, pieces, times, i, q, v, lam, torques, sensitivity, ws)
+            power_sensitivity(moved, pieces, times, i, q, v, lam, torques, sensitivity, work)
         if sensitivity.taken[0] == 0 and sensitivity.times[0] <= history.t[k]:
             copy(sensitivity.q[0], sensitivity.sample_q[0])
             copy(sensitivity.v[0], sensitivity.sample_v[0])
@@ -246,9 +246,9 @@ def sensitivity_steps(
             copy(sensitivity.lam[0], sensitivity.sample_lam[0])
             sensitivity.taken[0] = 1
         sensitivity_at_samples(tableau, k, history, sensitivity)
-        work, d_work = work_sensitivity(tableau, k, history, sensitivity)
-        sensitivity.work[0] += work
-        sensitivity.work[1] += d_work
+        done, d_done = work_sensitivity(tableau, k, history, sensitivity)
+        sensitivity.work[0] += done
+        sensitivity.work[1] += d_done
         copy(sensitivity.q[last], sensitivity.q[0])
         copy(sensitivity.v[last], sensitivity.v[0])
         copy(sensitivity.a[last], sensitivity.a[0])
@@ -258,7 +258,7 @@ def sensitivity_steps(
 
 @routine
 def start_sensitivity(tableau, i, k, g, history, sensitivity):
-    """What y.q[i] and y.v[i] are without the stage's own accelerations: the derivative of `step.stage_start`."""
+    """q[i] and v[i] of the sensitivity without the stage's own a: the derivative of `step.stage_start`."""
     h, dh = history.h[k], sensitivity.h[k]
     for j in range(sensitivity.q.shape[1]):
         dv, dq = sensitivity.v[0, j], sensitivity.q[0, j]

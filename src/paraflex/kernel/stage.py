@@ -22,8 +22,8 @@ from paraflex.kernel.compiling import inlined, routine, unoptimised
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import (
-    add_efforts,
     add_joints,
+    add_motors,
     apply_lines,
     apply_loads,
     finish_friction,
@@ -41,13 +41,13 @@ MAX_ITERATIONS, NEAR_ITERATIONS = 8, 24
 # SLOW: it still contracts after so many iterations.
 CONVERGED, DIVERGED, SINGULAR, SLOW = range(4)
 # The slowest contraction worth going on with, assumed of a new factor until one is measured.
-WORST_RATE = 0.5
+WORST_CONTRACTION = 0.5
 # After a guess that was right but for a direction that the norm hardly sees, the second change may be larger than the
 # first by so much.
-SECOND_RATE = 20.0
+SECOND_CONTRACTION = 20.0
 # A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it. It is not
 # taken to be better than this: motion that sets in makes it worse at once.
-AGEING, BEST_RATE = 1.05, 0.02
+AGEING, BEST_CONTRACTION = 1.05, 0.02
 # Changes that fall no more are rounding where they are smaller than this part of the accelerations, or where they
 # move nothing further than this part of the mechanism's size: there are no more digits to be had.
 ROUNDING, FINEST = 1e-8, 4e-15
@@ -55,7 +55,7 @@ ROUNDING, FINEST = 1e-8, 4e-15
 
 @unoptimised
 def equations(system, signals, t, weights, q, v, a, lam, torques, work):
-    """Residuals of the equations of motion (ws.f) and of the constraints (ws.rows) at one instant.
+    """Residuals of the equations of motion (work.f) and of the constraints (work.rows) at one instant.
 
     The latter are w_a Phi'' + w_v Phi' + w_q Phi for weights (w_a, w_v, w_q).
     """
@@ -78,7 +78,7 @@ def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
     for i in range(system.bodies.size):
         begin_body(system, i, q, v, a, work.f, work.scratch, work.scratch.points)
         add_joints(system, i, q, v, a, lam, weights, work.scratch, work.f, work.rows)
-        add_efforts(system, i, torques, work.scratch, work.f)
+        add_motors(system, i, torques, work.scratch, work.f)
         hand_on(system, i, work.scratch, work.f)
     apply_axes(system, q, v, a, lam, weights, torques, work.f, work.rows)
     finish_friction(system, lam, work.compliance, work.rows)
@@ -88,8 +88,8 @@ def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
 
 @routine
 def solve_stage(
-    system, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, tolerance, time_scale, rate, dependent_part,
-    renew, held, lag, work,
+    system, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, newton_tolerance, time_scale, contraction,
+    dependent_part, renew, held, lag, work,
 ):  # fmt: skip
     """Newton iteration for one stage; a and lam are starting guesses and then the solution.
 
@@ -100,9 +100,9 @@ def solve_stage(
     shift : (n,) array
         Of stabilised index 2 (Gear, Gupta and Leimkuhler): what q takes besides, such that Phi = 0 as well; a guess
         and then the solution. Empty for all else.
-    tolerance : float
-        Largest error left in q, in the mass norm; in v it is tolerance / time_scale.
-    rate : float
+    newton_tolerance : float
+        Largest error left in q, in the mass norm; in v it is newton_tolerance / time_scale.
+    contraction : float
         Contraction measured in earlier stages with this factor.
     dependent_part : float
         See `factor_schur`.
@@ -113,8 +113,8 @@ def solve_stage(
 
     Returns
     -------
-    status, iterations, rate
-        ws.q and ws.v hold the stage's q and v.
+    status, iterations, contraction
+        work.q and work.v hold the stage's q and v.
     """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     previous = 0.0
@@ -125,7 +125,7 @@ def solve_stage(
             factor_bodies(system, b, work.q, work)
             orient(system, work.q, work, dependent_part)
             if work.least[0] < SINGULAR_PART:
-                return SINGULAR, iteration, rate
+                return SINGULAR, iteration, contraction
         residuals(system, signals, t, weights, work.q, work.v, a, lam, torques, work)
         right_hand_side(system, work, scale)
         if renew:
@@ -144,26 +144,28 @@ def solve_stage(
             add(work.x, shift)
             change = max(change, mass_norm(system, work, work.x))
         if not isfinite(change):
-            return DIVERGED, iteration, rate
+            return DIVERGED, iteration, contraction
         if iteration > 1:
-            rate = change / previous
+            contraction = change / previous
             # From a good guess the second change may be larger than the first; from then on each has to be smaller.
-            if change > tolerance and rate > (SECOND_RATE if iteration == 2 else WORST_RATE):
+            if change > newton_tolerance and contraction > (
+                SECOND_CONTRACTION if iteration == 2 else WORST_CONTRACTION
+            ):
                 if b * size > FINEST * system.size and size > ROUNDING * mass_norm(system, work, a):
-                    return DIVERGED, iteration, rate
-                rate = 0.0
+                    return DIVERGED, iteration, contraction
+                contraction = 0.0
         else:
-            rate = min(WORST_RATE, max(BEST_RATE, AGEING * rate))
-        if change * rate <= tolerance * (1.0 - min(rate, WORST_RATE)):
+            contraction = min(WORST_CONTRACTION, max(BEST_CONTRACTION, AGEING * contraction))
+        if change * contraction <= newton_tolerance * (1.0 - min(contraction, WORST_CONTRACTION)):
             place(qs, vs, g, b, a, shift, work)
-            return CONVERGED, iteration, min(rate, WORST_RATE)
+            return CONVERGED, iteration, min(contraction, WORST_CONTRACTION)
         previous = change
-    return SLOW, MAX_ITERATIONS, rate
+    return SLOW, MAX_ITERATIONS, contraction
 
 
 @inlined
 def place(qs, vs, g, b, a, shift, work):
-    """Q and v of a stage into ws.q and ws.v."""
+    """Q and v of a stage into work.q and work.v."""
     for j in range(a.size):
         work.q[j] = qs[j] + b * a[j]
         work.v[j] = vs[j] + g * a[j]

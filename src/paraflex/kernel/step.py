@@ -32,6 +32,7 @@ from paraflex.kernel.near import (
 from paraflex.kernel.newmark import newmark_end, newmark_start
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
+    CONTRACTION,
     ENTERS,
     EXCESS,
     FACTOR_B,
@@ -49,12 +50,11 @@ from paraflex.kernel.run_state import (
     POSITION,
     PREPARED,
     PROJECTION,
-    RATE,
     REUSED,
     WIDEST,
 )
 from paraflex.kernel.signals import evaluate_signal
-from paraflex.kernel.stage import CONVERGED, SINGULAR, SLOW, WORST_RATE, place, solve_stage
+from paraflex.kernel.stage import CONVERGED, SINGULAR, SLOW, WORST_CONTRACTION, place, solve_stage
 
 # A new factor costs about as much as this many iterations: it pays once the old one has cost so many more.
 # Of second-order geometry it costs more.
@@ -73,9 +73,9 @@ def input_power(system, signals, t, q, v, lam, torques, work):
     """Power of the motors, of prescribed motion and of loads, less what dampers, friction and damping take."""
     total = load_power(system, q, v) + axis_power(system, q, v, torques) - line_energy(system, q, v)[1]
     total -= dissipated_power(system, q, v, lam, work.mu) + modal_damping_power(system, v)
-    for k in range(system.efforts.size):
-        effort = system.efforts[k]
-        total += effort.sign * torques[effort.signal] * marker_angle(system, system.markers[effort.marker], v)
+    for k in range(system.motor_sides.size):
+        side = system.motor_sides[k]
+        total += side.sign * torques[side.signal] * marker_angle(system, system.markers[side.marker], v)
     for r in range(system.rows.size):
         if system.rows[r].signal >= 0:
             _, rate, _ = evaluate_signal(signals, system.rows[r].signal, t)
@@ -116,7 +116,7 @@ def renew_factor(system, b, march, work):
     note_all_axial_forces(system, march.q, march.v, march.stage_a[1, 0], march.stage_lam[0], work, work.geometric)
     factor_bodies(system, b, march.q, work)
     march.counts[FACTORS] += 1
-    march.clock[FACTOR_B], march.clock[RATE] = b, WORST_RATE
+    march.clock[FACTOR_B], march.clock[CONTRACTION] = b, WORST_CONTRACTION
 
 
 @routine
@@ -143,7 +143,7 @@ def note_excess(system, iterations, fresh, march):
 
 @routine
 def stage_start(tableau, i, t, h, march):
-    """Explicit parts of stage i into m.qs and m.vs; its time, g and b."""
+    """Explicit parts of stage i into march.qs and march.vs; its time, g and b."""
     g = tableau.A[i, i] * h
     for j in range(march.q.size):
         march.vs[j] = march.v[j]
@@ -160,7 +160,7 @@ def stage_start(tableau, i, t, h, march):
 
 @routine
 def constraint_weights(controls, h):
-    """Weights of Phi'', Phi' and Phi in the stage equations, and the `rates` of `filtered_error`."""
+    """Weights of Phi'', Phi' and Phi in the stage equations, and the `gains` of `filtered_error`."""
     if controls.treatment == POSITION:
         return (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     if controls.treatment == GGL:
@@ -183,7 +183,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         cause is PAUSED where the stages were solved.
     """
     stages, one_stage = tableau.c.size, tableau.newmark.size > 0
-    weights, rates = constraint_weights(controls, h)
+    weights, gains = constraint_weights(controls, h)
     x, g, b = t, tableau.A[1, 1] * h, (tableau.A[1, 1] * h) ** 2
     if one_stage:
         x, g, b = newmark_start(tableau.newmark, t, h, march)
@@ -200,7 +200,8 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         if march.counts[PREPARED] == 0:
             return ENTERS, 0.0
         begin_near(system, march, work)
-    tolerance, allowed = controls.newton_fraction * controls.rate * h, controls.rate * h
+    allowed = controls.tolerance_per_second * h
+    newton_tolerance = controls.newton_fraction * controls.tolerance_per_second * h
     before = march.counts[ITERATIONS]
     i, rounds, held = 1, 0, 0.0
     while i < stages:
@@ -212,13 +213,13 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             predict(i, x, h, march)
             copy(march.stage_lam[i - 1], march.stage_lam[i])
             fill(march.shift, 0.0)
-        status, iterations, rate = solve_stage(
+        status, iterations, contraction = solve_stage(
             system, signals, x, g, b, weights, march.qs, march.vs, march.stage_a[1, i], march.stage_lam[i], march.shift,
-            march.torques, tolerance, controls.newton_memory, march.clock[RATE],
+            march.torques, newton_tolerance, controls.newton_memory, march.clock[CONTRACTION],
             controls.dependent_part, march.counts[NEAR] > 0, held, lag, work,
         )  # fmt: skip
         march.counts[ITERATIONS] += iterations
-        march.clock[RATE] = rate
+        march.clock[CONTRACTION] = contraction
         if status == SINGULAR:
             if at_singular:
                 note_passage(t, h, march)
@@ -271,7 +272,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             embedded_error(tableau, h, march)
         else:
             history_error(h, march)
-        error_q, error_v = filtered_error(system, b**0.5, rates, controls.memory, march, work, slow)
+        error_q, error_v = filtered_error(system, b**0.5, gains, controls.memory, march, work, slow)
         if march.counts[NEAR] > 0:
             allowed = max(allowed, controls.near_error * share_of_passage(h, march))
         error = max(max(error_q, error_v) / allowed, moved)

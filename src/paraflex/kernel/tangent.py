@@ -48,7 +48,7 @@ def make_tangent(system: PackedSystem) -> Tangent:
 
 @inlined
 def joints_tangent(system, i, weights, q, v, a, lam, direction):
-    """Add the change of body i's part of the rows to d.rows, and that of Phi_q^T lambda to d.f."""
+    """Add the change of body i's part of the rows to direction.rows, and that of Phi_q^T lambda to direction.f."""
     body = system.bodies[i]
     for k in range(body.port, body.port_end):
         port = system.ports[k]
@@ -71,7 +71,7 @@ def joints_tangent(system, i, weights, q, v, a, lam, direction):
 
 @routine
 def loads_tangent(system, q, direction):
-    """Subtract the change of the generalised forces of constant loads from d.f."""
+    """Subtract the change of the generalised forces of constant loads from direction.f."""
     for k in range(system.loads.size):
         load = system.loads[k]
         marker = system.markers[load.marker]
@@ -82,7 +82,7 @@ def loads_tangent(system, q, direction):
 
 @routine
 def lines_tangent(system, q, v, direction):
-    """Subtract the change of the generalised forces of springs and dampers between points from d.f."""
+    """Subtract the change of the generalised forces of springs and dampers between points from direction.f."""
     for k in range(system.lines.size):
         line = system.lines[k]
         ax, ay, vax, vay, rax, ray = line_end(system, line.a, line.ax, line.ay, q, v)
@@ -115,7 +115,7 @@ def lines_tangent(system, q, v, direction):
 
 @kernel
 def note_slopes(system, q, v, rates, compliance, direction):
-    """Slopes of the rows of friction against the rate, into d.friction; `rates` is scratch (m,).
+    """Slopes of the rows of friction against the rate, into direction.friction; `rates` is scratch (m,).
 
     `compliance` is what their residuals are multiplied by: see `joints.finish_friction`.
     """
@@ -141,7 +141,7 @@ def finish_rows(system, compliance, direction):
 
 @kernel
 def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, last, direction):
-    """Change of the residuals along a direction, d.f and d.rows.
+    """Change of the residuals along a direction, direction.f and direction.rows.
 
     Parameters
     ----------
@@ -152,10 +152,10 @@ def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, 
     compliance : (m,) array
         That of the workspace the residuals were found with.
     first, last : int
-        Bodies from first to before last; the direction is zero in the coordinates of all others, and in d.lam unless
-        these are all bodies.
+        Bodies from first to before last; the direction is zero in the coordinates of all others, and in
+        direction.lam unless these are all bodies.
     direction : Tangent
-        Its direction is read, d.f and d.rows are written; `note_slopes` has been called at (q, v).
+        Its direction is read, direction.f and direction.rows are written; `note_slopes` has been called at (q, v).
     """
     fill(direction.f, 0.0)
     fill(direction.rows, 0.0)
@@ -170,9 +170,9 @@ def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, 
 
 @kernel
 def reaction_tangent(system, weights, q, v, a, lam, idle, first, last, direction):
-    """Change of Phi_q^T lambda, into d.f, and of the rows, into d.rows, without any other force.
+    """Change of Phi_q^T lambda, into direction.f, and of the rows, into direction.rows, without any other force.
 
-    Along d.lam alone d.f is Phi_q^T d.lam. `idle` (motors,) is zero; else as for `residual_tangent`.
+    Along dlambda alone direction.f is Phi_q^T dlambda. `idle` (motors,) is zero; else as for `residual_tangent`.
     """
     fill(direction.f, 0.0)
     fill(direction.rows, 0.0)

@@ -55,7 +55,7 @@ def track_sums(system, axis, x, vector):
 
 @routine
 def add_track_tangent(system, axis, x, d_x, force, d_force, direction):
-    """Subtract from d.f the change of force W(x) along a track."""
+    """Subtract from direction.f the change of force W(x) along a track."""
     track = system.tracks[axis.track]
     body = system.bodies[system.markers[axis.a].body]
     n = body.nf
@@ -118,7 +118,7 @@ def axis_tangent(system, k, q, v, a, direction):
 
 @routine
 def axes_tangent(system, weights, q, v, a, lam, torques, direction):
-    """Add the changes of the rows of all axes and of their forces, those of motors among them, to d.rows and d.f."""
+    """Add the changes of the rows of all axes to direction.rows, of their forces, motors among them, to direction.f."""
     for k in range(system.axes.size):
         axis = system.axes[k]
         value, rate, acceleration, ex, ey, d_ex, d_ey, lever, d_lever, x, d_x, ends, d_ends = axis_tangent(

@@ -32,7 +32,7 @@ def plane_sums(shapes, x, y, first, n, e, u, d_u):
 
 @inlined
 def body_tangent(system, i, q, v, a, direction):
-    """Change of M q'' + h + D u' + K u of body i, less its weight, into d.f: see `bodies.body_equations`."""
+    """Change of M q'' + h + D u' + K u of body i, less its weight, into direction.f: see `bodies.body_equations`."""
     body = system.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
@@ -116,7 +116,7 @@ def second_order_slopes(system, i, q, v, a, direction, points):
 
 @routine
 def second_order_tangent(system, i, q, v, a, direction, points):
-    """Change of M q'' + h + D u' + K u of body i, less its weight, into d.f: see `bending.second_order_equations`."""
+    """Change of M q'' + h + D u' + K u of body i, less its weight, into direction.f: see `second_order_equations`."""
     body = system.bodies[i]
     o, n = body.offset, body.nf
     e = o + 3
@@ -187,7 +187,7 @@ def second_order_tangent(system, i, q, v, a, direction, points):
 
 @inlined
 def body_terms_tangent(system, i, q, v, a, direction, points):
-    """Change of the terms of body i into d.f; `points` is d.points, None for linear geometry."""
+    """Change of the terms of body i into direction.f; `points` is direction.points, None for linear geometry."""
     if points is None:
         body_tangent(system, i, q, v, a, direction)
     elif system.bodies[i].slopes > 0:

@@ -74,7 +74,7 @@ def marker_tangent(system, marker, q, v, a, direction):
 
 @routine
 def force_tangent(system, marker, q, force, d_force, lever, d_lever, direction):
-    """Add to d.f the change of the generalised force of a force (x, y) at a marker, whose R s is the lever."""
+    """Add to direction.f the change of the generalised force of a force (x, y) at a marker, whose R s is the lever."""
     body = system.bodies[marker.body]
     o, e, k, n = body.offset, body.offset + 3, marker.shape, body.nf
     c, s, turn = cos(q[o + 2]), sin(q[o + 2]), direction.q[o + 2]
@@ -92,7 +92,7 @@ def force_tangent(system, marker, q, force, d_force, lever, d_lever, direction):
 
 @inlined
 def shorten_tangent(system, bending, marker, q, force, d_force, direction):
-    """Subtract from d.f the change of a force along the beam times the derivative of a marker's f/2."""
+    """Subtract from direction.f the change of a force along the beam times the derivative of a marker's f/2."""
     if bending is None:
         return
     if marker.bending < 0:

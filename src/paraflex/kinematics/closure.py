@@ -14,12 +14,11 @@ from paraflex.arrays import Array
 from paraflex.dynamics import (
     System,
     build_system,
-    constant_signals,
-    pack_signals,
     project_position,
     records,
     redundant_rows,
     reference_pose,
+    still_signals,
 )
 from paraflex.dynamics.points import point_motion
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
@@ -241,9 +240,7 @@ class PathClosure:
         self.system: System = build_system(free)
         self.orientation = orientation
         end = end if end > 0.0 else 1.0
-        self.signals: Signals = pack_signals(
-            self.system.mechanism, constant_signals([0.0] * len(free.motors), end), end
-        )[0]
+        self.signals: Signals = still_signals(self.system.mechanism, end)[0]
         self.coordinates: NDArray[np.int64] = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
         self.packed, self.marker = with_marker(self.system, effector.point)
         self.reach: PoseSearch = PoseSearch(self.system, effector.point, self.coordinates, self.signals)
@@ -332,7 +329,7 @@ class PathClosure:
 
     def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]) -> RigidMotion:
         """The motion at the instants of the grid to keep, with more instants between where steps prove too long."""
-        stretches = []
+        intervals = []
         while True:
             target = self.target(path, grid)
             status, index, _, found = self.run(grid, target, pose)
@@ -340,14 +337,14 @@ class PathClosure:
             if status in (CLOSED, SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
                 break
             # From the last instant reached, in shorter steps.
-            stretches.append([x[:last][keep[:last]] for x in (grid, *found)])
+            intervals.append([x[:last][keep[:last]] for x in (grid, *found)])
             pose = found[0][last]
             between = np.linspace(grid[last], grid[index], _PIECES + 1)[1:-1]
             grid = np.concatenate([grid[last:index], between, grid[index:]])
             keep = np.concatenate([keep[last:index], np.zeros(between.size, bool), keep[index:]])
-        stretches.append([x[:index][keep[:index]] for x in (grid, *found)])
+        intervals.append([x[:index][keep[:index]] for x in (grid, *found)])
         motion = RigidMotion(
-            self.mechanism, self.system, path, *(np.concatenate(parts) for parts in zip(*stretches, strict=True))
+            self.mechanism, self.system, path, *(np.concatenate(parts) for parts in zip(*intervals, strict=True))
         )
         if status == CLOSED:
             return motion

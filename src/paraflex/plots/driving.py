@@ -54,7 +54,7 @@ def _of_all_modes(data: xr.Dataset, values: NDArray[np.float64], quantity: str) 
 def mode_comparison(data: xr.Dataset) -> Figure:
     """RMS tracking error (of the motion, or the whole run), residual vibration and largest torque of every mode."""
     rms, of_motion = headline(data)[0], ranked_by_motion(data)
-    efforts = data["peak_torque"].max("motor").values
+    peaks = data["peak_torque"].max("motor").values
     label = effort_label(data["torque"].attrs.get("units", "N m"))
     figure, axes = panels(1, 3)
     names = [mode_label(name) for name in names_of(data, "mode")]
@@ -71,7 +71,7 @@ def mode_comparison(data: xr.Dataset) -> Figure:
         panel.margins(x=0.08)
         if (values > 0.0).any():
             mark_powers(panel, "x")
-    _bars(axes[0, 2], names, efforts, VERMILLION)
+    _bars(axes[0, 2], names, peaks, VERMILLION)
     axes[0, 2].set_title(f"largest {label.partition(' [')[0]}")
     axes[0, 2].set_xlabel(label)
     return lay_out(figure, axes, panel_height=LINE * len(names) + 2.0)

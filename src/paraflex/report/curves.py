@@ -58,8 +58,8 @@ def torque_unit(data: xr.Dataset) -> str:
 
 def torque_chart(data: xr.Dataset) -> Chart:
     """The chart of what motors do, without its curves."""
-    effort = "force" if torque_unit(data) == "N" else "torque"
-    return Chart("torques", f"Motor {effort}s", effort, choosing="motor")
+    quantity = "force" if torque_unit(data) == "N" else "torque"
+    return Chart("torques", f"Motor {quantity}s", quantity, choosing="motor")
 
 
 def bending(data: xr.Dataset, name: str = "tip_transverse") -> xr.DataArray:

@@ -86,7 +86,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     length, bend = display_unit("m", gaps), display_unit("m", deflections)
     after = _after_columns(data)
     motors = names_of(data, "motor")
-    efforts = [data[name].transpose("mode", "motor").values for name in ("peak_torque", "rms_torque")]
+    torques = [data[name].transpose("mode", "motor").values for name in ("peak_torque", "rms_torque")]
     heads = [
         ("mode", ""), ("status", ""), ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
         *((name, f"[{unit}]") for name, unit, _ in after),
@@ -102,7 +102,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
             number(errors_rms[r].item(), length.factor),
             number(largest(ranked[r]), length.factor),
             *(number(values[r]) for _, _, values in after),
-            *(f"{number(peak)}\n{number(rms)}" for peak, rms in zip(*(each[r] for each in efforts), strict=True)),
+            *(f"{number(peak)}\n{number(rms)}" for peak, rms in zip(*(each[r] for each in torques), strict=True)),
             _deflection(deflections[r], data["body"].values, bend.factor),
             number(largest(one["strain_energy"].values)),
             number(one["energy_balance_max"].item()),
@@ -222,9 +222,9 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         tiles.append((f"{'least ' if several else ''}RMS error {words}", value, _name(data, best)))
     if np.isfinite(peaks).any():
         least = int(np.nanargmin(peaks))
-        effort = "force" if torque_unit(data) == "N" else "torque"
+        kind = "force" if torque_unit(data) == "N" else "torque"
         value = f"{number(peaks[least])} {torque_unit(data)}"
-        tiles.append((f"least peak {effort}" if several else f"peak {effort}", value, _name(data, least)))
+        tiles.append((f"least peak {kind}" if several else f"peak {kind}", value, _name(data, least)))
     deflections = np.array([largest(one) for one in _deflections(data)])
     if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
         most = int(np.nanargmax(deflections))

@@ -68,14 +68,14 @@ class _Runs:
 
 
 @checked_arguments()
-def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
+def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
     """The report of a verification.
 
     Parameters
     ----------
     data : xarray.Dataset
         From `studies.Verification.dataset`.
-    figures : mapping
+    summary : mapping
         From `studies.agreement`: what `verify.json` holds.
     """
     check_kind(data, "verification")
@@ -83,12 +83,12 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
     reference = str(data.attrs["reference"])
     moving = animation(data, ("mode", "model"))
     few = thinned(data)
-    tables = [(f"Models, mode {name}", _models(mode, reference, runs, name)) for name, mode in figures["modes"].items()]
+    tables = [(f"Models, mode {name}", _models(mode, reference, runs, name)) for name, mode in summary["modes"].items()]
     more = []
-    for name, mode in figures["modes"].items():
+    for name, mode in summary["modes"].items():
         more += [
             (f"Largest distance between the paths of two models, mode {name}", _distances(mode)),
-            (f"Difference from {printed(reference)}, mode {name}", _differences(mode, figures["links"], reference)),
+            (f"Difference from {printed(reference)}, mode {name}", _differences(mode, summary["links"], reference)),
         ]
     facts = [(name, value) for name, value in common_facts(data) if name != "integration"]
     return Page(
@@ -98,7 +98,7 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
         f"reference: {printed(reference)}",
         facts=facts,
         command=verify_command_line(asked_for, data, _ENGINES),
-        figures=_tiles(figures, reference),
+        figures=_tiles(summary, reference),
         tables=tables,
         more=more,
         panels=_panels(few, runs, reference),
@@ -108,10 +108,10 @@ def verification_page(data: xr.Dataset, figures: Mapping[str, Any]) -> Page:
         selected=runs.models.index(reference),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=doubt_lines(map(Finding.from_dict, figures.get("verdict", {}).get("findings", [])))
+        notes=doubt_lines(map(Finding.from_dict, summary.get("verdict", {}).get("findings", [])))
         + [
             f"Mode {name}, {printed(model)}: {one['message']}"
-            for name, mode in figures["modes"].items()
+            for name, mode in summary["modes"].items()
             for model, one in mode["models"].items()
             if one["message"]
         ],
@@ -235,9 +235,9 @@ def _paths(data: xr.Dataset, runs: _Runs) -> Chart:
     return Chart("path", "End-effector paths", "y [mm]", curves, x="x [mm]", equal=True, over_time=False, note=note)
 
 
-def _tiles(figures: Mapping[str, Any], reference: str) -> list[tuple[str, str, str]]:
+def _tiles(summary: Mapping[str, Any], reference: str) -> list[tuple[str, str, str]]:
     """The nearest model to the reference and its distance in the first mode, and how long all took."""
-    name, mode = next(iter(figures["modes"].items()))
+    name, mode = next(iter(summary["modes"].items()))
     apart = {
         model: one["distance_max"] for model, one in mode["models"].items()
         if model != reference and one.get("distance_max") is not None
@@ -249,8 +249,8 @@ def _tiles(figures: Mapping[str, Any], reference: str) -> list[tuple[str, str, s
             tiles.append((title, quantity(apart[model], "m"), f"{printed(model)}, mode {name}"))
     error = mode["models"].get(reference, {}).get("tracking_error")
     if error is not None:
-        span = SPAN_WORDS[ErrorSpan(figures.get("error", ErrorSpan.WHOLE.value))]
+        span = SPAN_WORDS[ErrorSpan(summary.get("error", ErrorSpan.WHOLE.value))]
         tiles.append((f"RMS error {span}", quantity(error, "m"), printed(reference)))
-    whole = all(one["status"] == "complete" for by in figures["modes"].values() for one in by["models"].values())
+    whole = all(one["status"] == "complete" for by in summary["modes"].values() for one in by["models"].values())
     tiles.append(("models", str(len(mode["models"])), "all complete" if whole else "not all complete"))
     return tiles

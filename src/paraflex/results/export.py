@@ -76,13 +76,13 @@ def _table(data: xr.Dataset, names: Sequence[Any], rows: Sequence[str]) -> pd.Da
         for index in product(*(range(len(one)) for one in labels)):
             column = "_".join([str(name), *(str(one[i]) for one, i in zip(labels, index, strict=True))])
             columns[column] = values[(..., *index)].ravel()
-            units[column], meanings[column] = _told(data[name])
+            units[column], meanings[column] = _unit_and_meaning(data[name])
     table = pd.DataFrame(columns)
     table.attrs = {"units": units, "meanings": meanings}
     return table
 
 
-def _told(array: xr.DataArray) -> tuple[str, str]:
+def _unit_and_meaning(array: xr.DataArray) -> tuple[str, str]:
     """Unit and meaning of a variable."""
     unit = str(array.attrs.get("units", ""))
     return ("" if unit == "1" else unit), str(array.attrs.get("long_name", ""))
@@ -177,7 +177,7 @@ def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
         last = [dim for dim in ("mode", "model") if dim in array.dims]
         array = array.transpose(*first, *(dim for dim in array.dims if dim not in (*first, *last)), *last)
         struct[field] = _matlab_value(array.values)
-        struct["units"][field], struct["meaning"][field] = _told(array)
+        struct["units"][field], struct["meaning"][field] = _unit_and_meaning(array)
         struct["dims"][field] = _cells([str(dim) for dim in array.dims])
     struct["attributes"] = {matlab_name(str(key)): _matlab_attribute(value) for key, value in data.attrs.items()}
     return struct

@@ -124,7 +124,7 @@ class Part:
         """The same, to be kept with results."""
         return Finding("path-cut-short", place, str(self), f"the path takes {self.path:.4g} s")
 
-    def figures(self) -> dict[str, float | str]:
+    def to_dict(self) -> dict[str, float | str]:
         """As plain numbers, and in words."""
         return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
 

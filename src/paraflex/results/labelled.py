@@ -102,7 +102,7 @@ _COMMENTS = {
 
 
 # Variables that are forces where all motors slide.
-_EFFORTS = ("torque", "peak_torque", "rms_torque", "applied_torque")
+_TORQUES = ("torque", "peak_torque", "rms_torque", "applied_torque")
 
 
 def link_variables(links: Links, mechanism: Mechanism) -> Variables:
@@ -162,7 +162,7 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
     units = sorted(set(mechanism.motor_units()), reverse=True) or ["N m"]
     speeds = {"N m": "rad/s", "N": "m/s"}
     data["motor_speed"].attrs["units"] = ", ".join(speeds[unit] for unit in units)
-    for name in (each for each in _EFFORTS if each in data):
+    for name in (each for each in _TORQUES if each in data):
         data[name].attrs["units"] = ", ".join(units)
         if units == ["N"]:
             data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")

@@ -93,11 +93,11 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     check_kind(data, "motion")
     reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
     last = data.isel(time=reached[-1] if reached.size else 0)
-    figures: dict[str, Any] = {name: data[name].item() for name in FIGURES}
-    figures = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in figures.items()}
+    numbers: dict[str, Any] = {name: data[name].item() for name in FIGURES}
+    numbers = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in numbers.items()}
     return {
         "mechanism": data.attrs["mechanism"],
-        **figures,
+        **numbers,
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),

@@ -51,23 +51,23 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     modes, part = {}, part_run(data)
     for name in data["mode"].values:
         run = data.sel(mode=name)
-        figures: dict[str, Any] = {"status": str(run["status"].item())}
-        if figures["status"] != "complete":
-            figures["message"] = str(run["message"].item())
-        if figures["status"] == "stopped":
-            figures |= {"event": str(run["event"].item()), "event_time": run["event_time"].item()}
+        numbers: dict[str, Any] = {"status": str(run["status"].item())}
+        if numbers["status"] != "complete":
+            numbers["message"] = str(run["message"].item())
+        if numbers["status"] == "stopped":
+            numbers |= {"event": str(run["event"].item()), "event_time": run["event_time"].item()}
         # Results of earlier versions lack some.
-        figures |= {key: finite_or_none(run[key].item()) for key in _FIGURES if key in run}
+        numbers |= {key: finite_or_none(run[key].item()) for key in _FIGURES if key in run}
         traces = data_traces(run)
         if "deflection" in run:
-            figures["deflection_max"] = finite_or_none(METRICS["deflection_max"].value(traces))
-        figures |= {key: int(run[key].item()) for key in _COUNTS}
+            numbers["deflection_max"] = finite_or_none(METRICS["deflection_max"].value(traces))
+        numbers |= {key: int(run[key].item()) for key in _COUNTS}
         for key in ("peak_torque", "rms_torque"):
-            figures[key] = {str(m): finite_or_none(run[key].sel(motor=m).item()) for m in run["motor"].values}
-        figures["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
-        figures["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
-        figures["validity"] = validity_summary(run)
-        modes[str(name)] = figures
+            numbers[key] = {str(m): finite_or_none(run[key].sel(motor=m).item()) for m in run["motor"].values}
+        numbers["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
+        numbers["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
+        numbers["validity"] = validity_summary(run)
+        modes[str(name)] = numbers
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}
     return {
@@ -75,7 +75,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         "error": data.attrs.get("error", ErrorSpan.WHOLE.value),
         "after": data.attrs.get("after", "free"),
         "verdict": verdict_of(data).to_dict(),
-        "part": None if part is None else part.figures(),
+        "part": None if part is None else part.to_dict(),
         "modes": modes,
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],

@@ -129,7 +129,7 @@ class Verification(Result):
             "duration": float(task.motion.t[-1]),
             "samples": int(task.motion.t.size),
             "verdict": Verdict(_findings(task, part)).to_dict(),
-            "part": None if part is None else part.figures(),
+            "part": None if part is None else part.to_dict(),
             "reference": reference,
             "error": self.error.value,
             "links": [body.name for body in task.mechanism.bodies],

@@ -30,12 +30,12 @@ def study_html(result: StudyResult) -> str:
     if result.data is None:
         reasons = [sentence(f"{mode}: {reason}") for mode, reason in result.failed.items()]
         return page("study: no mode ran", *reasons)
-    figures = summary(result.data, result.failed)
+    found = summary(result.data, result.failed)
     motors = [str(name) for name in result.data["motor"].values]
     unit = result.data["torque"].attrs.get("units", "N m")
-    span = ErrorSpan(figures["error"])
+    span = ErrorSpan(found["error"])
     rows, why = [], []
-    for name, mode in figures["modes"].items():
+    for name, mode in found["modes"].items():
         if "message" in mode:
             why.append(sentence(f"{name}: {mode['message']}"))
         if "steps" not in mode:
@@ -50,8 +50,8 @@ def study_html(result: StudyResult) -> str:
     peaks = [f"peak {motor} [{unit}]" for motor in motors]
     heads = ("mode", "status", f"RMS tracking error {SPAN_WORDS[span]} [mm]", "after the motion [mm]", "drift [mm/s]",
              "residual vibration [mm]", *peaks, "steps", "Newton iterations", "wall time [s]")  # fmt: skip
-    title = f"{figures['mechanism']}, {_modes_of(len(rows))}" + (", interrupted" if result.interrupted else "")
-    holds = validity_line({name: mode.get("validity") for name, mode in figures["modes"].items()})
+    title = f"{found['mechanism']}, {_modes_of(len(rows))}" + (", interrupted" if result.interrupted else "")
+    holds = validity_line({name: mode.get("validity") for name, mode in found["modes"].items()})
     why += [sentence(holds)] if holds else []
     return page(title, *map(sentence, doubt_lines(verdict_of(result.data))), table(heads, rows), *why)
 
@@ -142,39 +142,39 @@ def sensitivities_html(found: Sensitivities) -> str:
 @view.register(Verification)
 def verification_html(verification: Verification) -> str:
     """Every model in every mode: tracking error, distance from the reference, time."""
-    figures = verification.to_dict()
+    found = verification.to_dict()
     rows = [
-        (mode, name, told["status"], _millimetres(told.get("tracking_error")), _millimetres(told.get("distance_max")),
-         told.get("steps"), told.get("wall_time"))
-        for mode, each in figures["modes"].items() for name, told in each["models"].items()
+        (mode, name, run["status"], _millimetres(run.get("tracking_error")), _millimetres(run.get("distance_max")),
+         run.get("steps"), run.get("wall_time"))
+        for mode, each in found["modes"].items() for name, run in each["models"].items()
     ]  # fmt: skip
-    heads = ("mode", "model", "status", "RMS tracking error [mm]", f"largest distance from {figures['reference']} [mm]",
+    heads = ("mode", "model", "status", "RMS tracking error [mm]", f"largest distance from {found['reference']} [mm]",
              "steps", "wall time [s]")  # fmt: skip
     why = [
-        sentence(f"{mode}, {name}: {told['message']}")
-        for mode, each in figures["modes"].items()
-        for name, told in each["models"].items()
-        if told["message"]
+        sentence(f"{mode}, {name}: {run['message']}")
+        for mode, each in found["modes"].items()
+        for name, run in each["models"].items()
+        if run["message"]
     ]
     state = _state(verification.complete, verification.interrupted)
-    return page(f"{figures['mechanism']}, models compared: {state}", table(heads, rows), *why)
+    return page(f"{found['mechanism']}, models compared: {state}", table(heads, rows), *why)
 
 
 @view.register(MethodComparison)
 def comparison_html(comparison: MethodComparison) -> str:
     """Every run of every method: error, time, steps."""
-    figures = comparison.to_dict()
+    found = comparison.to_dict()
     rows = [
         (method["title"], run["tolerance"], run["step"], run["status"], run["error"], run["wall_time"], run["steps"])
-        for method in figures["methods"].values()
+        for method in found["methods"].values()
         for run in method["runs"]
     ]
     heads = ("method", "tolerance [m]", "step [s]", "status", "error [m]", "wall time [s]", "steps")
     reference = comparison.reference
-    told = None if reference is None else f"{reference.method}, {reference.tolerance:g} m"
+    title = None if reference is None else f"{reference.method}, {reference.tolerance:g} m"
     return page(
         f"{comparison.mechanism}, {comparison.case}: methods compared",
-        facts([("reference", told), ("its uncertainty [m]", None if reference is None else reference.uncertainty)]),
+        facts([("reference", title), ("its uncertainty [m]", None if reference is None else reference.uncertainty)]),
         table(heads, rows[:_MOST]),
         _more(len(rows)),
     )

@@ -24,16 +24,16 @@ from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
 STEEP = 0.7
 # Tracking error over the diagonal of the path: the library's worst mode, RAParM-I's +-+-, has 0.34, dwell included.
 LOST = 0.5
-# A motor's effort over that of the whole mass at the acceleration of the path and under gravity, with all loads: the
-# library's modes take at most 1.04 times as much.
-EFFORT = 30.0
+# A motor's torque or force over that of the whole mass at the acceleration of the path and under gravity, with all
+# loads: the library's modes take at most 1.04 times as much.
+TORQUE = 30.0
 # Force of a joint or drive over the same, and what it is multiplied by: also of the slowest of mechanisms.
 FORCE = 1000.0
 # Acceleration that masses count with at least: that of gravity [m/s^2].
 _LEAST_ACCELERATION = 9.81
 # Part of the samples that a force is as large in, so that a pole at a singular position is none.
 _LASTING = 0.1
-# Condition number of the actuation matrix that explains large efforts.
+# Condition number of the actuation matrix that explains large torques.
 _NEAR_SINGULAR = 50.0
 
 
@@ -49,7 +49,7 @@ class Driven:
         Of the end-effector, at the samples reached [m].
     acceleration : float
         Largest of the desired motion [m/s^2].
-    efforts : mapping of str to float
+    peaks : mapping of str to float
         Largest torque or force of each motor [N m or N].
     units : mapping of str to str
         "N m" or "N", of each motor.
@@ -61,7 +61,7 @@ class Driven:
     desired: Array
     actual: Array
     acceleration: float
-    efforts: Mapping[str, float]
+    peaks: Mapping[str, float]
     units: Mapping[str, str]
     condition: float
 
@@ -112,13 +112,13 @@ def doubtful_results(
         *_large_forces(where, system, solution),
     ]
     if driven is not None:
-        found += [*_lost(where, driven), *_large_efforts(where, system, driven)]
+        found += [*_lost(where, driven), *_large_torques(where, system, driven)]
     return found
 
 
-def doubtful_efforts(system: System, driven: Driven) -> list[Finding]:
+def doubtful_torques(system: System, driven: Driven) -> list[Finding]:
     """Findings about the torques and forces of a plan, before anything runs."""
-    return list(_large_efforts(_Where(f"mode {driven.mode}", system.mechanism), system, driven))
+    return list(_large_torques(_Where(f"mode {driven.mode}", system.mechanism), system, driven))
 
 
 def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
@@ -166,14 +166,14 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _large_efforts(where: _Where, system: System, driven: Driven) -> Iterator[Finding]:
+def _large_torques(where: _Where, system: System, driven: Driven) -> Iterator[Finding]:
     mechanism = where.mechanism
     size = mechanism_size(mechanism) or system.size
     force, turning = _expected(system, mechanism, driven.acceleration)
-    for motor, peak in driven.efforts.items():
+    for motor, peak in driven.peaks.items():
         unit = driven.units[motor]
         expected = force * size + turning if unit == "N m" else force + turning / size
-        if peak > EFFORT * expected > 0.0:
+        if peak > TORQUE * expected > 0.0:
             yield Finding(
                 "torque-large", where.place,
                 f"motor {motor} gives up to {peak:.3g} {unit}, where mass, size, acceleration and loads come to "

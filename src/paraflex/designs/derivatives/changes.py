@@ -22,10 +22,10 @@ from paraflex.dynamics import (
     InputSignals,
     System,
     build_system,
-    constant_signals,
     numbers_of,
     pack_signals,
     same_layout,
+    still_signals,
     with_numbers,
 )
 from paraflex.errors import InputError, ParaflexError
@@ -240,7 +240,7 @@ class Change:
         mechanism = near.mechanism
         if not mechanism.prescribed:
             return self.closure.signals
-        return pack_signals(mechanism, constant_signals([0.0] * len(mechanism.motors), near.end), near.end)[0]
+        return still_signals(mechanism, near.end)[0]
 
     def of_mode(self, nominal: Given) -> ModeChange:
         """How what the run of a mode is given changes."""

@@ -84,7 +84,7 @@ def _scipy(problem: DesignProblem, start: Array, method: str, **given: Any) -> s
     from scipy.optimize import minimize
 
     bounds = [(0.0, 1.0)] * start.size
-    return _told(minimize(problem.value, start, jac=problem.slope, method=method, bounds=bounds, **given))
+    return _why_ended(minimize(problem.value, start, jac=problem.slope, method=method, bounds=bounds, **given))
 
 
 def _simplex(problem: DesignProblem, start: Array) -> str:
@@ -96,7 +96,7 @@ def _simplex(problem: DesignProblem, start: Array) -> str:
     problem.scores(list(corners))
     options = {"initial_simplex": corners, "xatol": np.sqrt(tolerance), "fatol": tolerance * problem.cost}
     bounds, many = [(0.0, 1.0)] * start.size, {"maxiter": _MANY, "maxfev": _MANY}
-    return _told(
+    return _why_ended(
         minimize(lambda x: problem.scores([x])[0], start, method="Nelder-Mead", bounds=bounds, options=options | many)
     )
 
@@ -104,7 +104,7 @@ def _simplex(problem: DesignProblem, start: Array) -> str:
 def _evolution(problem: DesignProblem, start: Array) -> str:
     from scipy.optimize import differential_evolution
 
-    return _told(
+    return _why_ended(
         differential_evolution(
             lambda population: np.array(problem.scores(list(np.atleast_2d(population.T)))),
             [(0.0, 1.0)] * start.size,
@@ -134,7 +134,7 @@ def _optuna(problem: DesignProblem, start: Array) -> str:
             study.tell(trial, score)
 
 
-def _told(result: Any) -> str:
+def _why_ended(result: Any) -> str:
     text = str(result.message).strip().rstrip(".")
     return text[0].lower() + text[1:]
 

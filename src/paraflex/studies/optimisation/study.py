@@ -192,11 +192,11 @@ def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given
     field = f"vary.{parameter.name}.start"
     found = {number_at(setting.data, place) for place in places} if given is None else {given}
     if len(found) > 1:
-        told = sorted(found)
+        values = sorted(found)
         raise InputError(
             "its fields have different values in the mechanism's file, so that there is no start",
             field=field,
-            value=told,
+            value=values,
             remedy="give a start",
         )
     (start,) = found

@@ -130,13 +130,13 @@ def _parameters(study: StudyFolder, designs: DesignTable) -> dict[str, VariedPar
 
 def _facts(study: StudyFolder, found: Mapping[str, Any]) -> list[tuple[str, str]]:
     setting = study.setting
-    told = setting.integration
+    integration = setting.integration
     facts = [("search", str(found["method"]))] if "method" in found else [("sampling", study.sampling)]
     if setting.duration is not None:
         facts.append(("duration", f"{setting.duration:g} s"))
     for name, unit in (("method", ""), ("tolerance", " m"), ("step", " s"), ("constraints", "")):
-        if told.get(name) is not None:
-            value = told[name]
+        if integration.get(name) is not None:
+            value = integration[name]
             facts.append((name, f"{value:g}{unit}" if isinstance(value, float) else f"{value}"))
     return facts + [(name, study.versions[name]) for name in ("paraflex", "numba", "numpy") if name in study.versions]
 
@@ -161,10 +161,10 @@ def _found(file: Path) -> Mapping[str, Any]:
     if not file.is_file():
         return {}
     try:
-        told = json.loads(file.read_text(encoding="utf-8"))
+        found = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError("cannot be read", field=str(file), remedy="run the command again") from error
-    return told if isinstance(told, dict) else {}
+    return found if isinstance(found, dict) else {}
 
 
 def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool]]:
