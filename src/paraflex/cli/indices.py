@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rich.console import Console
 
 from paraflex.cli import COMPLETE, INTERRUPTED
@@ -21,28 +23,31 @@ def indices_command(request: IndicesRequest) -> int:
     compile_kernels_for(study.sweep.model().mechanism, console.print)
     with bars(console, "{task.completed}/{task.total}") as progress:
         bar = progress.add_task(study.sweep.name, total=study.sweep.runs)
-        report = lambda at: progress.update(bar, completed=at.done)  # noqa: E731
-        result = study.run(request.folder, workers=request.workers.chosen, on_progress=report)
+        result = study.run(
+            request.folder, workers=request.workers.chosen,
+            on_progress=lambda at: progress.update(bar, completed=at.done),
+        )  # fmt: skip
     if not result.complete:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED
-    save_figures(result.to_dict(), request.folder / "figures")
+    numbers = result.to_dict()
+    save_figures(numbers, request.folder / "figures")
     verdict = study.sweep.setting.verdict()
 
     def show(out: Console) -> None:
-        _report(out, result)
+        _report(out, result, numbers["indices"])
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)
 
-    tell(result.to_dict() | {"verdict": verdict.to_dict()}, show, as_json=request.json, doubts=verdict)
+    tell(numbers | {"verdict": verdict.to_dict()}, show, as_json=request.json, doubts=verdict)
     return COMPLETE
 
 
-def _report(console: Console, result: IndicesResult) -> None:
+def _report(console: Console, result: IndicesResult, found: list[dict[str, Any]]) -> None:
     title = "Sobol indices and half the width of their intervals of 95 %"
     keys = ("first", "first_confidence", "total", "total_confidence")
     rows = (
         [row["metric"], row["path"], row["mode"], row["parameter"], *(number(row[key], ".3f") for key in keys)]
-        for row in result.to_dict()["indices"]
+        for row in found
     )
     heads = ("first", "±", "total", "±")
     console.print(plain_table("metric", "path", "mode", "parameter", numbers=heads, rows=rows, title=title))

@@ -31,7 +31,8 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
     if result.interrupted and not result.values:
         console.print("interrupted before the first design was done")
         return INTERRUPTED
-    save_figures(result.to_dict(), request.folder / "figures")
+    numbers = result.to_dict()
+    save_figures(numbers, request.folder / "figures")
     verdict = study.base.setting.verdict()
 
     def show(out: Console) -> None:
@@ -39,7 +40,7 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
         _say_end(console, result, request.folder)
 
     more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
-    tell(result.to_dict() | more, show, as_json=request.json, doubts=verdict)
+    tell(numbers | more, show, as_json=request.json, doubts=verdict)
     return exit_code(bool(result.values), interrupted=result.interrupted)
 
 

@@ -29,7 +29,8 @@ def sweep_command(request: SweepRequest) -> int:
     result = _sweep(console, study, folder, request)
     has_report = request.report and bool(result.done) and _write_report(console, folder)
     verdict = study.setting.verdict()
-    parts = {path: part.to_dict() for path, part in study.setting.parts().items()}
+    # Tables say which parts of paths are run by the verdict's findings.
+    parts = {path: part.to_dict() for path, part in study.setting.parts().items()} if request.json else {}
 
     def show(out: Console) -> None:
         _report(console, result)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ class DesignTable:
     status: NDArray[np.str_]
     reason: NDArray[np.str_]
 
-    @property
+    @cached_property
     def complete(self) -> NDArray[np.bool_]:
         """Which runs are."""
         return self.status == "complete"

@@ -246,15 +246,17 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
             units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in found.schema}
             _write_csv(found, units, unfinished)
         else:
-            table = found.to_pandas()
-            columns = {matlab_name(name): _matlab_value(_known(table[name]).to_numpy()) for name in table}
+            columns = {matlab_name(name): _matlab_value(_values(found[name])) for name in found.column_names}
             _write_mat({"results": columns}, unfinished)
     return [file]
 
 
-def _known(column: pd.Series) -> pd.Series:
-    """A column in which text that is missing is empty."""
-    return column.fillna("") if column.dtype == object else column
+def _values(column: pa.ChunkedArray) -> NDArray[Any]:
+    """Values of an Arrow column; missing numbers are NaN, missing text is empty."""
+    import pyarrow as pa
+    from pyarrow import compute
+
+    return (compute.fill_null(column, "") if pa.types.is_string(column.type) else column).to_numpy()
 
 
 def _plain(value: Any) -> str:
