@@ -11,10 +11,11 @@ import time
 import pytest
 
 from journals import rows_in
-from paraflex.campaign import held, open_engine, outcomes, read_table, tables_of
+from paraflex.campaign import open_engine, outcomes, read_table, tables_of
 from paraflex.campaign.journal import JOURNAL, read_journal, write_journal
 from paraflex.designs.run import run_task
 from paraflex.errors import InputError, OutputError, ResultWarning
+from paraflex.folders import lock_folder
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
 
@@ -57,9 +58,9 @@ HOLDS = """
 import sys, time
 from pathlib import Path
 
-from paraflex.campaign import held
+from paraflex.folders import lock_folder
 
-with held(Path(sys.argv[1])):
+with lock_folder(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
 """
@@ -153,10 +154,13 @@ def test_a_process_killed_in_a_commit_leaves_what_was_committed(tmp_path):
 @kills
 def test_a_killed_process_holds_nothing(tmp_path):
     process = start(HOLDS, tmp_path, until="held")
-    with pytest.raises(InputError, match=r"another process writes to it .*wait for it, or stop it"), held(tmp_path):
+    with (
+        pytest.raises(InputError, match=r"another process writes to it .*wait for it, or stop it"),
+        lock_folder(tmp_path),
+    ):
         pass
     kill(process)
-    with held(tmp_path) as locks:
+    with lock_folder(tmp_path) as locks:
         assert locks
     assert [each.name for each in tmp_path.iterdir()] == [".lock"]
 

@@ -32,7 +32,8 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
         console.print("interrupted before the first design was done")
         return INTERRUPTED
     numbers = result.to_dict()
-    save_figures(numbers, request.folder / "figures")
+    with result.added() as new:
+        save_figures(numbers, new / "figures")
     verdict = study.base.setting.verdict()
 
     def show(out: Console) -> None:
