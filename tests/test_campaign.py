@@ -154,10 +154,8 @@ def test_a_process_killed_in_a_commit_leaves_what_was_committed(tmp_path):
 @kills
 def test_a_killed_process_holds_nothing(tmp_path):
     process = start(HOLDS, tmp_path, until="held")
-    with (
-        pytest.raises(InputError, match=r"another process writes to it .*wait for it, or stop it"),
-        lock_folder(tmp_path),
-    ):
+    said = r"another process writes to it .*wait for it, or stop it"
+    with pytest.raises(InputError, match=said), lock_folder(tmp_path):
         pass
     kill(process)
     with lock_folder(tmp_path) as locks:
