@@ -12,6 +12,7 @@ from paraflex.folders import (
     COMPARISON,
     MANIFEST,
     RUN,
+    STUDY_OF_RUNS,
     added_to,
     check_listed,
     files_of,
@@ -169,6 +170,18 @@ def test_figures_are_added_where_there_are_results_and_written_where_there_are_n
     assert read_manifest(folder).identity == identity
     with added_to(tmp_path / "elsewhere") as new:
         assert new == tmp_path / "elsewhere"
+
+
+def test_while_the_runs_of_a_study_go_on_a_report_is_written_beside_them(tmp_path):
+    replace(tmp_path / "out", {"results.csv": "old"}, STUDY_OF_RUNS)
+    with hold_folder(tmp_path / "out", STUDY_OF_RUNS) as held:
+        with added_to(tmp_path / "out") as new:
+            assert new == tmp_path / "out"
+            write(new, {"report.html": "of some runs"})
+        with held.replaced() as new:
+            write(new, {"results.csv": "new"})
+    assert ours(tmp_path / "out") == {"results.csv": "new"}
+    assert not (tmp_path / "out" / "report.html").exists()
 
 
 def test_a_file_of_other_results_is_noticed(folder, tmp_path):

@@ -14,7 +14,7 @@ import shutil
 import sqlite3
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from importlib.metadata import version
@@ -47,7 +47,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
 # What else a study of many runs keeps, listed or not: they come and go while it runs.
 _OF_STUDY = (
     "journal.sqlite*", "parts/*", "trajectories/*", "unfinished.parquet", "results.csv", "result.json", "summary.json",
-    "best.toml", "indices.*",
+    "best.toml", "indices.*", "report.html",
 )  # fmt: skip
 _REPORT = "report.html"
 
@@ -135,6 +135,10 @@ def _is_listed(file: Path) -> bool:
             wanted = manifest.files.get(file.absolute().relative_to(folder).as_posix())
             return wanted is None or wanted == _digest_of(file)
     return True
+
+
+class FolderInUseError(InputError):
+    """Another process writes to a folder."""
 
 
 class ResultsFolder:
@@ -245,13 +249,28 @@ def hold_folder(
 
 @contextmanager
 def added_to(folder: Path) -> Iterator[Path]:
-    """A folder to write figures or a report to: where it lies in a folder of results, they become part of these."""
-    for results in (folder, *folder.parents[:1]):
-        if (results / MANIFEST).is_file() and _NEW not in folder.parts:
-            with hold_folder(results, kind_of_folder(results)) as held, held.amended() as new:
-                yield new / folder.relative_to(results)
-            return
-    yield folder
+    """A folder to write figures or a report to: where it lies in a folder of results, they become part of these.
+
+    What is drawn of a study while its runs go on is not: it is of results that will not stay.
+
+    Raises
+    ------
+    FolderInUseError
+        Another process is to replace the results.
+    """
+    with ExitStack() as stack:
+        for results in (folder, *folder.parents[:1]):
+            if (results / MANIFEST).is_file() and _NEW not in folder.parts:
+                kind = kind_of_folder(results)
+                try:
+                    held = stack.enter_context(hold_folder(results, kind))
+                except FolderInUseError:
+                    if kind != STUDY_OF_RUNS:
+                        raise
+                    break
+                yield stack.enter_context(held.amended()) / folder.relative_to(results)
+                return
+        yield folder
 
 
 @contextmanager
@@ -281,7 +300,7 @@ def lock_folder(folder: Path, *, field: str = "--output") -> Iterator[bool]:
             code = error.sqlite_errorcode & 0xFF
             if code == sqlite3.SQLITE_BUSY:
                 remedy = "wait for it, or stop it"
-                raise InputError(
+                raise FolderInUseError(
                     "another process writes to it", field=field, value=str(folder), remedy=remedy
                 ) from None
             if code != sqlite3.SQLITE_IOERR:
@@ -312,9 +331,7 @@ def finish_change(folder: Path) -> None:
         try:
             with lock_folder(folder, field=str(folder)):
                 return
-        except OutputError:
-            raise
-        except InputError:
+        except FolderInUseError:
             if time.monotonic() > until:
                 raise
             time.sleep(_LOOK)
