@@ -200,6 +200,9 @@ class ResultsFolder:
             write_json(new / MANIFEST, {"paraflex_version": version("paraflex")} | vars(manifest))
             write_json(new / _REMOVED, removed)
             new.replace(ready)
+        except KeyboardInterrupt as interrupt:
+            interrupt.args = interrupt.args or (f"nothing was written; {self.path} is as it was",)
+            raise
         except OutputError as error:
             raise error.at(error.field.replace(str(new), str(self.path))) from None
         except OSError as error:

@@ -32,8 +32,6 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
         console.print("interrupted before the first design was done")
         return INTERRUPTED
     numbers = result.to_dict()
-    with result.added() as new:
-        save_figures(numbers, new / "figures")
     verdict = study.base.setting.verdict()
 
     def show(out: Console) -> None:
@@ -42,6 +40,7 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
 
     more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
     tell(numbers | more, show, as_json=request.json, doubts=verdict)
+    save_figures(numbers, request.folder / "figures")
     return exit_code(bool(result.values), interrupted=result.interrupted)
 
 
