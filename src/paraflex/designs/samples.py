@@ -71,7 +71,7 @@ class Varied:
 
 
 def check_varied(parameter: Varied, kind: str) -> None:
-    """Nothing, if a parameter says what a kind of sampling asks for.
+    """Check that a parameter has the fields that a kind of sampling needs.
 
     Raises
     ------

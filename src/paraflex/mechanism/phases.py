@@ -1,4 +1,4 @@
-"""Phases of gears and other relations that are as an assembly stands."""
+"""Phases of gears and other relations, by the first assembly."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def with_phases(mechanism: Members) -> dict[str, tuple[Relation, ...]]:
 
 
 def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
-    """A relation with its phase as the first assembly stands."""
+    """A relation with its phase in the first assembly."""
     field = f"{group.table}.{relation.name}.phase"
     if not mechanism.assemblies:
         raise InputError(
@@ -50,7 +50,7 @@ def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
 
 
 def _coordinate(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:
-    """A joint's angle or travel at approximate poses of the bodies; None where a place is not known."""
+    """A joint's angle or travel at approximate poses of the bodies; None if a place is not known."""
 
     def angle(ref: PointRef) -> float:
         return 0.0 if ref.on_ground else poses[ref.body].angle

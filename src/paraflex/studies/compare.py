@@ -41,7 +41,7 @@ _FIGURES = (
 
 @dataclass(frozen=True)
 class ComparisonOptions(CheckedFields):
-    """How methods are compared.
+    """Options of a comparison of methods.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class ComparisonOptions(CheckedFields):
 
 
 class _TooSlowError(Exception):
-    """A run beyond the limit of time."""
+    """A run longer than the time limit."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def compare_methods(
 
 
 def _chosen(methods: Iterable[Method | str]) -> list[Method]:
-    """Methods, each once: their names tell runs apart."""
+    """Methods, each once: runs are distinguished by their names."""
     chosen = list(dict.fromkeys(map(find_method, methods)))
     for method in chosen:
         if method != METHODS.get(method.name):
@@ -182,7 +182,7 @@ def _chosen(methods: Iterable[Method | str]) -> list[Method]:
 
 @dataclass(frozen=True)
 class _Setting:
-    """A tolerance, or a step with the tolerance that Newton's iteration works to."""
+    """A tolerance, or a step with the tolerance of Newton's iteration."""
 
     tolerance: float
     step: float | None = None
@@ -191,7 +191,7 @@ class _Setting:
         return IntegrationOptions(method=method, tolerance=self.tolerance, step=self.step)
 
     def row(self, method: str, status: str, reason: str, warned: tuple[str, ...] = ()) -> Measurement:
-        """A run that has nothing else to tell."""
+        """A row of a run without results."""
         tolerance = self.tolerance if self.step is None else None
         return Measurement(method, tolerance, self.step, status, reason, warnings=warned)
 
@@ -200,7 +200,7 @@ class _Setting:
 
 
 def _plan(method: Method, options: ComparisonOptions) -> list[_Setting]:
-    """What a method is run with, loosest first; at least one, of which the method may say that it cannot."""
+    """Settings of a method, loosest first; at least one, which the method may refuse."""
     tolerances = [_Setting(value) for value in sorted(set(options.tolerances), reverse=True)]
     steps = [_Setting(options.tightest, value) for value in sorted(set(options.steps), reverse=True)]
     fitting = (tolerances if method.error_control else []) + (steps if method.fixed_step else [])
@@ -236,7 +236,7 @@ def _measurements(
 
 
 def _warm_up(case: Case, options: IntegrationOptions) -> None:
-    """The first slice of a run: what is compiled or loaded when it is first called is there afterwards."""
+    """Run the first slice of a run, which compiles and loads what is needed at the first call."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -249,7 +249,7 @@ def _warm_up(case: Case, options: IntegrationOptions) -> None:
 def _measure(
     case: Case, method: str, setting: _Setting, places: NDArray[np.float64], options: ComparisonOptions
 ) -> Measurement:
-    """A run, repeated while that is quick."""
+    """A run, repeated if it is quick."""
     chosen, solutions = setting.options(method), list[Solution]()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -299,7 +299,7 @@ def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
 
 
 def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArray[np.float64]]:
-    """Two tight runs, by the two methods of highest order that can do it; the first is what errors are taken from."""
+    """Two tight runs, by the two methods of highest order that succeed; errors are distances from the first."""
     ours = sorted((x for x in METHODS.values() if x.family is Family.ESDIRK), key=lambda x: -x.order)
     tolerance = options.tightest / _FINER
     runs: list[tuple[Method, float, Solution]] = []
@@ -330,7 +330,7 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
 
 
 def _distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Largest over points and samples [m]."""
+    """Largest distance over points and samples [m]."""
     return float(np.max(np.linalg.norm(one - other, axis=-1)))
 
 
