@@ -95,7 +95,7 @@ def open_study(folder: str | Path) -> StudyFolder:
             versions=account.get("versions", {}),
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError("not the study of a folder of ours", field=str(folder / STUDY), remedy=_AGAIN) from error
+        raise InputError("not a study.json of paraflex", field=str(folder / STUDY), remedy=_AGAIN) from error
 
 
 def run_again(

@@ -191,7 +191,7 @@ def _check_versions(setting: Setting) -> None:
         if versions()[name] != wanted:
             raise InputError(
                 f"a worker has {name} {versions()[name]}, the sweep was begun with {wanted}", field="--cluster",
-                remedy="give workers the same installation: results must not depend on who computes them",
+                remedy="give workers the same installation: results must not depend on the worker",
             )  # fmt: skip
 
 

@@ -190,7 +190,7 @@ def _per_span(elements: int | Sequence[int], n_spans: int) -> list[int]:
             f"the beam has {n_spans} span(s) between its points and ends",
             field="elements",
             value=counts,
-            remedy="give one number for all spans or one number a span",
+            remedy="give one number for all spans or one number per span",
         )
     for count in counts:
         if count < 1:

@@ -254,10 +254,9 @@ class PathClosure:
             repeated = redundant_rows(self.system, self.assemble(assembly))
         if free + len(repeated) == tasks:
             raise InputError(
-                f"the mechanism holds itself twice ({', '.join(repeated)}), and joint motions along a path need each "
-                "motion held once",
+                f"redundant constraints ({', '.join(repeated)}): the joint motion along a path needs independent ones",
                 field="joint",
-                remedy="leave out the joint, the gear or the link that repeats what others do",
+                remedy="leave out the joint, gear or link whose constraints follow from the others",
             )
         raise InputError(
             f"the mechanism has {free + len(repeated)} degrees of freedom, its task {tasks} coordinate(s)",

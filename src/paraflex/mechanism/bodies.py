@@ -126,7 +126,7 @@ class FlexibleBeam(CheckedFields):
     length : float
         [m]
     section : Section or tuple of Section
-        One for the whole beam, or one a span between neighbouring points and ends.
+        One for the whole beam, or one per span between neighbouring points and ends.
     material : Material or tuple of Material
         Likewise.
     points : mapping
@@ -224,7 +224,7 @@ def _per_span(value: T | tuple[T, ...], count: int, field: str) -> tuple[T, ...]
             f"the beam has {count} span(s) between its points and ends",
             field=field,
             value=len(value),
-            remedy=f"give one {field} for all spans or one a span",
+            remedy=f"give one {field} for all spans or one per span",
         )
     return value
 

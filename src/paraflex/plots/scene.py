@@ -174,7 +174,9 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
         1 is the truth, 0 draws links stiff.
     """
     if not (np.isfinite(magnify) and magnify >= 0.0):
-        raise InputError("must not be negative", field="magnify", value=magnify, remedy="1 is the truth, 50 shows more")
+        raise InputError(
+            "must not be negative", field="magnify", value=magnify, remedy="1 is the actual deflection, 50 magnifies it"
+        )
     kept = np.isfinite(run["shape"].values).any(axis=(1, 2))
     samples = int(np.argmin(kept)) if not kept.all() else kept.size
     if not samples:

@@ -304,7 +304,7 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
     tolerance = options.tightest / _FINER
     runs: list[tuple[Method, float, Solution]] = []
     reasons = []
-    # Where one method only can do it, that one is held against itself at another tolerance.
+    # If only one method succeeds, it is compared with itself at another tolerance.
     for method, times in [(x, y) for y in (1.0, 4.0) for x in ours]:
         asked = tolerance * (2.0 if runs and times == 1.0 else times)
         try:
@@ -320,7 +320,7 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
             break
     if len(runs) < 2:
         raise IntegrationError(
-            f"no two runs came to their end to compare the others with ({'; '.join(reasons)})",
+            f"fewer than two runs reached their end to serve as a reference ({'; '.join(reasons)})",
             remedy="choose coarser tolerances, a shorter duration, or a longer limit of time for each run",
         )
     (method, own, solution), (other, loose, check) = runs

@@ -82,8 +82,8 @@ def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> 
     size = abs(value) if size is None else abs(size)
     if not size > 0.0:
         raise InputError(
-            "is zero, which gives no size of steps", field=where, value=value,
-            remedy="give low and high, whose distance is taken for its size",
+            "is zero, so steps of differences have no size", field=where, value=value,
+            remedy="give low and high, whose distance is its size",
         )  # fmt: skip
     return size
 
