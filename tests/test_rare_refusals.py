@@ -211,7 +211,7 @@ def test_samples_without_numbers(tmp_path):
     for replaced, field, problem, remedy in (
         ('[sampling]\nkind = "random"\n', "sampling.number", "is missing", "say how many designs"),
         ('[sampling]\nkind = "random"\nnumber = 0\n', "sampling.number", "must be positive", "say how many designs"),
-        ('[sampling]\nkind = "list"\n', "vary.arm.values", "is missing", "give a list of numbers, one a design"),
+        ('[sampling]\nkind = "list"\n', "vary.arm.values", "is missing", "give a list of numbers, one per design"),
     ):
         file = tmp_path / "study.toml"
         file.write_text(f"{text}\n{replaced}", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A body's coordinates and its material points: which slice of q is whose."""
+"""Coordinates and material points of a body: the only place that maps slices of q to bodies."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ GROUND_INDEX = -1
 
 @dataclass(frozen=True)
 class BodyCoordinates:
-    """Where a body's coordinates stand and what they mean.
+    """Indices of a body's coordinates in q, and the data to interpret them.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class BodyCoordinates:
 
     @property
     def mesh(self) -> BeamMesh | None:
-        """Of a flexible beam; None for any other body."""
+        """Mesh of a flexible beam; None for any other body."""
         return self.shape.mesh
 
     @property
@@ -69,17 +69,17 @@ class BodyCoordinates:
 
     @property
     def position(self) -> slice:
-        """Of r in q."""
+        """Slice of r in q."""
         return slice(self.offset, self.offset + 2)
 
     @property
     def flexible(self) -> slice:
-        """Of the modal coordinates in q."""
+        """Slice of the modal coordinates in q."""
         return slice(self.offset + 3, self.offset + 3 + self.nf)
 
     @property
     def all(self) -> slice:
-        """Of every coordinate of the body in q."""
+        """Slice of all coordinates of the body in q."""
         return slice(self.offset, self.offset + 3 + self.nf)
 
     def slopes(self, q: Array) -> Array:
@@ -113,7 +113,7 @@ class Marker:
 
     @property
     def on_frame(self) -> Marker:
-        """The same place, fixed in the body frame: it does not follow the deformation."""
+        """The same place fixed to the body frame, without the deformation."""
         return replace(self, N=np.zeros_like(self.N), slope=np.zeros_like(self.slope), bending=None)
 
     def place(self, u: Array) -> Array:
@@ -166,7 +166,7 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry, like: ModalBas
 def make_marker(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], ref: PointRef
 ) -> Marker:
-    """The material point of that name; of the ground, a place without a body."""
+    """The material point of a name; for the ground, a place without a body."""
     if ref.on_ground:
         return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point]) * 1.0, np.zeros((2, 0)), np.zeros(0))
     i = index[ref.body]
@@ -177,7 +177,7 @@ def make_marker(
 
 
 def end_markers(index: int, body: BodyCoordinates) -> tuple[Marker, ...]:
-    """First and last end of a beam or bar, first and last point of a modal body; none of a rigid body."""
+    """First and last end of a beam or bar, first and last point of a modal body; none for a rigid body."""
     if body.mesh is None:
         return tuple(_point_marker(index, body, point) for point in body.shape.ends)
     return node_marker(index, body, 0), node_marker(index, body, body.mesh.n_elements)

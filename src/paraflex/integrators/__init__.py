@@ -1,4 +1,4 @@
-"""Time integration: methods as objects, our own schemes as tableaux and numbers, SciPy's and SUNDIALS' as guests."""
+"""Time integration: methods as objects, own schemes by tableaux and coefficients, adapters to SciPy and SUNDIALS."""
 
 from paraflex.integrators.events import (
     DeflectionLimit as DeflectionLimit,

@@ -1,4 +1,4 @@
-"""Integrate a system by any method: slices of steps, between which Python looks, reports and stops."""
+"""Integrate a system by any method, in slices of steps; between them events, interrupts and limits are checked."""
 
 from __future__ import annotations
 
@@ -166,13 +166,13 @@ def integrate(
 
 
 def _failed(error: IntegrationError) -> IntegrationError:
-    """An error whose partial solution says what it says."""
+    """An error with its partial solution, in which the message is that of the error."""
     error.partial = replace(error.partial, status="failed", message=str(error))
     return error
 
 
 def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
-    """Raise where a run ends at the end of a beam and its joint asks for an error."""
+    """Raise if a run ends at the end of a beam and its joint has `at_end` "error"."""
     if crossing is None or not (
         isinstance(crossing.function.event, BeamEnd) and crossing.function.event.at_end is AtEnd.ERROR
     ):
@@ -188,7 +188,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> Run:
 
 
 def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:
-    """Why a run ended with a code of the kernel, or has not ended after the most steps, and what to do."""
+    """Reason and remedy for a run that ended with an error code of the kernel, or has taken the most steps."""
     if code == PAUSED:
         remedy = "allow more steps (max_steps), or choose a coarser tolerance or a shorter duration"
         return Breakdown(f"the run has not ended after {most} steps,", remedy)

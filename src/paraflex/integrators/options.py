@@ -1,4 +1,4 @@
-"""What a user chooses of an integration, checked."""
+"""Options of an integration, checked."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _REMEDIES = {
 @given_as("IntegrationOptions", "them, say IntegrationOptions(tolerance=1e-6)")
 @dataclass(frozen=True)
 class IntegrationOptions(CheckedFields):
-    """How to integrate.
+    """Method, tolerance and further options of an integration.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class IntegrationOptions(CheckedFields):
 
     @property
     def treatment(self) -> Treatment:
-        """What keeps the constraints."""
+        """Treatment of the constraints."""
         return self.method.treatments[0] if self.constraints is None else Treatment(self.constraints)
 
     def to_dict(self) -> dict[str, str]:
@@ -131,7 +131,7 @@ class IntegrationOptions(CheckedFields):
 
 
 def check_times(duration: float | None, samples: int | None) -> None:
-    """Check how long a run is to be [s] and how many samples of it are kept; None says nothing of it.
+    """Check the duration of a run [s] and the number of its samples; None skips a check.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def check_times(duration: float | None, samples: int | None) -> None:
 
 @checked_arguments()
 def choose(method: Method | str | None, options: IntegrationOptions | None) -> IntegrationOptions:
-    """The options, by default the default ones, with the method where one is named.
+    """The options, by default the default ones, with another method if one is given.
 
     Raises
     ------

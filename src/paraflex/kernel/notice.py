@@ -1,4 +1,4 @@
-"""The one line that says why a first run takes long: kernels are being compiled.
+"""The one line that announces that kernels are being compiled, which a first run waits for.
 
 It goes through Python's logging, under the name "paraflex": to standard error where nobody has set logging up, and
 nowhere after `logging.getLogger("paraflex").setLevel("ERROR")`.
@@ -17,7 +17,7 @@ _announced = False
 
 
 def announce_compiling(say: Callable[[str], None] | None = None) -> None:
-    """Say once a process that kernels are compiled; worker processes leave it to the one that started them.
+    """Announce once per process that kernels are compiled; worker processes leave it to their parent.
 
     Parameters
     ----------

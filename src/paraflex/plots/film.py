@@ -51,7 +51,7 @@ _ELSEWHERE = "choose another place"
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """How a film is made.
+    """Options of a film.
 
     Attributes
     ----------
@@ -93,19 +93,19 @@ class Film:
 
     @property
     def caption(self) -> str:
-        """What is magnified, and how fast it plays."""
+        """Text on the magnification and the speed."""
         return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "")
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Of the run in each picture [s]."""
+        """Time of the run in each picture [s]."""
         return self.scenes[0].time
 
 
 def plan_film(
     data: xr.Dataset, modes: Sequence[str] = (), options: FilmOptions | None = None, kind: str = ".mp4"
 ) -> Film:
-    """What a film shows, and when.
+    """Scenes of a film, and their times.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def animate(
 
 
 def film_kind(file: Path) -> str:
-    """The kind of film that a name asks for: its ending, or nothing of a folder of pictures."""
+    """The kind of film by the suffix of a name; a name without a suffix is a folder of pictures."""
     kind = file.suffix.lower()
     if kind in FORMATS or kind == "":
         return kind
@@ -266,7 +266,7 @@ def _size(scenes: Sequence[Scene], size: tuple[int, int] | None) -> tuple[int, i
 
 
 def _frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:
-    """Pictures (height, width, 4) from one on, one after the other: what stays is drawn once."""
+    """Pictures (height, width, 4) in succession, from a first one on; fixed parts are drawn once."""
     with journal_style():
         figure, sketches, texts = _stage(film)
         canvas = FigureCanvasAgg(figure)
@@ -291,13 +291,13 @@ def _frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:
 
 
 def clock(time: float, last: float) -> str:
-    """Time of a picture, with digits that do not jump."""
+    """Time of a picture, with a fixed number of digits."""
     digits = max(0, 2 - math.floor(math.log10(last))) if last > 0.0 else 3
     return f"t = {time:.{min(digits, 6)}f} s"
 
 
 def _stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
-    """The figure, its sketches, and the texts that change: one a panel, then the clock."""
+    """The figure, its sketches, and the texts that change: one per panel, then the clock."""
     width, height = film.size
     count = len(film.scenes)
     # Text and lines are of one size against the picture, whatever its pixels.
@@ -330,7 +330,7 @@ def _stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
 
 
 def _animated_svg(film: Film) -> str:
-    """One file that plays by itself in browsers: what stays from Matplotlib, what moves as values in time (SMIL)."""
+    """One animated file for browsers: fixed parts from Matplotlib, moving parts as values in time (SMIL)."""
     (width, height), time = film.size, film.time
     seconds = max(float(time[-1] - time[0]) / film.speed, 1e-3)
     count = min(time.size, _MOST_KEYS, round(seconds * _KEYS) + 1)
@@ -361,7 +361,7 @@ def _animated_svg(film: Film) -> str:
 
 
 def _still_svg(figure: Figure, moving: list[Artist]) -> str:
-    """A figure without what moves as SVG, from its `viewBox` on; its rules of style, which hold beyond it, left out."""
+    """A figure without moving parts as SVG, from its `viewBox` on, without its global style rules."""
     for artist in moving:
         artist.set_visible(False)
     out = StringIO()
@@ -371,7 +371,7 @@ def _still_svg(figure: Figure, moving: list[Artist]) -> str:
 
 
 def _write_gif(film: Film, file: Path, report: Callable[[int, int], None]) -> None:
-    """One palette for all pictures: what does not move keeps its colour, and files are small."""
+    """Write a GIF with one palette for all pictures: fixed parts keep their colour, and files are small."""
     total = len(film.time)
     frames = _frames(film)
     palette = _palette(film)

@@ -33,7 +33,7 @@ _LONGEST_NAME = 63
 
 @checked_arguments()
 def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.DataFrame]:
-    """Results as tidy tables, a row an observation; what a run did not reach is NaN.
+    """Results as tidy tables, one row per observation; times that a run did not reach are NaN.
 
     Parameters
     ----------
