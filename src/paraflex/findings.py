@@ -55,6 +55,7 @@ _WRONG = {
     "study-refused": "The study asks for something that the model does not have.",
     "task-freedoms": "The coordinates of the end-effector that a path prescribes are not as many as the freedoms.",
     "start-refused": "The start of a run contradicts the joints, prescribed motions or itself.",
+    "out-of-proportion": "Numbers of the model are so far apart that its equations cannot be solved at a pose.",
     "path-unreachable": "The end-effector cannot follow a path of the study, in the assembly of the study.",
     "path-singular": "A mode loses control of the mechanism on the path: a Type II singular position.",
 }

@@ -11,6 +11,7 @@ from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, as_enum
 from paraflex.integrators.events import Event
 from paraflex.integrators.methods import Method, MethodField, Treatment
+from paraflex.limits import SAMPLES, at_most
 
 _REMEDIES = {
     "tolerance": "give a length in metres, say 1e-5",
@@ -142,6 +143,7 @@ def check_times(duration: float | None, samples: int | None) -> None:
         raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
     if samples is not None and samples < 2:
         raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+    at_most(samples or 0, SAMPLES, "samples", "too many samples")
 
 
 @checked_arguments()
