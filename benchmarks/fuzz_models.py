@@ -37,7 +37,7 @@ sys.path.append(str(Path(__file__).parent))
 from common import single_thread
 from mutations import MODELS, STUDIES, Case, mutated, originals
 
-# What a case may take [s], on a busy machine, and a process [bytes of addresses]: the library's largest model takes 1 s.
+# What a case may take [s] on a busy machine, and a process [bytes of addresses]: the largest of the library takes 1 s.
 LIMIT = 60.0
 MEMORY = 8 * 2**30
 # Steps of a run: what is tried is whether it ends well, not whether it comes far.
@@ -122,7 +122,8 @@ class _Worker:
     def close(self) -> None:
         """End the process."""
         self.process.kill()
-        self.process.wait()
+        with self.process:
+            pass
 
 
 def case_of(number: int, through: str) -> Case:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from paraflex.errors import ModelWarning, ParaflexWarning, warn_user
+from paraflex.errors import ModelWarning, ParaflexWarning, printable, warn_user
 
 __all__ = ["CODES", "Code", "Finding", "Level", "Verdict", "warn_of"]
 
@@ -103,6 +103,7 @@ _DOUBTFUL = {
     "deflection-large": "A link bends so far that it is more a spring than a link.",
     "speed-large": "A body moves, or a drive turns, as fast as no mechanism does.",
     "error-large": "The tracking error is of the size of the path.",
+    "tolerance-loose": "The tolerance is a large part of the mechanism's size: positions may be off by as much.",
     "stability": "An explicit method takes very many steps, by stability alone.",
     "validity": "A run went beyond what the geometry of its model can describe.",
 }
@@ -145,7 +146,7 @@ class Finding:
 
     def __str__(self) -> str:
         where = f"{self.place}: " if self.place else ""
-        return f"{where}{self.text}; {self.remedy} [{self.code}]"
+        return printable(f"{where}{self.text}; {self.remedy} [{self.code}]")
 
     def to_dict(self) -> dict[str, str]:
         """For JSON: code, level, place, text, remedy."""

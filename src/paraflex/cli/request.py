@@ -97,6 +97,7 @@ def at_fault(error: InputError, model: Model) -> InputError:
     flags = {
         "duration": "--duration",
         "samples": "--samples",
+        "tolerance": "--tol",
         "assembly": "--assembly",
         "after": "--after",
         "events": "--stop-at",
@@ -109,8 +110,9 @@ def at_fault(error: InputError, model: Model) -> InputError:
 def results_folder(out: str) -> Path:
     """The results folder, proved writable; nothing is left of the proof until there are results."""
     folder = Path(out)
-    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    made: list[Path] = []
     try:
+        made += [parent for parent in (folder, *folder.parents) if not parent.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".paraflex-writable"
         probe.touch()

@@ -82,6 +82,14 @@ def _content(path: Path) -> bytes:
         return stream.read(FILE_BYTES + 1)
 
 
+def exists(path: Path) -> bool:
+    """Whether there is such a file; of a name that none can have there is none."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The data of a TOML text.
 

@@ -24,6 +24,7 @@ from paraflex.designs.setting import Setting, digest, make_setting
 from paraflex.errors import InputError, OutputError
 from paraflex.findings import Verdict
 from paraflex.mechanism.quantities import known
+from paraflex.results.spreadsheet import spreadsheet_text
 from paraflex.results.summary import finite_or_none
 from paraflex.writing import read_json, whole_file
 
@@ -149,7 +150,8 @@ class Sensitivities(Result):
         """Write `sensitivity.json`, and its lines as `sensitivity.csv` and `sensitivity.parquet`; see `Result.save`."""
         target, lines = super().save(folder), self.to_frame()
         with whole_file(target / TABLE) as unfinished:
-            lines.to_csv(unfinished, index=False)
+            cells = lines.map(lambda cell: spreadsheet_text(cell) if isinstance(cell, str) else cell)
+            cells.to_csv(unfinished, index=False)
         with whole_file(target / LINES) as unfinished:
             _to_parquet(lines, unfinished)
         return target
