@@ -35,6 +35,15 @@ _NAMES = (
     "", " ", "ground", "a.b", "type", "points", "name", "x" * 5000, "\u202eabc", "\x1b[2J", "{x}", "=1+1", "[b]", "é",
     "t", "pi", "sin", "0", "-", "nul\x00", "line\nbreak", "body", "__class__", "." * 1000,
 )  # fmt: skip
+# Words that mean something in some field.
+_WORDS = (
+    "linear", "second-order", "pinned", "cantilever", "free", "separate", "shared", "hold", "whole", "motion",
+    "beam", "rigid", "assumed-modes", "modal", "prismatic", "slot", "sliding", "weld", "revolute", "error", "warn",
+    "stop", "polygon", "line", "circle", "points", "force", "torque", "x", "y", "angle", "esdirk5", "tr-bdf2",
+    "trapezoidal", "newmark", "hht-alpha", "generalised-alpha", "wilson-theta", "rk45", "radau", "bdf", "ndf",
+    "adams", "ida", "baumgarte", "projection", "ggl", "grid", "list", "sobol", "random", "log", "slsqp", "nelder-mead",
+    "tracking_rms", "peak_torque_max", "deflection_max", "section.bar.width", "integration.tolerance", "four_bar",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -241,6 +250,20 @@ def _names_crossed(chance: random.Random, data: dict[str, Any], place: Place, ot
         one[key] = other[at]
 
 
+def _to_word(chance: random.Random, data: dict[str, Any], place: Place, others: Sequence[dict[str, Any]]) -> None:
+    """A word that may stand there, or a field of [study] that says another thing."""
+    texts = [(holder, key) for holder, key in _places(data) if isinstance(holder[key], str)]
+    if texts and chance.random() < 0.5:
+        holder, key = chance.choice(texts)
+        holder[key] = chance.choice(_WORDS)
+    elif isinstance(study := data.setdefault("study", {}), dict):
+        study |= chance.choice((
+            {"method": chance.choice(_WORDS)}, {"step": 10.0 ** chance.uniform(-7, 1), "method": "newmark"},
+            {"tolerance": 10.0 ** chance.uniform(-16, 3)}, {"duration": 10.0 ** chance.uniform(-9, 6)},
+            {"after": "hold"}, {"samples": chance.choice((2, 3, 1000))}, {"orientation": chance.uniform(-9, 9)},
+        ))  # fmt: skip
+
+
 def _from_another(chance: random.Random, data: dict[str, Any], place: Place, others: Sequence[dict[str, Any]]) -> None:
     """A table of another file in place of this one's, or beside what this one has."""
     other = chance.choice(others)
@@ -261,11 +284,11 @@ def _nested(chance: random.Random, data: dict[str, Any], place: Place, others: S
 
 _DATA_CHANGES = (
     _to_odd, _to_odd, _to_odd, _scaled, _scaled, _scaled, _to_expression, _deleted, _deleted, _doubled, _multiplied,
-    _renamed, _renamed, _crossed, _crossed, _names_crossed, _names_crossed, _from_another, _nested,
+    _renamed, _renamed, _crossed, _crossed, _names_crossed, _names_crossed, _to_word, _from_another, _nested,
 )  # fmt: skip
 
 
-_NUMBERS = (_scaled, _scaled, _scaled, _number_to_odd, _numbers_swapped, _names_crossed)
+_NUMBERS = (_scaled, _scaled, _scaled, _number_to_odd, _numbers_swapped, _names_crossed, _to_word)
 
 
 def _cut(chance: random.Random, content: bytes) -> bytes:
