@@ -236,8 +236,10 @@ def hold_folder(
     OutputError
         It cannot be made or written.
     """
-    made = [each for each in (path, *path.parents) if not each.exists()]
+    made: list[Path] = []
     try:
+        with suppress(OSError):  # a name that is too long, which the lock tells
+            made += [each for each in (path, *path.parents) if not each.exists()]
         with lock_folder(path, field=field) as locks:
             there = kind_of_folder(path)
             if there not in ("", kind) and not force:
@@ -423,10 +425,10 @@ def _digest_of(file: Path, *, sync: bool = False) -> str:
         return digest.hexdigest()
 
 
-def _remove_empty(folder: Path, made: Iterable[Path]) -> None:
+def _remove_empty(folder: Path, made: Sequence[Path]) -> None:
     """Remove folders that were made for results of which nothing came."""
     with suppress(OSError):
-        if folder in (made := list(made)) and {file.name for file in folder.iterdir()} == {LOCK}:
+        if folder in made and {file.name for file in folder.iterdir()} == {LOCK}:
             (folder / LOCK).unlink()
         for each in made:
             each.rmdir()

@@ -21,6 +21,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.files import Model, library_names, model_from
 from paraflex.files.generators import is_generated
 from paraflex.files.model import read_model
+from paraflex.files.read import exists
 from paraflex.findings import Verdict
 from paraflex.integrators import IntegrationOptions, check_times
 from paraflex.mechanism.quantities import known
@@ -190,7 +191,7 @@ def digest(content: Any) -> str:
 
 def _mechanism(name: str, folder: FilePath) -> str:
     beside = folder / name
-    return str(beside) if name not in library_names() and not is_generated(name) and beside.exists() else name
+    return str(beside) if name not in library_names() and not is_generated(name) and exists(beside) else name
 
 
 def _varied(name: str, entry: VaryTable) -> Varied:

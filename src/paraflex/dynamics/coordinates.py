@@ -22,6 +22,8 @@ from paraflex.fem import (
 from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
+# The least eigenvalue of a body's mass matrix, scaled to ones along its diagonal, that is more than rounding.
+_SINGULAR = 1e-14
 
 
 @dataclass(frozen=True)
@@ -147,20 +149,42 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry, like: ModalBas
             integrals = integrals.without_flexibility()
         modes = modal_basis(integrals)
     except np.linalg.LinAlgError as error:
-        raise InputError(
-            "its mass matrix is not positive definite",
-            field=f"body.{body.name}",
-            remedy="check section, material and lumped masses for values many orders of magnitude apart",
-        ) from error
+        raise _not_definite(body.name) from error
     if like is not None:
         modes = modes.like(like, integrals.Mff)
     elif not isinstance(body, RigidBody) and body.modes is not None:
         modes = modes.lowest(body.modes)
     integrals = integrals.in_basis(modes.vectors)
+    _check_mass(body.name, integrals)
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
         points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
     return BodyCoordinates(body.name, offset, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
+
+
+def _check_mass(name: str, body: ShapeIntegrals) -> None:
+    """The mass matrix of a whole body, undeformed, is positive definite beyond rounding.
+
+    It is not where what is left of its inertia about its centre of mass is rounding beside that about its origin.
+    """
+    rigid = [[body.m, 0.0, -body.S1[1]], [0.0, body.m, body.S1[0]], [-body.S1[1], body.S1[0], body.I0 + body.J]]
+    mass = np.real(np.array(rigid))
+    if body.nf:
+        coupling = np.real(np.vstack([body.S2, body.G1 + body.Jf]))
+        mass = np.block([[mass, coupling], [coupling.T, np.real(body.Mff)]])
+    if np.all(np.isfinite(mass)) and np.all(np.diag(mass) > 0.0):
+        size = np.sqrt(np.diag(mass))
+        if np.linalg.eigvalsh(mass / size / size[:, None])[0] > _SINGULAR:
+            return
+    raise _not_definite(name)
+
+
+def _not_definite(name: str) -> InputError:
+    return InputError(
+        "its mass matrix is not positive definite, or only by rounding", field=f"body.{name}",
+        remedy="check inertia, centre of mass, section, material and lumped masses for values many orders of "
+        "magnitude apart",
+    )  # fmt: skip
 
 
 def make_marker(

@@ -18,6 +18,7 @@ from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import CONSTRAINT, INDEX_1
 from paraflex.kernel.stage import equations
+from paraflex.limits import solvable
 
 _MAX_ITERATIONS = 50
 # Newton's iteration has converged when it moves links by less than this [sizes of the mechanism, rad] ...
@@ -43,6 +44,7 @@ Motion = Callable[[Array], tuple[Array, Array]]
 
 
 @checked_arguments()
+@solvable("an equilibrium")
 def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -> State:
     """The state of rest nearest a start: all forces in balance, joints closed, the angles of held joints kept.
 
@@ -66,6 +68,7 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
     return State(start.time, _find(system, start, held, None), np.zeros(system.n))
 
 
+@solvable("an equilibrium")
 def moving_equilibrium(system: System, start: State, motion: Motion) -> Array:
     """The pose (n,) nearest a start at which forces balance the inertia forces of a motion.
 

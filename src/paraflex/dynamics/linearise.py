@@ -22,6 +22,7 @@ from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiff
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
 from paraflex.dynamics.system import System
+from paraflex.limits import solvable
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix as Sparse
@@ -70,6 +71,7 @@ class Vibration:
 
 
 @checked_arguments()
+@solvable("natural frequencies")
 def natural_frequencies(
     system: System,
     state: State,

@@ -15,7 +15,8 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass
 from paraflex.dynamics.state import State, close_downhill, consistent_state, reference_pose
 from paraflex.dynamics.system import System
-from paraflex.errors import AssemblyError, InconsistentConstraintsError
+from paraflex.errors import AssemblyError, InconsistentConstraintsError, ProportionError
+from paraflex.limits import solvable
 from paraflex.mechanism import Assembly
 
 # How far a body turns, or moves as a part of the mechanism's size, to look whether a pose is a special one.
@@ -74,7 +75,7 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
     except AssemblyError as error:
         gaps = joint_gaps(system, system.constraints(signals, time, error.partial)[0])
         return Closure(assembly.name, before, nan, nan, max(gaps.values()), tuple(gaps), error.cause, None)
-    except InconsistentConstraintsError as error:
+    except (InconsistentConstraintsError, ProportionError) as error:
         return Closure(assembly.name, before, nan, nan, 0.0, (), error.cause, None)
     phi, rate = system.constraints(signals, time, state.q, state.v)
     position, velocity = (float(np.max(np.abs(part), initial=0.0)) for part in (phi, rate))
@@ -153,6 +154,7 @@ class Mobility:
         return self.lasting is not None and self.lasting < self.freedoms
 
 
+@solvable("degrees of freedom")
 def mobility(system: System, state: State) -> Mobility:
     """Degrees of freedom and redundant constraints of a rigid mechanism at a closed pose.
 

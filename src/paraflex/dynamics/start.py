@@ -21,6 +21,7 @@ from paraflex.dynamics.state import State, reference_pose
 from paraflex.dynamics.system import System
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
+from paraflex.limits import solvable
 from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start, check_start
 
 # What joints may be open by at a start that is given [sizes of the mechanism, rad], and velocities by, as a fraction
@@ -34,6 +35,7 @@ _POSITION_STIFFNESS, _VELOCITY_STIFFNESS = 1.0, 1e3
 
 
 @checked_arguments()
+@solvable("a start")
 def start_state(
     system: System,
     start: Start,

@@ -28,6 +28,7 @@ from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import Signals
+from paraflex.limits import solvable
 from paraflex.mechanism import GROUND, Assembly, PointRef
 from paraflex.mechanism.poses import approximate_poses
 
@@ -208,6 +209,7 @@ def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Ar
 
 
 @checked_arguments()
+@solvable("a consistent pose")
 def consistent_state(
     system: System,
     assembly: str | Assembly | None,

@@ -19,6 +19,7 @@ from paraflex.fem.element import (
     axial_shape,
     transverse_shape,
 )
+from paraflex.limits import ELEMENTS, at_most
 
 # Two points closer than this fraction of the beam are one node: an element that short is a typing slip.
 COINCIDENT_POINTS = 1e-9
@@ -195,4 +196,5 @@ def _per_span(elements: int | Sequence[int], n_spans: int) -> list[int]:
     for count in counts:
         if count < 1:
             raise InputError("a span needs at least one element", field="elements", value=count, remedy="use 1 or more")
+    at_most(sum(counts), ELEMENTS, "elements", "too many elements of a beam")
     return counts

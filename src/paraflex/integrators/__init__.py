@@ -19,6 +19,7 @@ from paraflex.integrators.options import (
     IntegrationOptions as IntegrationOptions,
     check_times as check_times,
     choose as choose,
+    loose_tolerance as loose_tolerance,
 )
 from paraflex.integrators.run import make_problem as make_problem
 from paraflex.integrators.solution import Solution as Solution

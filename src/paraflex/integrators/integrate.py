@@ -24,7 +24,7 @@ from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
 from paraflex.integrators.method import NativeMethod
-from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.options import IntegrationOptions, loose_tolerance, refuse_tolerance
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
@@ -109,11 +109,13 @@ def integrate(
         It cannot pass a singular position: the mechanism is driven beyond its reach there, or its method is one of
         the Newmark family.
     InputError
-        Times that do not ascend from the start; events that the mechanism cannot have, or a start beyond one, or off
-        the end of a beam.
+        A tolerance beyond the size of the mechanism; times that do not ascend from the start; events that the mechanism
+        cannot have, or a start beyond one, or off the end of a beam.
     """
     began = time.perf_counter()
     options = options or IntegrationOptions()
+    refuse_tolerance(options.tolerance, system.size)
+    loose = loose_tolerance(options.tolerance, system.size)
     problem = make_problem(system, signals, initial, times, knots)
     ends, crossing = BeamEnds(system, initial), None
     functions = (*event_functions(system, initial.q, options.events), *ends.functions)
@@ -146,7 +148,7 @@ def integrate(
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {run.now().t:.6g} s"
     solution = _solution(run, options, time.perf_counter() - began, status, message, crossing)
-    solution = replace(solution, findings=ends.findings(solution.q))
+    solution = replace(solution, findings=(*ends.findings(solution.q), *filter(None, [loose])))
     _refuse_beam_end(solution, crossing)
     if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution

@@ -27,6 +27,7 @@ from paraflex.kernel.closure import CLOSED, SINGULAR, close_path, make_closure_s
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.kinematics.reach import PoseSearch, Shortfall
+from paraflex.limits import solvable
 from paraflex.mechanism import Assembly, Mechanism, PointRef
 from paraflex.mechanism.members import TASK_COORDINATES
 
@@ -88,6 +89,7 @@ class RigidMotion:
 
 
 @checked_arguments()
+@solvable("the motion along the path")
 def follow_path(
     mechanism: Mechanism,
     path: Path,

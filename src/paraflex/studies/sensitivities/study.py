@@ -25,6 +25,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.findings import Verdict
 from paraflex.folders import SENSITIVITY
 from paraflex.mechanism.quantities import known
+from paraflex.results.spreadsheet import spreadsheet_text
 from paraflex.results.summary import finite_or_none
 from paraflex.writing import whole_file
 
@@ -151,7 +152,8 @@ class Sensitivities(Result):
         super().write_files(folder)
         lines = self.to_frame()
         with whole_file(folder / TABLE) as unfinished:
-            lines.to_csv(unfinished, index=False)
+            cells = lines.map(lambda cell: spreadsheet_text(cell) if isinstance(cell, str) else cell)
+            cells.to_csv(unfinished, index=False)
         with whole_file(folder / LINES) as unfinished:
             _to_parquet(lines, unfinished)
 
