@@ -9,7 +9,7 @@ from rich.console import Console
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import CompareRequest
 from paraflex.cli.compare_tables import print_comparison
-from paraflex.cli.ending import exit_code, say_where, tell
+from paraflex.cli.ending import Unwritten, exit_code, say_where, tell
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
@@ -52,11 +52,12 @@ def compare_command(request: CompareRequest) -> int:
     study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
     with counting(console) as report:
         comparison = study.run(folder, on_progress=report)
-    summary = comparison.to_dict()
+    summary, unwritten = comparison.to_dict(), Unwritten()
     if comparison.measurements:
         from paraflex.plots import save_figures
 
-        save_figures(summary, folder / "figures")
+        with unwritten.kept():
+            save_figures(summary, folder / "figures")
 
     def show(out: Console) -> None:
         print_comparison(out, summary)
@@ -64,6 +65,7 @@ def compare_command(request: CompareRequest) -> int:
             say_where(began, "numbers and figure", folder)
 
     tell(summary, show, as_json=request.json, doubts=())
+    unwritten.say()
     done = any(run.status == "complete" for run in comparison.measurements)
     return exit_code(done, interrupted=comparison.interrupted)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,28 @@ from rich.console import Console
 
 from paraflex.cli import COMPLETE, INTERRUPTED, TROUBLE
 from paraflex.cli.tables import plain_console, warn_of
+from paraflex.errors import ParaflexError
 from paraflex.findings import Finding
+
+
+class Unwritten:
+    """What went wrong where figures and reports were made, to be said after the results, which stand in their files."""
+
+    def __init__(self) -> None:
+        self._errors: list[ParaflexError] = []
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Go on after an error."""
+        try:
+            yield
+        except ParaflexError as error:
+            self._errors.append(error)
+
+    def say(self) -> None:
+        """Raise the first error, if there was one."""
+        for error in self._errors:
+            raise error
 
 
 def exit_code(well: bool, *, interrupted: bool) -> int:

@@ -9,7 +9,7 @@ from rich.console import Console
 from paraflex.cli import COMPLETE, INTERRUPTED
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import IndicesRequest
-from paraflex.cli.ending import tell
+from paraflex.cli.ending import Unwritten, tell
 from paraflex.cli.tables import number, plain_console, plain_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_figures
@@ -31,7 +31,9 @@ def indices_command(request: IndicesRequest) -> int:
         console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return INTERRUPTED
     numbers = result.to_dict()
-    save_figures(numbers, request.folder / "figures")
+    unwritten = Unwritten()
+    with unwritten.kept():
+        save_figures(numbers, request.folder / "figures")
     verdict = study.sweep.setting.verdict()
 
     def show(out: Console) -> None:
@@ -39,6 +41,7 @@ def indices_command(request: IndicesRequest) -> int:
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)
 
     tell(numbers | {"verdict": verdict.to_dict()}, show, as_json=request.json, doubts=verdict)
+    unwritten.say()
     return COMPLETE
 
 

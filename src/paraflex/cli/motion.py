@@ -76,7 +76,7 @@ def run_motion(
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     summary = motion_summary(data)
-    write_run(data, summary, folder, report=request.report)
+    unwritten = write_run(data, summary, folder, report=request.report)
 
     def show(out: Console) -> None:
         _report(out, summary, data)
@@ -86,6 +86,7 @@ def run_motion(
     finished = run.solution.status in FINISHED
     if not finished:
         console.print(f"error: {run.solution.message}", soft_wrap=True)
+    unwritten.say()
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 

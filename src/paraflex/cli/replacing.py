@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.cli.tables import plain_console
+from paraflex.errors import InputError
 from paraflex.writing import read_json
 
 # Beside the files of numbers all commands write these.
@@ -51,8 +52,8 @@ def _described(folder: Path, kind: str) -> str:
     when = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime))
     try:
         text = _what(folder, kind, read_json(folder / _FILES[kind][0]))
-    except (KeyError, TypeError, AttributeError):
-        # Damaged, or of another version: it is replaced all the same.
+    except (InputError, KeyError, TypeError, AttributeError):
+        # Not there, damaged, or of another version: it is replaced all the same.
         text = f"a {kind}"
     return f"{text}, {when}"
 
@@ -62,7 +63,8 @@ def _what(folder: Path, kind: str, found: dict[str, Any]) -> str:
     if kind == "sensitivity":
         return f'sensitivities "{found["name"]}"'
     if kind == "sweep":
-        searched = read_json(folder / "result.json").get("kind", "sweep")
+        search = folder / "result.json"
+        searched = read_json(search).get("kind", "sweep") if search.is_file() else "sweep"
         kind = "study of indices" if (folder / "indices.json").is_file() else searched
         article = "an" if kind[0] in "aeiou" else "a"
         number = found.get("runs")

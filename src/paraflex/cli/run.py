@@ -84,7 +84,7 @@ def run_command(request: RunRequest) -> int:
         return exit_code(False, interrupted=result.interrupted)
     keep_findings(result.data, collected(verdict_of(result.data)))
     summary = result.to_dict()
-    write_run(result.data, summary, folder, report=request.report)
+    unwritten = write_run(result.data, summary, folder, report=request.report)
 
     def show(out: Console) -> None:
         print_study(out, summary, task, _model_name(request, mechanism))
@@ -93,6 +93,7 @@ def run_command(request: RunRequest) -> int:
 
     tell(summary, show, as_json=request.json)
     failures(console, result)
+    unwritten.say()
     return exit_code(result.complete, interrupted=result.interrupted)
 
 

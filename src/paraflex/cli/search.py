@@ -13,7 +13,7 @@ from paraflex.campaign import Progress
 from paraflex.cli import INTERRUPTED
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SearchRequest
-from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.ending import Unwritten, exit_code, tell
 from paraflex.cli.tables import plain_console, plain_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.plots import save_figures
@@ -32,7 +32,9 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
         console.print("interrupted before the first design was done")
         return INTERRUPTED
     numbers = result.to_dict()
-    save_figures(numbers, request.folder / "figures")
+    unwritten = Unwritten()
+    with unwritten.kept():
+        save_figures(numbers, request.folder / "figures")
     verdict = study.base.setting.verdict()
 
     def show(out: Console) -> None:
@@ -41,6 +43,7 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
 
     more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
     tell(numbers | more, show, as_json=request.json, doubts=verdict)
+    unwritten.say()
     return exit_code(bool(result.values), interrupted=result.interrupted)
 
 

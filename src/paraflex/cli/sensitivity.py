@@ -11,7 +11,7 @@ from rich.table import Table
 
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.studies import SensitivityRequest
-from paraflex.cli.ending import tell
+from paraflex.cli.ending import Unwritten, tell
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.tables import number, plain_table, print_titled
 from paraflex.errors import InputError
@@ -32,7 +32,9 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     # Told of the first path when the folder is seen to be this study's.
     found = study.run(folder, on_progress=lambda at: None if at.done else say_replaced(folder, "sensitivity"))
     summary = found.to_dict()
-    save_figures(summary, folder / FIGURES)
+    unwritten = Unwritten()
+    with unwritten.kept():
+        save_figures(summary, folder / FIGURES)
 
     def show(out: Console) -> None:
         for row in range(len(found.rows)):
@@ -40,6 +42,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
         out.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
 
     tell(summary, show, as_json=request.json)
+    unwritten.say()
     return COMPLETE
 
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from paraflex.campaign import Progress
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SweepRequest
-from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.ending import Unwritten, exit_code, tell
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits
@@ -27,7 +27,10 @@ def sweep_command(request: SweepRequest) -> int:
     folder = request.folder
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
-    has_report = request.report and bool(result.done) and _write_report(console, folder)
+    unwritten, has_report = Unwritten(), False
+    if request.report and result.done:
+        with unwritten.kept():
+            has_report = _write_report(console, folder)
     verdict = study.setting.verdict()
     # Tables say which parts of paths are run by the verdict's findings.
     parts = {path: part.to_dict() for path, part in study.setting.parts().items()} if request.json else {}
@@ -39,6 +42,7 @@ def sweep_command(request: SweepRequest) -> int:
 
     more = {"part": parts, "verdict": verdict.to_dict()}
     tell(_figures(result) | more, show, as_json=request.json, doubts=verdict)
+    unwritten.say()
     return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)
 
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from paraflex.cli.agreement import print_agreement
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import VerifyRequest
-from paraflex.cli.ending import exit_code, say_where, tell
+from paraflex.cli.ending import Unwritten, exit_code, say_where, tell
 from paraflex.cli.replacing import say_replaced
 from paraflex.cli.request import (
     find_mode,
@@ -58,9 +58,10 @@ def verify_command(request: VerifyRequest) -> int:
     study = VerificationStudy(task, modes, models, options, parameters, model.study.error)
     with counting(console) as report:
         verification = study.run(on_progress=report)
-    summary = verification.to_dict()
+    summary, unwritten = verification.to_dict(), Unwritten()
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
-        _write(verification, summary, folder, report=request.report)
+        verification.save(folder)
+        _draw(verification, summary, folder, unwritten, report=request.report)
 
     def show(out: Console) -> None:
         for mode in summary["modes"]:
@@ -72,6 +73,7 @@ def verify_command(request: VerifyRequest) -> int:
         for name, runs in by_model.items():
             if runs.failure:
                 console.print(f'error: mode "{mode}", {name}: {runs.failure}', soft_wrap=True)
+    unwritten.say()
     return exit_code(verification.complete, interrupted=verification.interrupted)
 
 
@@ -92,14 +94,15 @@ def _models(request: VerifyRequest) -> list[str]:
     return list(dict.fromkeys([*(request.fidelities or FIDELITIES), *request.engines]))
 
 
-def _write(verification: Verification, summary: dict, folder: Path, *, report: bool) -> None:
+def _draw(verification: Verification, summary: dict, folder: Path, unwritten: Unwritten, *, report: bool) -> None:
     from paraflex.plots import save_figures
 
-    verification.save(folder)
     data = verification.data
     assert data is not None
-    save_figures(data, folder / "figures")
+    with unwritten.kept():
+        save_figures(data, folder / "figures")
     if report:
         from paraflex.report import save_page, verification_page
 
-        save_page(verification_page(data, summary), folder / "report.html")
+        with unwritten.kept():
+            save_page(verification_page(data, summary), folder / "report.html")

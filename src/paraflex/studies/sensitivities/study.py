@@ -21,9 +21,10 @@ from paraflex.designs.run import Task
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, digest, make_setting
-from paraflex.errors import InputError, OutputError
+from paraflex.errors import InputError
 from paraflex.findings import Verdict
 from paraflex.mechanism.quantities import known
+from paraflex.results.parquet import write_parquet
 from paraflex.results.summary import finite_or_none
 from paraflex.writing import read_json, whole_file
 
@@ -147,11 +148,12 @@ class Sensitivities(Result):
 
     def save(self, folder: str | Path) -> Path:
         """Write `sensitivity.json`, and its lines as `sensitivity.csv` and `sensitivity.parquet`; see `Result.save`."""
+        import pyarrow as pa
+
         target, lines = super().save(folder), self.to_frame()
         with whole_file(target / TABLE) as unfinished:
             lines.to_csv(unfinished, index=False)
-        with whole_file(target / LINES) as unfinished:
-            _to_parquet(lines, unfinished)
+        write_parquet(pa.Table.from_pandas(lines, preserve_index=False), target / LINES)
         return target
 
     def _metric(self, i: int, j: int) -> dict[str, Any]:
@@ -331,13 +333,3 @@ def _claim(folder: Path, asked: str) -> None:
     file = folder / Sensitivities.values_file
     if file.exists() and read_json(file).get("content") != asked:
         raise of_another_study(folder)
-
-
-def _to_parquet(lines: Any, file: Path) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        pq.write_table(pa.Table.from_pandas(lines, preserve_index=False), file)
-    except pa.ArrowException as error:
-        raise OutputError(f"cannot be written ({error})", field=str(file), remedy="choose another folder") from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -28,6 +27,7 @@ from paraflex.report.survey import Step
 from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.metrics import VALIDITY
+from paraflex.writing import read_json
 
 _FOUND = "result.json"
 # So much a metric may differ from its row's before the reader is warned: other machines round otherwise.
@@ -160,11 +160,7 @@ def _found(file: Path) -> Mapping[str, Any]:
     """What a search found; empty of a sweep."""
     if not file.is_file():
         return {}
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError("cannot be read", field=str(file), remedy="run the command again") from error
-    return found if isinstance(found, dict) else {}
+    return read_json(file)
 
 
 def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool]]:
