@@ -196,7 +196,7 @@ def test_a_file_of_other_results_is_noticed(folder, tmp_path):
 def test_a_damaged_manifest_is_noticed_and_replaced(folder, change):
     text = (folder / MANIFEST).read_text()
     (folder / MANIFEST).write_text(change(text))
-    with pytest.raises(InputError, match=r"manifest\.json: the list of the folder's files is damaged"):
+    with pytest.raises(InputError, match=r"manifest\.json: damaged: not "):
         check_listed(folder / "results.nc")
     assert kind_of_folder(folder) == RUN
     replace(folder, AFTER)
@@ -239,3 +239,15 @@ def test_a_reader_finishes_what_a_killed_writer_left_or_waits_for_a_living_one(f
             check_listed(folder / "results.nc")
     check_listed(folder / "results.nc")
     assert not ready.exists()
+
+
+def test_what_is_in_the_way_is_named_before_anything_is_moved(folder):
+    (folder / "report.html").mkdir()
+    for new, said in (
+        ({"report.html": "new"}, r"report\.html: cannot be written \(a folder of that name is there\)"),
+        ({"notes.txt/a.png": "new"}, r"notes\.txt: cannot be written \(a file of that name is there\)"),
+    ):
+        with pytest.raises(OutputError, match=said):
+            replace(folder, AFTER | new)
+        assert ours(folder) == BEFORE
+        assert not (folder / ".ready").exists()

@@ -264,7 +264,10 @@ def test_files_that_are_no_results(tmp_path):
     (tmp_path / "empty").mkdir()
     for path, says in [
         (table, "a table of many runs, not the results of one; read it with pandas or pyarrow"),
-        (cut, "damaged or cut short: not a readable netCDF file; copy it again, or run the study again"),
+        (
+            cut,
+            "damaged: cut short, or not a readable netCDF file; copy it again, or delete it",
+        ),
         (other, "a netCDF file, but not of paraflex; name a results.nc that paraflex wrote"),
         (later, "written by a later version, paraflex 99.0 (schema 1000000"),
         (tmp_path / "sweep", "the folder of a study of many runs, whose figures are in results.parquet; it kept no"),

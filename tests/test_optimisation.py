@@ -344,12 +344,12 @@ def test_a_damaged_table_is_named(tmp_path):
     assert optimise(study, tmp_path / "out", run=pytest.fail).table.read_bytes() == whole
     journal = tmp_path / "out" / "journal.sqlite"
     journal.write_bytes(journal.read_bytes()[:60])
-    with pytest.raises(OutputError, match=r"journal.sqlite: cannot be read .*delete this file"):
+    with pytest.raises(OutputError, match=r"journal.sqlite: damaged: .*delete this file"):
         optimise(study, tmp_path / "out", run=made_up(tracking_rms=bowl))
     # ... and a journal of the table.
     journal.unlink()
     result.table.write_bytes(whole[:60])
-    with pytest.raises(OutputError, match=r"results.parquet: cannot be read .*delete this file"):
+    with pytest.raises(OutputError, match=r"results.parquet: damaged: .*delete it and run"):
         optimise(study, tmp_path / "out", run=made_up(tracking_rms=bowl))
 
 

@@ -281,7 +281,7 @@ def test_results_that_are_none(results: Path, tmp_path: Path) -> None:
     for name, content, said in (
         ("cut.nc", whole[: len(whole) // 2], "damaged"),
         ("cut.json", b'{"kind": "optimisation", ', "damaged"),
-        ("cut.parquet", b"PAR1 and no more", "cannot be read"),
+        ("cut.parquet", b"PAR1 and no more", "damaged"),
         ("text.txt", b"hello", "not a file of results"),
         ("empty", b"", "not a file of results"),
         ("other.json", b'{"a": 1}', "no figures are drawn"),

@@ -370,7 +370,7 @@ def test_what_is_no_result_is_named_for_what_it_is(tmp_path):
     (tmp_path / "cut.nc").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "empty.nc").write_bytes(b"")
     (tmp_path / "summary.json").write_text("{}")
-    refused(tmp_path / "cut.nc", "damaged or cut short")
+    refused(tmp_path / "cut.nc", "damaged: cut short")
     refused(tmp_path / "empty.nc", "an empty file")
     refused(tmp_path / "summary.json", "not a netCDF file")
     refused(tmp_path / "sumary.json", 'no such file or folder.*did you mean "summary.json"')

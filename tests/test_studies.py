@@ -27,6 +27,7 @@ from paraflex.studies import (
     load_sweep,
     tracking_case,
 )
+from paraflex.writing import read_json
 
 LOOSE = pf.IntegrationOptions(tolerance=1e-3)
 SAMPLED = STUDY.replace("[vary.x]", '[sampling]\nkind = "sobol"\nnumber = 4\n\n[vary.x]')
@@ -105,7 +106,7 @@ def test_every_study_is_one_and_gives_a_result(studies, done, kind):
 @pytest.mark.parametrize("kind", FILES)
 def test_plain_values_are_those_of_the_file(done, kind):
     result, folder, _ = done[kind]
-    written = json.loads((folder / result.values_file).read_text(encoding="utf-8"))
+    written = read_json(folder / result.values_file)
     assert json.loads(json.dumps(result.to_dict(), default=str)) == written
 
 

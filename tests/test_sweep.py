@@ -363,7 +363,7 @@ def test_a_damaged_journal_is_named(tmp_path):
     sweep(study, tmp_path / "out", workers=1, run=stub, limit=2)
     file = tmp_path / "out" / "journal.sqlite"
     file.write_bytes(file.read_bytes()[:100])
-    with pytest.raises(OutputError, match=r"journal.sqlite: cannot be read .*delete this file"):
+    with pytest.raises(OutputError, match=r"journal.sqlite: damaged: .*delete this file"):
         sweep(study, tmp_path / "out", workers=1, run=stub)
     file.unlink()
     assert sweep(study, tmp_path / "out", workers=1, run=stub).complete

@@ -1,6 +1,5 @@
 """Files and folders that are written whole or not at all, and plans that take the rest from the study."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.files import StudyDefaults
 from paraflex.mechanism import Start
 from paraflex.tracking import plan_tracking
-from paraflex.writing import whole_file, whole_folder, write_json, write_text
+from paraflex.writing import read_json, whole_file, whole_folder, write_json, write_text
 
 
 class Half(Exception):
@@ -30,7 +29,7 @@ def test_a_file_that_is_not_finished_leaves_what_was_there(tmp_path, error):
     write_json(file, {"value": 1.0})
     with pytest.raises(error):
         half(whole_file(file), "", error)
-    assert json.loads(file.read_text()) == {"value": 1.0}
+    assert read_json(file) == {"value": 1.0}
     assert list(file.parent.iterdir()) == [file]
 
 

@@ -21,6 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from paraflex.errors import InputError, OutputError
+from paraflex.seals import damaged
 from paraflex.writing import ELSEWHERE, read_json, unwritable, write_json
 
 MANIFEST = "manifest.json"
@@ -88,15 +89,15 @@ def read_manifest(folder: Path) -> Manifest | None:
     file = folder / MANIFEST
     if not file.is_file():
         return None
-    found = read_json(file)
+    remedy = "run the same command again; or delete this file, and others are read without it"
+    found = read_json(file, remedy)
     try:
         manifest = Manifest.of(found["kind"], found["files"])
         if manifest.identity == found["identity"] and manifest.kind in KINDS:
             return manifest
     except (KeyError, TypeError, AttributeError):
         pass
-    remedy = "run the same command again; or delete this file, and others are read without it"
-    raise InputError("the list of the folder's files is damaged", field=str(file), remedy=remedy)
+    raise damaged(file, "not a list of the folder's files", remedy)
 
 
 def kind_of_folder(folder: Path) -> str:
@@ -194,6 +195,8 @@ class ResultsFolder:
             before = files_of(self.path)
             if all(before.get(name) == files[name] == _digest_of(self.path / name) for name in files):
                 return
+            for name in files:
+                _check_place(self.path, Path(name))
             removed = [name for name in before if is_replaced(name) and name not in files]
             kept = {name: digest for name, digest in before.items() if digest and name not in removed}
             manifest = Manifest.of(self.kind, kept | files)
@@ -379,6 +382,15 @@ def _move(folder: Path) -> None:
         raise
     except OSError as error:
         raise unwritable(error, str(folder), ELSEWHERE) from error
+
+
+def _check_place(folder: Path, name: Path) -> None:
+    """Check that a file can be moved to its place in a folder, before any is."""
+    inner = [folder / each for each in list(name.parents)[:-1]]
+    if (folder / name).is_dir() or any(each.exists() and not each.is_dir() for each in inner):
+        what = "a folder" if (folder / name).is_dir() else "a file"
+        where = str(folder / name) if what == "a folder" else str(inner[-1])
+        raise OutputError(f"cannot be written ({what} of that name is there)", field=where, remedy="move it elsewhere")
 
 
 def _put(ready: Path, folder: Path) -> None:

@@ -6,6 +6,7 @@ and nothing half written beside it.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -14,9 +15,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from paraflex.errors import OutputError
+from paraflex.errors import InputError, OutputError
+from paraflex.seals import damaged, seal
 
 ELSEWHERE = "choose another folder"
+# Under which key a file of JSON has the digest of the others.
+_DIGEST = "digest"
 # Of what is gone on with where it was left.
 GO_ON = "what is written stays; free some space and run the same command again: it goes on from there"
 
@@ -51,6 +55,14 @@ def whole_file(path: Path, *, remedy: str = ELSEWHERE, field: str = "", parents:
     finally:
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)
+
+
+@contextmanager
+def sealed_file(path: Path, **options: Any) -> Iterator[Path]:
+    """The name to write a netCDF or Parquet file under, which gets a digest of its bytes; see `whole_file`."""
+    with whole_file(path, **options) as unfinished:
+        yield unfinished
+        seal(unfinished)
 
 
 @contextmanager
@@ -95,17 +107,59 @@ def write_text(path: Path, text: str, **options: Any) -> None:
 
 
 def write_json(path: Path, data: Any, **options: Any) -> None:
-    """Write plain values as JSON, others as their text; see `whole_file` for the options and errors."""
+    """Write plain values as JSON, others as their text; see `whole_file` for the options and errors.
+
+    A table gets a digest of what it says, which `read_json` checks.
+    """
+    if isinstance(data, dict):
+        # Of what is read again: keys and values are those of JSON.
+        plain = json.loads(json.dumps(data, default=str))
+        data = plain | {_DIGEST: _digest(plain)}
     write_text(path, json.dumps(data, indent=2, default=str) + "\n", **options)
 
 
-def read_json(file: Path) -> dict[str, Any]:
-    """What a file of JSON holds; nothing of one that cannot be read, or that is no table."""
+def read_json(file: Path, remedy: str = "run the same command again") -> dict[str, Any]:
+    """The table that a file of JSON holds, without its digest; see `read_values`.
+
+    Raises
+    ------
+    InputError
+        It holds something else.
+    """
+    found = read_values(file, remedy)
+    if not isinstance(found, dict):
+        raise InputError("not a file that paraflex wrote", field=str(file), remedy=remedy)
+    return found
+
+
+def read_values(file: Path, remedy: str) -> Any:
+    """What a file of JSON holds; of a table with a digest all else.
+
+    Parameters
+    ----------
+    file : Path
+    remedy : str
+        Of the errors.
+
+    Raises
+    ------
+    InputError
+        It is damaged, or cannot be read.
+    """
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror or error})", field=str(file), remedy=remedy) from error
+    except (ValueError, RecursionError) as error:
+        raise damaged(file, "not JSON to its end", remedy) from error
+    if isinstance(found, dict) and _DIGEST in found and found.pop(_DIGEST) != _digest(found):
+        raise damaged(file, "not as it was written", remedy)
+    return found
+
+
+def _digest(table: dict[str, Any]) -> str:
+    text = json.dumps(table, sort_keys=True, separators=(",", ":"))
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
 def unwritable(error: OSError, field: str, remedy: str, value: str | None = None) -> OutputError:

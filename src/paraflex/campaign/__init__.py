@@ -25,6 +25,7 @@ from paraflex.campaign.tables import (
     UNFINISHED as UNFINISHED,
     read_data as read_data,
     read_table as read_table,
+    read_tables as read_tables,
     tables_of as tables_of,
 )
 from paraflex.campaign.workers import (

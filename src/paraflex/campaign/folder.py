@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from paraflex.campaign.journal import JOURNAL, Journal, write_journal
-from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA, UNFINISHED, read_table, write_table
-from paraflex.errors import InputError, OutputError
-from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, files_of, foreign_files, hold_folder
+from paraflex.campaign.journal import JOURNAL, Journal, Row, write_journal
+from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA, UNFINISHED, write_table
+from paraflex.errors import InputError, ResultWarning, warn_user
+from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, check_listed, files_of, foreign_files, hold_folder
+from paraflex.results.parquet import read_parquet
+from paraflex.seals import damaged
 from paraflex.writing import GO_ON, read_json, write_json
 
 if TYPE_CHECKING:
@@ -57,7 +59,9 @@ class Campaign:
 
 
 @contextmanager
-def open_campaign(folder: Path, study: Mapping[str, Any], schema: pa.Schema) -> Iterator[Campaign]:
+def open_campaign(
+    folder: Path, study: Mapping[str, Any], schema: pa.Schema, belongs: Callable[[Row], bool] = lambda _: True
+) -> Iterator[Campaign]:
     """A folder, made that of a study or seen to be; rows that are added to its journal stay, whatever happens.
 
     Parameters
@@ -67,6 +71,8 @@ def open_campaign(folder: Path, study: Mapping[str, Any], schema: pa.Schema) -> 
         What `study.json` says: `content`, a digest of all that results depend on, `versions` of packages, and more.
     schema : pyarrow.Schema
         Columns of the table.
+    belongs : callable
+        Whether a row is the study's, by its identity: asked of rows in tables of an earlier release.
 
     Raises
     ------
@@ -85,9 +91,10 @@ def open_campaign(folder: Path, study: Mapping[str, Any], schema: pa.Schema) -> 
             noted = journal.noted("study")
             _check_same(folder, study if noted is None else json.loads(noted), study)
             if noted is None:
-                _take_over(folder, journal)
-                journal.note(SCHEMA, schema.serialize().to_pybytes())
+                _take_over(folder, journal, schema, belongs)
                 journal.note("study", json.dumps(study, default=str).encode())
+            if journal.noted(SCHEMA) is None:
+                journal.note(SCHEMA, schema.serialize().to_pybytes())
             if not (folder / STUDY).exists():
                 with held.amended() as new:
                     write_json(new / STUDY, study, remedy=GO_ON)
@@ -100,9 +107,10 @@ def read_study(file: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        It cannot be read, or is none of ours.
+        It is damaged, cannot be read, or is none of ours.
     """
-    found = read_json(file)
+    found = read_json(file, "delete it and run the same command again: it is written again")
+    check_listed(file)
     if "content" not in found:
         raise InputError("not the study of a campaign", field=str(file), remedy="name a new folder")
     return found
@@ -130,18 +138,24 @@ def _check_same(folder: Path, found: Mapping[str, Any], study: Mapping[str, Any]
             )  # fmt: skip
 
 
-def _take_over(folder: Path, journal: Journal) -> None:
+def _take_over(folder: Path, journal: Journal, schema: pa.Schema, belongs: Callable[[Row], bool]) -> None:
     """Give a new journal the rows of tables beside it: of an earlier release, or of a journal that was deleted."""
-    import pyarrow as pa
-
     files = [folder / name for name in (RESULTS, UNFINISHED) if (folder / name).is_file()]
     for file in [*files, *sorted(folder.glob(EARLIER))]:
-        try:
-            journal.add(read_table(file).to_pylist())
-        except (OSError, pa.ArrowException) as error:
-            raise OutputError(
-                f"cannot be read ({str(error).splitlines()[0]})", field=str(file),
-                remedy="delete this file and run the same command again: its runs are made again",
-            ) from error  # fmt: skip
+        rows = _typed(file, schema).to_pylist()
+        ours = [row for row in rows if belongs(row)]
+        if len(ours) < len(rows):
+            text = f"{file}: {len(rows) - len(ours)} of its {len(rows)} rows are of another study, and are left out"
+            warn_user(ResultWarning(text))
+        journal.add(ours)
     journal.commit()
     shutil.rmtree(folder / Path(EARLIER).parent, ignore_errors=True)
+
+
+def _typed(file: Path, schema: pa.Schema) -> pa.Table:
+    """A table, whose columns are of the kinds that the study's are."""
+    found = read_parquet(file)
+    for column in found.schema:
+        if column.name in schema.names and column.type != schema.field(column.name).type:
+            raise damaged(file, f"{column.name} holds {column.type}", "delete it and run the same command again")
+    return found

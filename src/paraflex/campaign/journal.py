@@ -4,35 +4,63 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import sqlite3
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from paraflex.errors import OutputError, ResultWarning, warn_user
-from paraflex.writing import GO_ON
+from paraflex.writing import GO_ON, whole_file
 
 JOURNAL = "journal.sqlite"
 # Rows are committed when so many wait, or the first has waited so long [s]: what a crash can cost.
 _ROWS, _SECONDS = 2048, 2.0
 # How long a commit waits for those who read, and they for a commit [s].
 _PATIENCE = 60.0
+_PAGE = 4096
 # Not a write-ahead log: its index is shared memory, which machines on one network file system do not share. A rollback
 # journal is there during a commit only, so that the folder may be copied as it stands; FULL: a commit is on the disk.
-_START = """
+_SETTINGS = f"""
+PRAGMA page_size = {_PAGE};
 PRAGMA journal_mode = DELETE;
 PRAGMA synchronous = FULL;
-CREATE TABLE IF NOT EXISTS study (name TEXT PRIMARY KEY, value BLOB NOT NULL);
+"""
+_TABLES = """
+BEGIN IMMEDIATE;
+CREATE TABLE IF NOT EXISTS notes (name TEXT PRIMARY KEY, value BLOB NOT NULL, digest TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS runs (
     run INTEGER, id TEXT, content TEXT NOT NULL, digest TEXT NOT NULL, PRIMARY KEY (run, id)
 );
+COMMIT;
 """
-_ALL = "SELECT run, id, content, digest FROM runs ORDER BY run, id"
-_DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+# The first bytes of any journal's file, by these settings.
+_HEAD = b"SQLite format 3\0\x10\0\x01\x01\0\x40\x20\x20"
+_ALL = "SELECT run, id, content, digest FROM runs"
+# The note that says how many rows there are, and the sum of their digests.
+_TALLY = "rows"
+# Of SQLite where the file is not to blame.
+_UNWRITABLE = {
+    sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_LOCKED,
+    sqlite3.SQLITE_PERM, sqlite3.SQLITE_PROTOCOL, sqlite3.SQLITE_READONLY,
+}  # fmt: skip
+_MEND = "run the same command again: what is whole is kept, and the other runs are made again"
 
 Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Tally:
+    """How many rows there are, and the sum of their digests: which rows a damaged index or page leaves out."""
+
+    count: int = 0
+    total: int = 0
+
+    def plus(self, digest: str, sign: int = 1) -> _Tally:
+        return _Tally(self.count + sign, (self.total + sign * int(digest, 16)) % (1 << 128))
 
 
 class Journal:
@@ -52,12 +80,26 @@ class Journal:
     def note(self, name: str, value: bytes) -> None:
         """Keep something about the study."""
         with self._connection:
-            self._connection.execute("INSERT OR REPLACE INTO study VALUES (?, ?)", (name, value))
+            self._note(name, value)
+
+    def _note(self, name: str, value: bytes) -> None:
+        entry = (name, value, _digest(name, value.hex()))
+        self._connection.execute("INSERT OR REPLACE INTO notes VALUES (?, ?, ?)", entry)
 
     def noted(self, name: str) -> bytes | None:
-        """What was kept under a name."""
-        found = self._connection.execute("SELECT value FROM study WHERE name = ?", (name,)).fetchone()
-        return None if found is None else found[0]
+        """What was kept under a name.
+
+        Raises
+        ------
+        sqlite3.DatabaseError
+            It is damaged.
+        """
+        found = self._connection.execute("SELECT value, digest FROM notes WHERE name = ?", (name,)).fetchone()
+        if found is None:
+            return None
+        if not isinstance(found[0], bytes) or found[1] != _digest(name, found[0].hex()):
+            raise sqlite3.DatabaseError(f"what is noted as {name} is not as it was written")
+        return found[0]
 
     def runs(self) -> Iterator[int]:
         """The runs of all rows, in order."""
@@ -73,10 +115,28 @@ class Journal:
             The file, or a row, is damaged.
         """
         self.commit()
-        for run, identity, content, digest in self._connection.execute(_ALL):
+        return (json.loads(content) for content in self._contents())
+
+    def check(self) -> None:
+        """See that notes and rows are as they were written; see `rows` for the errors."""
+        for (name,) in self._connection.execute("SELECT name FROM notes").fetchall():
+            self.noted(name)
+        for _ in self._contents():
+            pass
+
+    def _contents(self) -> Iterator[str]:
+        noted, found = self._tally(), _Tally()
+        for run, identity, content, digest in self._connection.execute(f"{_ALL} ORDER BY run, id"):
             if digest != _digest(run, identity, content):
-                raise sqlite3.DatabaseError(f"the row of run {run} is damaged")
-            yield json.loads(content)
+                raise sqlite3.DatabaseError(f"the row of run {run} is not as it was written")
+            found = found.plus(digest)
+            yield content
+        if found != noted:
+            raise sqlite3.DatabaseError(f"{found.count} rows are found of {noted.count}")
+
+    def _tally(self) -> _Tally:
+        noted = self.noted(_TALLY)
+        return _Tally() if noted is None else _Tally(*map(int, noted.split()))
 
     def add(self, rows: Sequence[Row]) -> None:
         """Keep rows, in place of those of the same runs; they are written together, within two seconds."""
@@ -87,37 +147,41 @@ class Journal:
     def commit(self) -> None:
         """Write what waits, all of it or nothing."""
         if self._waiting:
-            entries = [(int(row["run"]), row["id"], json.dumps(row, default=_plain)) for row in self._waiting]
+            # Of two rows of a run the later one.
+            waiting = {(int(row["run"]), row["id"]): row for row in self._waiting}
+            contents = {key: json.dumps(row, default=_plain) for key, row in waiting.items()}
             with self._connection:
-                digested = [(*entry, _digest(*entry)) for entry in entries]
-                self._connection.executemany("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?)", digested)
+                self._write([(*key, content, _digest(*key, content)) for key, content in contents.items()])
             # Not before: what Ctrl-C met half written is written at the end.
             self._waiting = []
         self._written = time.monotonic()
 
-    def forget_damaged(self) -> None:
-        """Leave out rows that are not as they were written, and say so: their runs are made again."""
-        found = self._connection.execute(_ALL)
-        damaged = [entry[:2] for entry in found if entry[3] != _digest(*entry[:3])]
-        if damaged:
-            with self._connection:
-                self._connection.executemany("DELETE FROM runs WHERE run IS ? AND id IS ?", damaged)
-            runs = ", ".join(str(run) for run, _ in damaged[:5])
-            warn_user(ResultWarning(f"rows of the journal are damaged, and these runs are made again: {runs}"))
+    def _write(self, entries: list[tuple[int, str, str, str]]) -> None:
+        tally, connection = self._tally(), self._connection
+        for run, identity, _, digest in entries:
+            old = connection.execute("SELECT digest FROM runs WHERE run = ? AND id = ?", (run, identity)).fetchone()
+            tally = (tally if old is None else tally.plus(old[0], -1)).plus(digest)
+        connection.executemany("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?)", entries)
+        self._note(_TALLY, f"{tally.count} {tally.total}".encode())
 
 
 @contextmanager
 def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
     """The journal of a folder that this process holds; what was added is on the disk at the end, whatever ends it.
 
+    Of one that is damaged what is whole is kept, with a warning.
+
     Raises
     ------
     OutputError
-        It is damaged, or the disk is full or cannot be written for another reason.
+        Nothing in it is whole, or the disk is full or cannot be written for another reason.
     """
-    with _open(folder / JOURNAL, f"mode=rwc&nolock={int(not locks)}") as connection:
+    file, how = folder / JOURNAL, f"mode=rwc&nolock={int(not locks)}"
+    reason = _reason_to_mend(file, how)
+    if reason:
+        _mend(file, how, reason)
+    with _errors(file), _connected(file, how) as connection:
         journal = Journal(connection)
-        journal.forget_damaged()
         try:
             yield journal
         finally:
@@ -126,7 +190,7 @@ def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
 
 @contextmanager
 def read_journal(file: Path) -> Iterator[Journal]:
-    """A journal to read, also while another process writes it.
+    """A journal as it stands, to read, also while another process writes it.
 
     Raises
     ------
@@ -134,34 +198,120 @@ def read_journal(file: Path) -> Iterator[Journal]:
         It is damaged.
     """
     # Not mode=ro: what a killed process left half written is undone first.
-    with _open(file, "mode=rw") as connection:
+    with _errors(file), _connected(file, "mode=rw") as connection:
+        connection.execute("BEGIN")
         yield Journal(connection)
 
 
-@contextmanager
-def _open(file: Path, how: str) -> Iterator[sqlite3.Connection]:
-    """A connection, whose errors name the file and say what to do."""
+def _reason_to_mend(file: Path, how: str) -> str:
+    """What is wrong with a journal; empty where it is whole, or is not there."""
+    if not file.exists():
+        return ""
+    with _errors(file):
+        try:
+            with _connected(file, how) as connection:
+                Journal(connection).check()
+        except (sqlite3.DatabaseError, MemoryError) as error:
+            if _code(error) in _UNWRITABLE:
+                raise
+            return str(error)
+    with file.open("rb") as stream:
+        start = stream.read(len(_HEAD))
+    return "" if start in (b"", _HEAD) else "its first bytes are not as they were written"
+
+
+def _mend(file: Path, how: str, reason: str) -> None:
+    """Write a journal anew, of what is whole in it.
+
+    Raises
+    ------
+    OutputError
+        Nothing is.
+    """
+    copy = file.with_name(f"{file.name}.copy.part")
     try:
-        with closing(sqlite3.connect(f"{file.absolute().as_uri()}?{how}", timeout=_PATIENCE, uri=True)) as connection:
-            # A damaged text is a matter of its digest.
-            connection.text_factory = lambda text: text.decode(errors="replace")
-            connection.executescript(_START)
-            yield connection
+        with whole_file(file, remedy=GO_ON) as unfinished:
+            unfinished.unlink(missing_ok=True)
+            with _connected(unfinished, how) as connection:
+                shutil.copyfile(file, copy)
+                _restore_first_page(copy, unfinished.read_bytes())
+                kept = _keep_whole(copy, Journal(connection))
+            if not kept:
+                raise _damaged(file, reason)
+            # It is of pages of the damaged file.
+            file.with_name(f"{file.name}-journal").unlink(missing_ok=True)
+    finally:
+        copy.unlink(missing_ok=True)
+    text = f"{file}: damaged ({reason}); {kept} rows are whole, and runs without one are made again"
+    warn_user(ResultWarning(text))
+
+
+def _restore_first_page(file: Path, empty: bytes) -> None:
+    """Give a journal the first page of an empty one, which has the same tables at the same places."""
+    pages = file.stat().st_size // _PAGE
+    with file.open("rb+") as stream:
+        stream.write(empty[:28] + pages.to_bytes(4, "big") + bytes(8) + empty[40:_PAGE])
+
+
+def _keep_whole(damaged: Path, journal: Journal) -> int:
+    """Notes and rows of a damaged file that are as they were written; how many rows."""
+    found: set[tuple[int, str]] = set()
+    with suppress(sqlite3.DatabaseError), _connected(damaged, "mode=rw") as connection:
+        with suppress(sqlite3.DatabaseError, MemoryError):
+            for name, value, digest in connection.execute("SELECT name, value, digest FROM notes").fetchall():
+                if name != _TALLY and isinstance(value, bytes) and digest == _digest(name, value.hex()):
+                    journal.note(name, value)
+        # From both ends, without the index: to the page that cannot be read.
+        for order in ("rowid", "rowid DESC"):
+            with suppress(sqlite3.DatabaseError, MemoryError):
+                for run, identity, content, digest in connection.execute(f"{_ALL} NOT INDEXED ORDER BY {order}"):
+                    if (run, identity) not in found and digest == _digest(run, identity, content):
+                        found.add((run, identity))
+                        journal.add([json.loads(content)])
+                break
+    journal.commit()
+    return len(found)
+
+
+@contextmanager
+def _connected(file: Path, how: str) -> Iterator[sqlite3.Connection]:
+    """A connection to a journal, with its tables where the file is new."""
+    with closing(sqlite3.connect(f"{file.absolute().as_uri()}?{how}", timeout=_PATIENCE, uri=True)) as connection:
+        # A damaged text is a matter of its digest.
+        connection.text_factory = lambda text: text.decode(errors="replace")
+        # What a killed process left half written is undone by the first question.
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        connection.executescript(_SETTINGS)
+        if not file.stat().st_size:
+            connection.executescript(_TABLES)
+        yield connection
+
+
+@contextmanager
+def _errors(file: Path) -> Iterator[None]:
+    """Errors of SQLite, which are to name the file and say what to do."""
+    try:
+        yield
     except sqlite3.DatabaseError as error:
-        if _code(error) in _DAMAGED:
-            remedy = "delete this file and run the same command again: its runs are made again"
-            raise OutputError(f"cannot be read ({error})", field=str(file), remedy=remedy) from error
+        if _code(error) not in _UNWRITABLE:
+            raise _damaged(file, str(error), _MEND) from error
         reason = "no space left on device" if _code(error) == sqlite3.SQLITE_FULL else str(error)
         raise OutputError(f"cannot be written ({reason})", field=str(file), remedy=GO_ON) from error
 
 
-def _code(error: sqlite3.Error) -> int:
-    """Of SQLite; that of damage where it is a row's digest."""
+def _damaged(
+    file: Path, reason: str, remedy: str = "delete this file and run the same command again: its runs are made again"
+) -> OutputError:
+    return OutputError(f"damaged: {reason}", field=str(file), remedy=remedy)
+
+
+def _code(error: Exception) -> int:
+    """Of SQLite; that of damage where it has none."""
     return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
 
 
-def _digest(run: int, identity: str, content: str) -> str:
-    return hashlib.blake2b(f"{run} {identity} {content}".encode(), digest_size=16).hexdigest()
+def _digest(*parts: object) -> str:
+    return hashlib.blake2b(" ".join(map(str, parts)).encode(), digest_size=16).hexdigest()
 
 
 def _plain(number: Any) -> int | float:

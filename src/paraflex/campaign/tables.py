@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from paraflex.campaign.journal import JOURNAL, Journal, read_journal
+from paraflex.errors import InputError, ResultWarning, warn_user
+from paraflex.results.parquet import open_parquet, read_parquet
 from paraflex.results.spreadsheet import spreadsheet_table
+from paraflex.seals import damaged
 from paraflex.writing import GO_ON, whole_file
 
 if TYPE_CHECKING:
@@ -39,15 +42,14 @@ def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
     Raises
     ------
     OutputError
-        The disk is full, or cannot be written for another reason.
+        The disk is full, or cannot be written for another reason; or the journal is damaged.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     file = folder / (RESULTS if finished else UNFINISHED)
     schema, held = _schema(journal), min(_HELD, _GROUP)
     pieces = _pieces(journal, held)
-    with whole_file(file, remedy=GO_ON) as unfinished, pq.ParquetWriter(unfinished, schema) as writer:
+    with open_parquet(file, schema, remedy=GO_ON) as writer:
         while group := list(islice(pieces, _GROUP // held)):
             writer.write_table(pa.concat_tables(group).combine_chunks(), row_group_size=_GROUP)
     if finished:
@@ -56,24 +58,79 @@ def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
 
 
 def tables_of(folder: Path) -> list[Path]:
-    """Files that hold the rows of a folder's runs: the table, else the journal; and parts of an earlier release."""
+    """Files with the rows of a folder's runs: the table, else the journal, else those of an earlier release."""
     found = [folder / name for name in (RESULTS, JOURNAL, UNFINISHED) if (folder / name).is_file()]
-    return found[:1] + sorted(folder.glob(EARLIER))
+    # Parts beside a finished table or a journal are what a killed process left of rows that are in it.
+    return found[:1] if found and found[0].name != UNFINISHED else [*found, *sorted(folder.glob(EARLIER))]
 
 
-def read_table(file: Path) -> pa.Table:
-    """The rows of a file that `tables_of` names.
+def read_tables(files: Sequence[Path]) -> pa.Table:
+    """The rows of all files that `tables_of` names, each run once.
 
     Raises
     ------
-    OutputError
-        A journal that is damaged; of other files pyarrow's errors.
+    InputError
+        A file is damaged, or has rows of another study.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    if file.name != JOURNAL:
-        return pq.read_table(file)
+    tables = [read_table(file) for file in files]
+    if len(tables) == 1:
+        return tables[0]
+    known: dict[int, str] = {}
+    kept = [_new_rows(file, table, known) for file, table in zip(files, tables, strict=True)]
+    try:
+        return pa.concat_tables(kept)
+    except pa.ArrowException as error:
+        raise _of_two_studies(files[-1], "they have other columns") from error
+
+
+def _new_rows(file: Path, table: pa.Table, known: dict[int, str]) -> pa.Table:
+    """Rows of runs that are not known yet; they are afterwards."""
+    import pyarrow as pa
+
+    if not {"run", "id"} <= set(table.column_names):
+        raise damaged(file, "not a table of runs", "delete it and run the same command again")
+    new = []
+    for place, (run, identity) in enumerate(zip(table["run"].to_pylist(), table["id"].to_pylist(), strict=True)):
+        if run not in known:
+            known[run] = identity
+            new.append(place)
+        elif known[run] != identity:
+            raise _of_two_studies(file, f"run {run} has two identities")
+    return table.take(pa.array(new, pa.int64()))
+
+
+def _of_two_studies(file: Path, why: str) -> InputError:
+    remedy = "move this file out of the folder, if it was copied there"
+    return InputError(f"rows of another study than in the files beside it ({why})", field=str(file), remedy=remedy)
+
+
+def read_table(file: Path) -> pa.Table:
+    """The rows of a file that `tables_of` names; where it is damaged those of a journal beside it.
+
+    Raises
+    ------
+    InputError
+        It is damaged.
+    """
+    if file.name == JOURNAL:
+        return _journal_table(file)
+    journal = file.with_name(JOURNAL)
+    try:
+        return read_parquet(file)
+    except InputError as error:
+        if file.name not in (RESULTS, UNFINISHED) or not (file.is_file() and journal.is_file()):
+            raise
+        found = _journal_table(journal)
+        why = f"{error.problem}; its rows are read from {JOURNAL} beside it"
+        warn_user(ResultWarning(f"{file}: {why}; run the same command again, and the table is made again"))
+        return found
+
+
+def _journal_table(file: Path) -> pa.Table:
+    import pyarrow as pa
+
     with read_journal(file) as journal:
         return pa.concat_tables([_schema(journal).empty_table(), *_pieces(journal, _HELD)])
 

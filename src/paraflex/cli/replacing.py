@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.cli.tables import plain_console
+from paraflex.errors import InputError
 from paraflex.folders import (
     COMPARISON,
     KINDS,
@@ -68,8 +69,8 @@ def _described(folder: Path, kind: str) -> str:
     when = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime))
     try:
         text = _what(folder, kind, read_json(folder / KINDS[kind][0]))
-    except (KeyError, TypeError, AttributeError):
-        # Damaged, or of another version: it is replaced all the same.
+    except (InputError, KeyError, TypeError, AttributeError):
+        # Not there, damaged, or of another version: it is replaced all the same.
         text = f"a {kind}"
     return f"{text}, {when}"
 
@@ -79,7 +80,8 @@ def _what(folder: Path, kind: str, found: dict[str, Any]) -> str:
     if kind == SENSITIVITY:
         return f'sensitivities "{found["name"]}"'
     if kind == STUDY_OF_RUNS:
-        searched = read_json(folder / "result.json").get("kind", "sweep")
+        search = folder / "result.json"
+        searched = read_json(search).get("kind", "sweep") if search.is_file() else "sweep"
         kind = "study of indices" if (folder / "indices.json").is_file() else searched
         article = "an" if kind[0] in "aeiou" else "a"
         number = found.get("runs")

@@ -11,6 +11,7 @@ from rich.console import Console
 from paraflex.cli.commands.results import ReportRequest
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
+from paraflex.folders import check_listed
 from paraflex.report import Page, motion_page, save_page, tracking_page, verification_page
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
@@ -65,6 +66,7 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
 
 def _beside(file: Path) -> dict[str, Any]:
     numbers = read_json(file)
+    check_listed(file)
     if not isinstance(numbers.get("modes"), dict):
         raise InputError("is no summary that paraflex wrote", field=str(file), remedy="run the command again")
     return numbers

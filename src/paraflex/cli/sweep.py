@@ -27,18 +27,14 @@ def sweep_command(request: SweepRequest) -> int:
     folder = request.folder
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
-    has_report = request.report and bool(result.done) and _write_report(console, folder)
     verdict = study.setting.verdict()
     # Tables say which parts of paths are run by the verdict's findings.
     parts = {path: part.to_dict() for path, part in study.setting.parts().items()} if request.json else {}
 
-    def show(out: Console) -> None:
-        _report(console, result)
-        if has_report:
-            console.print(f"report: {folder / REPORT}", soft_wrap=True)
-
     more = {"part": parts, "verdict": verdict.to_dict()}
-    tell(_figures(result) | more, show, as_json=request.json, doubts=verdict)
+    tell(_figures(result) | more, lambda _: _report(console, result), as_json=request.json, doubts=verdict)
+    if request.report and result.done and _write_report(console, folder) and not request.json:
+        console.print(f"report: {folder / REPORT}", soft_wrap=True)
     return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)
 
 

@@ -156,6 +156,15 @@ def run_id(setting: Setting, task: Task, mode: str) -> str:
     return digest([setting.identity, numbers, task.path, mode])[:_ID_DIGITS]
 
 
+def is_row_of(setting: Setting, row: Row) -> bool:
+    """Whether a row is of what a setting says: its identity is that of its numbers, path and mode."""
+    try:
+        task = Task(0, 0, tuple(row[name] for name in setting.names), row["path"])
+        return row["id"] == run_id(setting, task, row["mode"])
+    except (KeyError, TypeError, ValueError):
+        return False
+
+
 def _blank(setting: Setting, task: Task, mode: str) -> Row:
     first = task.number * len(setting.modes)
     return {

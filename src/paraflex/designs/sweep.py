@@ -24,6 +24,7 @@ from paraflex.campaign import (
     LostWorker,
     OnProgress,
     Progress,
+    Row,
     Study,
     Workers,
     kept_in,
@@ -32,13 +33,14 @@ from paraflex.campaign import (
 )
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
-from paraflex.designs.run import Outcome, Task, lost, run_task, table_schema
+from paraflex.designs.run import COMPLETE, Outcome, Task, is_row_of, lost, run_id, run_task, table_schema
 from paraflex.designs.samples import Varied, check_varied, designs
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
 from paraflex.errors import InputError
 from paraflex.files import Model, model_from
 from paraflex.results.metrics import VALIDITY
+from paraflex.results.parquet import read_parquet
 from paraflex.results.storage import write_results
 from paraflex.writing import GO_ON, write_json
 
@@ -193,13 +195,24 @@ class SweepStudy(Study["SweepResult"]):
         if limit is not None and limit < 1:
             raise InputError("must be positive", field="--limit", value=limit, remedy="say how many runs")
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
-        with open_campaign(folder, account, table_schema(setting, self.motors)) as campaign:
+        with open_campaign(folder, account, table_schema(setting, self.motors), self._has) as campaign:
             session = _Session(self, campaign, on_progress)
             interrupted = False
             if not session.complete:
                 compile_kernels_for(self.model().mechanism)
                 interrupted = session.go((workers or Workers()).open(), partial(run, setting), limit)
             return session.end(interrupted)
+
+    def _task(self, number: int) -> Task:
+        design, path = divmod(number, len(self.setting.paths))
+        return Task(number, design, tuple(self.designs[design].tolist()), self.setting.paths[path])
+
+    def _has(self, row: Row) -> bool:
+        """Whether a row is of this study, and of the run that it says."""
+        number, mode = divmod(row["run"], len(self.setting.modes))
+        if not 0 <= row["run"] < self.runs or not is_row_of(self.setting, row):
+            return False
+        return row["id"] == run_id(self.setting, self._task(number), self.setting.modes[mode])
 
 
 @checked_arguments()
@@ -262,10 +275,19 @@ class _Session:
         self.on_progress = on_progress
         self.began, self.fresh = time.perf_counter(), 0
         rows = np.zeros(study.runs // len(self.setting.modes), dtype=np.intp)
-        for number in campaign.journal.runs():
+        for number in self._runs():
             rows[number // len(self.setting.modes)] += 1
         # Of a task that lacks a row all are made again.
         self.done: NDArray[np.bool_] = rows == len(self.setting.modes)
+
+    def _runs(self) -> Iterator[int]:
+        """The runs of all rows, but for those whose trajectory was taken out of the folder to be made again."""
+        kept = self.campaign.folder.path / TRAJECTORIES
+        if not (self.setting.trajectories and kept.is_dir()):
+            return self.campaign.journal.runs()
+        there = {each.stem for each in kept.iterdir()}
+        rows = self.campaign.journal.rows()
+        return (row["run"] for row in rows if row["status"] != COMPLETE or row["id"] in there)
 
     @property
     def complete(self) -> bool:
@@ -288,10 +310,8 @@ class _Session:
 
     def end(self, interrupted: bool) -> SweepResult:
         """Write the table, and counts beside it."""
-        import pyarrow.parquet as pq
-
         with self.campaign.published(finished=self.complete) as new:
-            table = pq.read_table(new / (RESULTS if self.complete else UNFINISHED), columns=["status", VALIDITY])
+            table = read_parquet(new / (RESULTS if self.complete else UNFINISHED), ["status", VALIDITY])
             result = SweepResult(
                 name=self.study.name,
                 folder=self.campaign.folder.path,
@@ -311,9 +331,8 @@ class _Session:
             if limit is not None and given >= limit:
                 return
             if not self.done[number]:
-                design, path = divmod(number, len(self.setting.paths))
                 given += len(self.setting.modes)
-                yield Task(number, design, tuple(self.study.designs[design].tolist()), self.setting.paths[path])
+                yield self.study._task(number)
 
     def _take(self, outcome: Outcome) -> None:
         # A trajectory stands before its row does: a row without one would never be made again.

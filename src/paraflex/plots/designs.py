@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.campaign import read_table
+from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit, metric_name
 from paraflex.plots.selection import place_of
@@ -135,15 +135,7 @@ class DesignTable:
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
     """The table of a study in order of its runs, from the files of its folder that `tables_of` finds."""
-    import pyarrow as pa
-
-    try:
-        table = pa.concat_tables([read_table(file) for file in files])
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(
-            f"cannot be read ({str(error).splitlines()[0]})", field=str(files[0]),
-            remedy="name a results.parquet that paraflex wrote",
-        ) from error  # fmt: skip
+    table = read_tables(files)
     names = table.column_names
     if not {*_FIRST, *_LAST} <= set(names):
         raise InputError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +9,15 @@ from typing import Any
 
 from paraflex.campaign import tables_of
 from paraflex.errors import InputError
+from paraflex.folders import check_listed
 from paraflex.plots.designs import DesignTable, read_designs
+from paraflex.seals import NETCDF, PARQUET
+from paraflex.writing import read_values
 
 _OURS = "name a folder or file that paraflex wrote"
 # Files of results, those that tell what a folder is first.
 _FILES = ("results.nc", "verify.nc", "compare-methods.json", "sensitivity.json", "indices.json", "result.json")
-_BEGINNINGS = {b"\x89HDF": "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", b"PAR1": "parquet"}
+_BEGINNINGS = {NETCDF: "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", PARQUET: "parquet"}
 
 
 @dataclass(frozen=True)
@@ -86,10 +88,8 @@ def _format(file: Path) -> str:
 
 
 def _json(file: Path) -> Source:
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError("damaged: not JSON to its end", field=str(file), remedy="make these results again") from error
+    found = read_values(file, "make these results again")
+    check_listed(file)
     kind = kind_of_numbers(found)
     if kind:
         searched = kind in ("optimisation", "identification", "indices")

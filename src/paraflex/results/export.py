@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
+from paraflex.results.parquet import read_parquet, write_parquet
 from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.results.storage import save_results
 from paraflex.writing import whole_file
@@ -145,7 +146,6 @@ def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = Fals
 def _write_table(table: pd.DataFrame, file: Path, to: str, about: Mapping[str, str]) -> None:
     """Write a table as CSV, units in the names of columns, or Parquet, units in their metadata."""
     import pyarrow as pa
-    from pyarrow import parquet
 
     units, meanings = table.attrs["units"], table.attrs["meanings"]
     found = pa.Table.from_pandas(table, preserve_index=False)
@@ -154,7 +154,7 @@ def _write_table(table: pd.DataFrame, file: Path, to: str, about: Mapping[str, s
         return
     about_columns = {name: {"unit": units[name], "long_name": meanings[name]} for name in units}
     fields = [field.with_metadata(about_columns[field.name]) for field in found.schema]
-    parquet.write_table(found.cast(pa.schema(fields, metadata=dict(about))), file, compression="zstd")
+    write_parquet(found.cast(pa.schema(fields, metadata=dict(about))), file, "zstd")
 
 
 def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
@@ -226,9 +226,6 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
     OutputError
         It cannot be written.
     """
-    import pyarrow as pa
-    from pyarrow import parquet
-
     if to not in ("csv", "mat"):
         raise InputError(
             f"the table of a study of many runs cannot be written as {to}", field="to",
@@ -236,12 +233,7 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
         )  # fmt: skip
     file = output if output.suffix.lower() == ENDINGS[to] else output / f"results{ENDINGS[to]}"
     _refuse([file], force)
-    try:
-        found = parquet.read_table(source)
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(
-            "damaged or cut short: not a readable table", field=str(source), remedy="run the study again"
-        ) from error
+    found = read_parquet(source)
     with whole_file(file) as unfinished:
         if to == "csv":
             units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in found.schema}

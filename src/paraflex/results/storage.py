@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
+from paraflex.folders import check_listed
 from paraflex.results.following import metric_variables
-from paraflex.writing import whole_file
+from paraflex.seals import NETCDF, PARQUET, check_seal, damaged
+from paraflex.writing import sealed_file
 
 # Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from. 3:
 # errors during the motion and after it, vibration about the drift, deflections from the chord; joint forces are whole
@@ -25,9 +28,9 @@ _NAMED = 3
 _LARGE = 16384
 # Written at once where the reason is looked for why a file cannot be [bytes].
 _PIECE = 1 << 20
-# First bytes of what netCDF files are (HDF5, or the classic formats), and of other files of ours.
-_NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
-_PARQUET = b"PAR1"
+# First bytes of what netCDF files are: HDF5, or the classic formats.
+_NETCDF = (NETCDF, b"CDF\x01", b"CDF\x02", b"CDF\x05")
+_AGAIN = "copy it again, or delete it and run the same command again"
 
 
 @checked_arguments()
@@ -44,7 +47,7 @@ def save_results(data: xr.Dataset, path: str | Path) -> None:
 
 def write_results(data: xr.Dataset, path: Path, **options: Any) -> None:
     """Write a dataset as netCDF; see `whole_file` for the options and errors."""
-    with whole_file(path, **options) as unfinished:
+    with sealed_file(path, **options) as unfinished:
         _write_netcdf(data, unfinished)
 
 
@@ -136,7 +139,7 @@ def _read(file: Path) -> xr.Dataset:
         raise InputError(
             f"cannot be read ({error.strerror or error})", field=str(file), remedy="check its permissions"
         ) from error
-    if start == _PARQUET:
+    if start == PARQUET:
         raise InputError(
             "a table of many runs, not the results of one", field=str(file), remedy="read it with pandas or pyarrow"
         )
@@ -145,18 +148,18 @@ def _read(file: Path) -> xr.Dataset:
             "not a netCDF file" if start else "an empty file", field=str(file),
             remedy="name a results.nc that paraflex wrote",
         )  # fmt: skip
+    check_seal(file, _AGAIN)
+    check_listed(file)
     try:
         return xr.load_dataset(file, engine="netcdf4")
-    except (OSError, ValueError, RuntimeError) as error:
-        raise InputError(
-            "damaged or cut short: not a readable netCDF file", field=str(file),
-            remedy="copy it again, or run the study again",
-        ) from error  # fmt: skip
+    # Of a damaged file without a seal the libraries raise whatever its bytes lead them to.
+    except Exception as error:
+        raise damaged(file, "cut short, or not a readable netCDF file", _AGAIN) from error
 
 
 def _checked(data: xr.Dataset, file: Path) -> xr.Dataset:
     schema = data.attrs.get("schema")
-    if schema is None or "paraflex_version" not in data.attrs:
+    if not isinstance(schema, int | np.integer) or "paraflex_version" not in data.attrs:
         raise InputError(
             "a netCDF file, but not of paraflex", field=str(file), remedy="name a results.nc that paraflex wrote"
         )

@@ -19,9 +19,10 @@ from paraflex.designs.schema import SamplingTable, study_table
 from paraflex.designs.sweep import RunTask, SweepStudy, SweptResult, make_study
 from paraflex.errors import InputError, suggestion
 from paraflex.results.metrics import METRICS
+from paraflex.results.parquet import read_parquet, write_parquet
 from paraflex.results.summary import finite_or_none
 from paraflex.studies.optimisation.schema import StudyTable
-from paraflex.writing import GO_ON, whole_file, write_json
+from paraflex.writing import GO_ON, write_json
 
 Array = NDArray[np.float64]
 TABLE = "indices.parquet"
@@ -104,15 +105,13 @@ class IndicesStudy(Study[IndicesResult]):
             Too few samples are complete; see `Study.run` for others.
         """
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         done = self.sweep.run(folder, workers=workers, on_progress=on_progress, run=run)
         result = IndicesResult(done, _dataset(self, _indices(self, done.table) if done.complete else []))
         if done.complete:
             with result.added() as new:
                 write_json(new / result.values_file, result.to_dict(), remedy=GO_ON)
-                with whole_file(new / result.table.name, remedy=GO_ON) as unfinished:
-                    pq.write_table(pa.Table.from_pylist(result.to_dict()["indices"]), unfinished)
+                write_parquet(pa.Table.from_pylist(result.to_dict()["indices"]), new / result.table.name, remedy=GO_ON)
         return result
 
 
@@ -172,11 +171,9 @@ def indices(
 
 
 def _indices(study: IndicesStudy, table: Path) -> list[dict[str, Any]]:
-    import pyarrow.parquet as pq
-
     setting = study.sweep.setting
     shape = (len(study.sweep.designs), len(setting.paths), len(setting.modes))
-    read = pq.read_table(table, columns=["status", *study.columns])
+    read = read_parquet(table, ["status", *study.columns])
     # Rows are in order of designs, then paths, then modes.
     complete = (read["status"].to_numpy() == COMPLETE).reshape(shape)
     out = []

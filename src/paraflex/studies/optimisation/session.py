@@ -13,7 +13,7 @@ from paraflex.campaign import Engine, open_campaign
 from paraflex.campaign.study import Result
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
-from paraflex.designs.run import run_task, table_schema
+from paraflex.designs.run import is_row_of, run_task, table_schema
 from paraflex.designs.samples import SOBOL, designs
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
@@ -102,7 +102,8 @@ def search(
     began = time.perf_counter()
     exact = _slopes_run(study, run)
     account = study_account(study.name, study.setting, study.parameters, study.content())
-    with open_campaign(folder, account, record_schema(study, slopes=exact is not None)) as campaign:
+    schema = record_schema(study, slopes=exact is not None)
+    with open_campaign(folder, account, schema, partial(is_row_of, study.setting)) as campaign:
         compile_kernels_for(study.base.model().mechanism)
         evaluate = Evaluate(study, campaign.journal, open_workers(), run or run_task, on_evaluated, exact)
         try:

@@ -21,10 +21,11 @@ from paraflex.designs.run import Task
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, digest, make_setting
-from paraflex.errors import InputError, OutputError
+from paraflex.errors import InputError
 from paraflex.findings import Verdict
 from paraflex.folders import SENSITIVITY
 from paraflex.mechanism.quantities import known
+from paraflex.results.parquet import write_parquet
 from paraflex.results.spreadsheet import spreadsheet_text
 from paraflex.results.summary import finite_or_none
 from paraflex.writing import whole_file
@@ -149,13 +150,14 @@ class Sensitivities(Result):
 
     def write_files(self, folder: Path) -> None:
         """Write `sensitivity.json`, and its lines as `sensitivity.csv` and `sensitivity.parquet`; see `Result.save`."""
+        import pyarrow as pa
+
         super().write_files(folder)
         lines = self.to_frame()
         with whole_file(folder / TABLE) as unfinished:
             cells = lines.map(lambda cell: spreadsheet_text(cell) if isinstance(cell, str) else cell)
             cells.to_csv(unfinished, index=False)
-        with whole_file(folder / LINES) as unfinished:
-            _to_parquet(lines, unfinished)
+        write_parquet(pa.Table.from_pandas(lines, preserve_index=False), folder / LINES)
 
     def _metric(self, i: int, j: int) -> dict[str, Any]:
         arrays = {"derivatives": self.derivatives, "relative": self.relative, "errors": self.errors}
@@ -321,13 +323,3 @@ def _gathered(
         content=study.content(),
         verdict=study.setting.verdict(),
     )
-
-
-def _to_parquet(lines: Any, file: Path) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        pq.write_table(pa.Table.from_pandas(lines, preserve_index=False), file)
-    except pa.ArrowException as error:
-        raise OutputError(f"cannot be written ({error})", field=str(file), remedy="choose another folder") from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +20,7 @@ from paraflex.designs.run import Abandoned
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError, ParaflexError
 from paraflex.files import model_from
+from paraflex.folders import check_listed
 from paraflex.plots.designs import DesignTable, read_designs
 from paraflex.report import Page
 from paraflex.report.choice import MOST_RUNS, Picked, best_runs
@@ -28,6 +28,7 @@ from paraflex.report.survey import Step
 from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.metrics import VALIDITY
+from paraflex.writing import read_json
 
 _FOUND = "result.json"
 # So much a metric may differ from its row's before the reader is warned: other machines round otherwise.
@@ -160,11 +161,9 @@ def _found(file: Path) -> Mapping[str, Any]:
     """Result of a search; empty for a sweep."""
     if not file.is_file():
         return {}
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError("cannot be read", field=str(file), remedy="run the command again") from error
-    return found if isinstance(found, dict) else {}
+    found = read_json(file)
+    check_listed(file)
+    return found
 
 
 def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool]]:

@@ -1,0 +1,60 @@
+"""Tables in Parquet files: sealed, with checksums of pages for other programs, and checked when they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from paraflex.folders import check_listed
+from paraflex.seals import check_seal, damaged
+from paraflex.writing import sealed_file
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+_AGAIN = "delete it and run the same command again"
+
+
+def write_parquet(table: pa.Table, path: Path, compression: str = "snappy", **options: Any) -> None:
+    """Write a table; see `whole_file` for the options and errors."""
+    with open_parquet(path, table.schema, compression, **options) as writer:
+        writer.write_table(table)
+
+
+@contextmanager
+def open_parquet(
+    path: Path, schema: pa.Schema, compression: str = "snappy", **options: Any
+) -> Iterator[pq.ParquetWriter]:
+    """A file to write tables into; see `whole_file` for the options and errors."""
+    import pyarrow.parquet as pq
+
+    with (
+        sealed_file(path, **options) as unfinished,
+        pq.ParquetWriter(unfinished, schema, compression=compression, write_page_checksum=True) as writer,
+    ):
+        yield writer
+
+
+def read_parquet(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
+    """A table, or some of its columns.
+
+    Raises
+    ------
+    InputError
+        It is damaged, or cannot be read.
+    """
+    import pyarrow.parquet as pq
+
+    check_seal(file, _AGAIN)
+    check_listed(file)
+    try:
+        names = None if columns is None else list(columns)
+        table = pq.read_table(file, columns=names, page_checksum_verification=True)
+        table.validate(full=True)
+    # Of a damaged file without a seal the library raises whatever its bytes lead it to.
+    except Exception as error:
+        raise damaged(file, f"not a readable table ({(str(error) or 'no reason').splitlines()[0]})", _AGAIN) from error
+    return table
