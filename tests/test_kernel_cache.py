@@ -132,7 +132,7 @@ def test_that_kernels_are_compiled_is_said_once_and_only_where_they_are(tmp_path
 
 def test_workers_say_nothing_of_compiling(monkeypatch):
     said = []
-    monkeypatch.setattr(notice, "_announced", False)
+    monkeypatch.setattr(notice, "_announced", set())
     monkeypatch.setattr(notice.multiprocessing, "parent_process", lambda: "a process")
     notice.announce_compiling(said.append)
     monkeypatch.setattr(notice.multiprocessing, "parent_process", lambda: None)

@@ -51,7 +51,7 @@ def test_metadata_of_the_wheel(wheel):
     extras = set(metadata.get_all("Provides-Extra") or [])
     assert extras == set(PROJECT["optional-dependencies"])
     entry_points = wheel.read(f"{NAME}.dist-info/entry_points.txt").decode()
-    assert "paraflex = paraflex.cli.app:main" in entry_points
+    assert "paraflex = paraflex.__main__:main" in entry_points
 
 
 def test_all_extras_but_that_of_developers_are_in_all():

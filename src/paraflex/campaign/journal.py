@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError, OutputError, ResultWarning, warn_user
+from paraflex.interrupts import uninterrupted
 from paraflex.writing import GO_ON
 
 JOURNAL = "journal.sqlite"
@@ -157,7 +158,8 @@ def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
         try:
             yield journal
         finally:
-            journal.commit()
+            with uninterrupted():
+                journal.commit()
 
 
 @contextmanager

@@ -9,11 +9,12 @@ from typing import Annotated
 
 import typer
 
-from paraflex.cli import BAD_INPUT, INTERRUPTED, TROUBLE
+from paraflex.cli import BAD_INPUT, TROUBLE
 from paraflex.cli.collected import collecting
 from paraflex.cli.commands.once import Command
 from paraflex.cli.commands.requests import with_options
 from paraflex.cli.commands.shell import COMMANDS
+from paraflex.cli.signals import exit_code
 from paraflex.errors import InputError, ParaflexError
 
 app: typer.Typer = typer.Typer(
@@ -61,7 +62,7 @@ def main() -> None:
         sys.exit(TROUBLE)
     except KeyboardInterrupt:
         typer.echo("interrupted", err=True)
-        sys.exit(INTERRUPTED)
+        sys.exit(exit_code())
 
 
 def _start_quickly() -> None:

@@ -27,7 +27,12 @@ def sweep_command(request: SweepRequest) -> int:
     folder = request.folder
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
-    has_report = request.report and bool(result.done) and _write_report(console, folder)
+    # Whoever stops it does not want to wait for more.
+    has_report = request.report and bool(result.done) and not result.interrupted
+    if has_report:
+        from paraflex.cli.report import save_study_report
+
+        save_study_report(folder, console)
     verdict = study.setting.verdict()
     # Tables say which parts of paths are run by the verdict's findings.
     parts = {path: part.to_dict() for path, part in study.setting.parts().items()} if request.json else {}
@@ -36,6 +41,8 @@ def sweep_command(request: SweepRequest) -> int:
         _report(console, result)
         if has_report:
             console.print(f"report: {folder / REPORT}", soft_wrap=True)
+        elif request.report and result.interrupted:
+            console.print(f"no report: paraflex report {folder} writes it", soft_wrap=True)
 
     more = {"part": parts, "verdict": verdict.to_dict()}
     tell(_figures(result) | more, show, as_json=request.json, doubts=verdict)
@@ -54,18 +61,6 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
         return study.run(folder, workers=request.workers.chosen, on_progress=report, limit=request.limit)
 
 
-def _write_report(console: Console, folder: Path) -> bool:
-    """Whether the report is written: another Ctrl-C leaves it out."""
-    from paraflex.cli.report import save_study_report
-
-    try:
-        save_study_report(folder, console)
-    except KeyboardInterrupt:
-        console.print(f"no report: paraflex report {folder} writes it", soft_wrap=True)
-        return False
-    return True
-
-
 def _report(console: Console, result: SweepResult) -> None:
     statuses = ", ".join(f"{number} {status}" for status, number in sorted(result.counts.items()))
     plain_console().print(f"{result.done} of {result.total} runs: {statuses or 'none yet'}")
@@ -78,7 +73,8 @@ def _report(console: Console, result: SweepResult) -> None:
     if result.complete:
         console.print(f"one table: {result.table}", soft_wrap=True)
     else:
-        console.print(f"so far: {result.table}; the same command goes on from there", soft_wrap=True)
+        stopped = "interrupted; " if result.interrupted else ""
+        console.print(f"{stopped}so far: {result.table}; the same command goes on from there", soft_wrap=True)
 
 
 def _figures(result: SweepResult) -> dict:
