@@ -4,7 +4,6 @@ Waits are for conditions; their bounds are only there for what would never happe
 """
 
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -32,16 +31,14 @@ def wait_until(condition, *, within=WITHIN, what="the condition"):
 class Child:
     """A process that a test started: see `started`."""
 
-    def __init__(self, command, **options):
+    def __init__(self, command, cwd=None, env=None, text=True):
+        self._text = text
         self._mark = uuid.uuid4().hex
-        self._said = tempfile.TemporaryFile("w+b"), tempfile.TemporaryFile("w+b")
-        # Ignored signals stay so in what is started, as under nohup.
-        with patch_signals():
-            self.process = subprocess.Popen(
-                [str(each) for each in command], start_new_session=True, stdin=subprocess.DEVNULL,
-                stdout=self._said[0], stderr=self._said[1], cwd=options.get("cwd"),
-                env={**os.environ, **options.get("env", {}), _MARK: self._mark},
-            )  # fmt: skip
+        self._said = [tempfile.TemporaryFile("w+b") for _ in range(2)]  # noqa: SIM115
+        self.process = subprocess.Popen(
+            [str(each) for each in command], start_new_session=True, stdin=subprocess.DEVNULL, cwd=cwd,
+            stdout=self._said[0], stderr=self._said[1], env={**os.environ, **(env or {}), _MARK: self._mark},
+        )  # fmt: skip
 
     @property
     def out(self):
@@ -55,7 +52,8 @@ class Child:
 
     def _read(self, which):
         size = os.fstat(self._said[which].fileno()).st_size
-        return os.pread(self._said[which].fileno(), size, 0).decode(errors="replace")
+        said = os.pread(self._said[which].fileno(), size, 0)
+        return said.decode(errors="replace") if self._text else said
 
     def until(self, condition, **bounds):
         """Wait for a condition, which must come while the process lives."""
@@ -105,19 +103,8 @@ class Child:
 
 
 @contextmanager
-def patch_signals():
-    """Ctrl-C does what it does in a terminal to processes that are started within."""
-    before = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
 def started(*command, **options):
-    """A process while the block lasts; `cwd` and `env`, what is added to the environment, as options."""
+    """A process while the block lasts; options: `cwd`, `env` (added to the environment), `text` (or bytes)."""
     child = Child(command, **options)
     try:
         yield child
@@ -125,8 +112,8 @@ def started(*command, **options):
         child.close()
 
 
-def run(*command, within=WITHIN, check=False, **options):
-    """A process, waited for: its exit code and what it said."""
+def run(*command, within=2 * WITHIN, check=False, **options):
+    """A process, waited for: its exit code and what it said; with `check` the code must be 0."""
     with started(*command, **options) as child:
         done = child.end(within)
     assert not check or done.returncode == 0, done.stderr

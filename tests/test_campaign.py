@@ -4,9 +4,7 @@ import json
 import os
 import signal
 import sqlite3
-import subprocess
 import sys
-import time
 
 import pytest
 
@@ -17,6 +15,7 @@ from paraflex.designs.run import run_task
 from paraflex.errors import InputError, OutputError, ResultWarning
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
+from processes import started
 
 STUDY = """
 mechanism = "raparm_i"
@@ -105,29 +104,17 @@ def counted():
     return run
 
 
-def start(script, *arguments, until=None):
-    """A process of its own, when it has said something."""
-    process = subprocess.Popen([sys.executable, "-c", script, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
-    if until:
-        assert process.stdout is not None
-        assert process.stdout.readline().strip() == until
-    return process
-
-
-def kill(process):
-    with process:
-        os.kill(process.pid, signal.SIGKILL)
-    assert process.returncode == -signal.SIGKILL
+def kill(child):
+    child.send(signal.SIGKILL)
+    assert child.end().returncode == -signal.SIGKILL
 
 
 @kills
 def test_a_killed_sweep_goes_on_to_the_same_table(file, whole, counted, tmp_path):
     out = tmp_path / "out"
-    process = start(SLOWLY, file, out)
-    while not rows_in(out):
-        assert process.poll() is None
-        time.sleep(0.05)
-    kill(process)
+    with started(sys.executable, "-c", SLOWLY, file, out) as child:
+        child.until(lambda: rows_in(out))
+        kill(child)
     kept = rows_in(out)
     assert 0 < kept < 64
     # No table was made, but the rows are there for reports and figures.
@@ -142,7 +129,9 @@ def test_a_killed_sweep_goes_on_to_the_same_table(file, whole, counted, tmp_path
 
 @kills
 def test_a_process_killed_in_a_commit_leaves_what_was_committed(tmp_path):
-    kill(start(HALF_A_COMMIT, tmp_path, until="half"))
+    with started(sys.executable, "-c", HALF_A_COMMIT, tmp_path) as child:
+        child.until(lambda: child.out == "half\n")
+        kill(child)
     assert (tmp_path / f"{JOURNAL}-journal").stat().st_size > 0
     assert (tmp_path / JOURNAL).stat().st_size > 1_000_000
     assert rows_in(tmp_path) == 10
@@ -152,10 +141,12 @@ def test_a_process_killed_in_a_commit_leaves_what_was_committed(tmp_path):
 
 @kills
 def test_a_killed_process_holds_nothing(tmp_path):
-    process = start(HOLDS, tmp_path, until="held")
-    with pytest.raises(InputError, match=r"another process writes to it .*wait for it, or stop it"), held(tmp_path):
-        pass
-    kill(process)
+    with started(sys.executable, "-c", HOLDS, tmp_path) as child:
+        child.until(lambda: child.out == "held\n")
+        says = r"another process writes to it .*wait for it, or stop it"
+        with pytest.raises(InputError, match=says), held(tmp_path):
+            pass
+        kill(child)
     with held(tmp_path) as locks:
         assert locks
     assert [each.name for each in tmp_path.iterdir()] == [".lock"]

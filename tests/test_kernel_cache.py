@@ -3,13 +3,12 @@
 import gc
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import paraflex
+import processes
 from paraflex.kernel import disk_cache, notice
 from paraflex.kernel.compiling import Kernel
 
@@ -37,9 +36,7 @@ print(FOLDER)
 
 
 def python(*arguments, **environment):
-    command = [sys.executable, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env={**os.environ, **environment})
-    return done.stdout.strip().splitlines()
+    return processes.python(*arguments, env=environment, check=True).stdout.strip().splitlines()
 
 
 @pytest.fixture
@@ -119,8 +116,7 @@ SILENT = "import logging; logging.getLogger('paraflex').setLevel('ERROR')"
 
 def streams(code, place):
     """Standard output and standard error of a process with a place for its kernels."""
-    command, environment = [sys.executable, "-c", code], {**os.environ, "NUMBA_CACHE_DIR": str(place)}
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    done = processes.python("-c", code, env={"NUMBA_CACHE_DIR": str(place)}, check=True)
     return done.stdout, done.stderr
 
 

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -11,6 +10,7 @@ import pytest
 
 import paraflex
 from paraflex import cache_folder
+from processes import run
 
 HEAVY = ("numba", "matplotlib", "xarray", "scipy", "numpy", "netCDF4", "pydantic")
 
@@ -56,9 +56,7 @@ def python(*arguments, read_only=(), **environment):
     command = [sys.executable, *arguments]
     if read_only and os.getuid() == 0:
         command = ["unshare", "--mount", "sh", "-c", MOUNT, "sh", *map(str, read_only), *command]
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, cwd="/", env={**os.environ, **environment}
-    )
+    done = run(*command, cwd="/", env=environment)
     if done.returncode == 77 or "unshare failed" in done.stderr:
         pytest.skip("root may write anywhere, and nothing can be mounted here")
     assert done.returncode == 0, done.stderr
