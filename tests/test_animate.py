@@ -207,14 +207,14 @@ def test_a_gif_moves_and_keeps_its_ground(data, tmp_path):
 @pytest.fixture
 def drawn(data, monkeypatch):
     """Pictures as they are asked for, two of them as the one before: copies, and how many there are at once."""
-    reduced, copies, alive, most = film_files._reduced, [], weakref.WeakSet(), [0]
+    reduced, copies, alive, most = film_files._reduced, [], [], [0]
 
     def kept(film, report):
         for k, picture in enumerate(reduced(film, report)):
             picture = copies[1].copy() if k in (2, 3) else picture
             copies.append(picture.copy())
-            alive.add(picture)
-            most[0] = max(most[0], len(alive))
+            alive.append(weakref.ref(picture))
+            most[0] = max(most[0], sum(each() is not None for each in alive))
             yield picture
 
     monkeypatch.setattr(film_files, "_reduced", kept)

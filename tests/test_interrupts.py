@@ -115,17 +115,12 @@ def study(tmp_path):
     return file
 
 
-def begun(child, out):
-    """Wait until a sweep has rows, and all the workers it wants."""
-    child.until(lambda: rows_in(out))
-
-
 @pytest.mark.parametrize(("number", "code"), ENDING)
 @pytest.mark.parametrize("engine", ["threads", "processes", "dask"])
 def test_a_sweep_ends_with_its_rows_and_all_its_processes(study, tmp_path, number, code, engine):
     out = tmp_path / "out"
     with started(*PARAFLEX, "sweep", study, "--output", out, "--engine", engine, "--workers", 2) as child:
-        begun(child, out)
+        child.until(lambda: rows_in(out))
         child.send(number, group=True)
         done = child.end()
         wait_until(lambda: not child.descendants(), within=30.0, what="the end of workers")
@@ -141,7 +136,7 @@ def test_a_sweep_ends_with_its_rows_and_all_its_processes(study, tmp_path, numbe
 def test_workers_end_with_a_parent_that_was_killed(study, tmp_path, engine):
     out = tmp_path / "out"
     with started(*PARAFLEX, "sweep", study, "--output", out, "--engine", engine, "--workers", 2) as child:
-        begun(child, out)
+        child.until(lambda: rows_in(out))
         assert len(child.descendants()) >= 2
         child.send(signal.SIGKILL)
         child.end()
@@ -214,7 +209,7 @@ def test_nohup_is_respected(study, tmp_path):
     )
     out = tmp_path / "out"
     with started(sys.executable, "-c", deaf, *PARAFLEX, "sweep", study, "--output", out, "--limit", 40) as child:
-        begun(child, out)
+        child.until(lambda: rows_in(out))
         child.send(signal.SIGHUP)
         assert child.end().returncode == 0
     assert rows_in(out) == 40
