@@ -9,10 +9,11 @@ import sys
 import pytest
 
 from journals import rows_in
-from paraflex.campaign import held, open_engine, outcomes, read_table, tables_of
+from paraflex.campaign import open_engine, outcomes, read_table, tables_of
 from paraflex.campaign.journal import JOURNAL, read_journal, write_journal
 from paraflex.designs.run import run_task
 from paraflex.errors import InputError, OutputError, ResultWarning
+from paraflex.folders import lock_folder
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
 from processes import started
@@ -56,9 +57,9 @@ HOLDS = """
 import sys, time
 from pathlib import Path
 
-from paraflex.campaign import held
+from paraflex.folders import lock_folder
 
-with held(Path(sys.argv[1])):
+with lock_folder(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
 """
@@ -144,10 +145,10 @@ def test_a_killed_process_holds_nothing(tmp_path):
     with started(sys.executable, "-c", HOLDS, tmp_path) as child:
         child.until(lambda: child.out == "held\n")
         says = r"another process writes to it .*wait for it, or stop it"
-        with pytest.raises(InputError, match=says), held(tmp_path):
+        with pytest.raises(InputError, match=says), lock_folder(tmp_path):
             pass
         kill(child)
-    with held(tmp_path) as locks:
+    with lock_folder(tmp_path) as locks:
         assert locks
     assert [each.name for each in tmp_path.iterdir()] == [".lock"]
 

@@ -390,6 +390,17 @@ def test_distances_forces_and_conditions_are_those_of_the_dataset(results: Path)
     assert bends.axes[0].get_ylabel().startswith("displacement [")
 
 
+def test_all_figures_of_rigid_links_are_those_that_can_be_drawn(tmp_path: Path) -> None:
+    model = pf.load("five_bar")
+    task = pf.plan(model.mechanism.rigid(), model.paths["square"], duration=0.02, samples=3)
+    save_results(pf.tracking_dataset([task.simulate("++")]), tmp_path / "results.nc")
+    source = open_source(tmp_path / "results.nc")
+    names = [figure.name for figure in figures_of(source)]
+    assert "link_deflections" not in names
+    for name in names:
+        drawn(source, name)
+
+
 def test_one_name_a_quantity() -> None:
     assert axis_label("torque") == r"torque $\tau$ [N m]"
     assert axis_label("position", direction="y", short=True) == "$y$ [mm]"

@@ -1,7 +1,9 @@
 """What commands say of a folder that holds results already, before they compute."""
 
+import json
 import os
 import time
+from pathlib import Path
 
 import pytest
 
@@ -32,11 +34,11 @@ fields = ["section.bar.thickness"]
 def paraflex(monkeypatch, capsys):
     """Run a command; what it printed on stdout and stderr."""
 
-    def call(*line):
+    def call(*line, code=0):
         monkeypatch.setattr("sys.argv", ["paraflex", *line])
         with pytest.raises(SystemExit) as end:
             program.main()
-        assert end.value.code in (0, None)
+        assert (end.value.code or 0) == code
         said = capsys.readouterr()
         return said.out, said.err
 
@@ -80,15 +82,47 @@ def test_results_of_another_kind_are_named_with_the_files_they_lose(paraflex, mo
     assert "here holds" not in err
     _, again = paraflex("sweep", "bars.toml", "--out", "here", "--no-report")
     assert "here holds" not in again, "a sweep goes on: it replaces nothing"
+    before = {file.name for file in (tmp_path / "here").iterdir()}
+    _, err = paraflex(*RUN, "--out", "here", code=2)
+    assert "--out: the folder holds other results, a study of many runs (got 'here'); name another folder" in err
+    assert {file.name for file in (tmp_path / "here").iterdir()} == before
+    (tmp_path / "here" / "notes.txt").write_text("mine")
     date = dated(tmp_path / "here", ["study.json"])
-    _, err = paraflex(*RUN, "--out", "here")
-    assert err.splitlines()[0] == (
-        f'here holds a sweep "bars" of 1 run, {date}; its summary.json will be replaced, and a run comes beside it '
-        "(--out another folder keeps them apart)"
-    )
-    _, err = paraflex(*COMPARE, "--out", "here")
-    assert 'here holds a sweep "bars" of 1 run' in err
-    assert "and a comparison of methods comes beside it" in err
+    _, err = paraflex(*RUN, "--out", "here", "--force")
+    said = f'here holds a sweep "bars" of 1 run, {date}; it will be replaced (--out another folder keeps both)'
+    assert err.splitlines()[:2] == [said, "here holds files that are not of paraflex and stay: notes.txt"]
+    assert {file.name for file in (tmp_path / "here").iterdir()} == {
+        ".lock", "figures", "manifest.json", "notes.txt", "results.nc", "summary.json",
+    }  # fmt: skip
+    _, err = paraflex("sweep", "bars.toml", "--out", "here", code=2)
+    assert "--output: the folder holds other results, a run (got 'here'); name another folder\n" in err
+
+
+def test_a_run_without_a_report_leaves_none_of_the_run_before(paraflex, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    paraflex(*RUN[:-1], "--out", "here")
+    paraflex("plot", "here", "tracking_errors", "--format", "pdf")
+    drawn = {file.name for file in Path("here/figures").iterdir()}
+    paraflex(*MOTION, "--out", "here")
+    assert not Path("here/report.html").exists()
+    assert not drawn & {file.name for file in Path("here/figures").iterdir()}
+    files = {file.relative_to("here").as_posix() for file in Path("here").rglob("*") if file.is_file()}
+    listed = json.loads(Path("here/manifest.json").read_text(encoding="utf-8"))["files"]
+    assert files == {*listed, "manifest.json", ".lock"}
+
+
+def test_figures_and_reports_made_later_belong_to_the_results(paraflex, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    paraflex(*RUN, "--out", "here")
+    before = json.loads(Path("here/manifest.json").read_text(encoding="utf-8"))
+    paraflex("plot", "here", "tracking_errors", "--format", "pdf")
+    paraflex("report", "here")
+    (drawn,) = Path("here/figures").glob("*.pdf")
+    after = json.loads(Path("here/manifest.json").read_text(encoding="utf-8"))
+    assert after["identity"] == before["identity"]
+    new = set(after["files"]) - set(before["files"])
+    assert "report.html" in new
+    assert new == {"report.html", f"figures/{drawn.name}"}
 
 
 def test_sensitivities_made_again_are_named(paraflex, monkeypatch, tmp_path):
@@ -105,13 +139,16 @@ def test_sensitivities_made_again_are_named(paraflex, monkeypatch, tmp_path):
 def test_damaged_results_are_named_by_their_kind(tmp_path, capsys, text):
     (tmp_path / "summary.json").write_text(text)
     date = dated(tmp_path, ["summary.json"])
-    say_replaced(tmp_path, "run")
+    say_replaced(tmp_path)
     said = " ".join(capsys.readouterr().err.split())
     assert said.endswith(f"holds a run, {date}; it will be replaced (--out another folder keeps both)")
 
 
-def test_other_folders_are_passed_without_a_word(tmp_path, capsys):
-    say_replaced(tmp_path / "none", "run")
-    (tmp_path / "notes.txt").write_text("mine")
-    say_replaced(tmp_path, "run")
+def test_other_files_are_named(tmp_path, capsys):
+    say_replaced(tmp_path)
     assert capsys.readouterr().err == ""
+    for name in "abcde":
+        (tmp_path / name).write_text("mine")
+    say_replaced(tmp_path)
+    said = capsys.readouterr().err
+    assert said == f"{tmp_path} holds files that are not of paraflex and stay: a, b, c and 2 more\n"

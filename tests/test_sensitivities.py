@@ -413,7 +413,7 @@ def test_command(tmp_path):
 
 
 def test_command_again_and_elsewhere(tmp_path, capsys):
-    """Again is the same; another point is not, and says so."""
+    """Again is the same; another point takes its place, and says so; another kind of results stays."""
     text = only("thickness").replace("duration = 0.06", 'duration = 0.01\nmetrics = ["rms_torque"]')
     file, out = write(tmp_path, text), tmp_path / "out"
 
@@ -427,17 +427,17 @@ def test_command_again_and_elsewhere(tmp_path, capsys):
     assert ask(as_json=False) == 0
     assert "rms_torque.tau6 [N m]" in capsys.readouterr().out
     assert json.loads((out / "sensitivity.json").read_text()) == figures
-    with pytest.raises(InputError, match="--output: the folder holds results of another study"):
-        ask(at=["thickness=0.006"])
-    with pytest.raises(InputError, match="--output: the folder holds other files"):
+    capsys.readouterr()
+    assert ask(at=["thickness=0.006"]) == 0
+    assert 'holds sensitivities "sweep"' in capsys.readouterr().err
+    assert json.loads((out / "sensitivity.json").read_text())["parameters"]["thickness"]["value"] == 0.006
+    (tmp_path / "verify.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match="--output: the folder holds other results, a verification"):
         ask(output=tmp_path)
     with pytest.raises(InputError, match=r"--at: not NAME=VALUE .got 'thickness'"):
         ask(at=["thickness"])
     with pytest.raises(InputError, match=r"metrics: has no derivative .got 'steps'"):
         ask(metrics=["work, steps"])
-    (out / "sensitivity.json").write_text("{", encoding="utf-8")
-    with pytest.raises(InputError, match="--output: the folder holds results of another study"):
-        ask()
 
 
 def test_example_is_a_study():

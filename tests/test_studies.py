@@ -113,7 +113,8 @@ def test_plain_values_are_those_of_the_file(done, kind):
 def test_it_is_saved_elsewhere_the_same(done, kind, tmp_path):
     result, folder, _ = done[kind]
     assert result.save(tmp_path / "copy") == tmp_path / "copy"
-    assert {file.name for file in (tmp_path / "copy").iterdir()} == FILES[kind]
+    kept = {"study.json"} & {file.name for file in folder.iterdir()}
+    assert {file.name for file in (tmp_path / "copy").iterdir()} == FILES[kind] | {"manifest.json", ".lock"} | kept
     for name in FILES[kind] - {"results.nc", "verify.nc"}:
         assert (tmp_path / "copy" / name).read_bytes() == (folder / name).read_bytes(), name
     result.save(folder)

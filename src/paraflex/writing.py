@@ -16,13 +16,13 @@ from typing import Any
 
 from paraflex.errors import OutputError
 
-_REMEDY = "choose another folder"
+ELSEWHERE = "choose another folder"
 # Of what is gone on with where it was left.
 GO_ON = "what is written stays; free some space and run the same command again: it goes on from there"
 
 
 @contextmanager
-def whole_file(path: Path, *, remedy: str = _REMEDY, field: str = "", parents: bool = True) -> Iterator[Path]:
+def whole_file(path: Path, *, remedy: str = ELSEWHERE, field: str = "", parents: bool = True) -> Iterator[Path]:
     """The name to write a file under, which takes the place of `path` when it is complete and on the disk.
 
     Parameters
@@ -54,7 +54,7 @@ def whole_file(path: Path, *, remedy: str = _REMEDY, field: str = "", parents: b
 
 
 @contextmanager
-def whole_folder(path: Path, *, replaced: str, remedy: str = _REMEDY) -> Iterator[Path]:
+def whole_folder(path: Path, *, replaced: str, remedy: str = ELSEWHERE) -> Iterator[Path]:
     """A folder to write files to, which move to `path` when all are complete.
 
     Parameters

@@ -3,12 +3,11 @@
 from paraflex.campaign.folder import (
     STUDY as STUDY,
     TRAJECTORIES as TRAJECTORIES,
-    not_ours as not_ours,
-    of_another_study as of_another_study,
+    Campaign as Campaign,
     open_campaign as open_campaign,
     read_study as read_study,
 )
-from paraflex.campaign.journal import Journal as Journal, Row as Row, held as held
+from paraflex.campaign.journal import Journal as Journal, Row as Row
 from paraflex.campaign.study import (
     KeptResult as KeptResult,
     OnProgress as OnProgress,
@@ -16,6 +15,7 @@ from paraflex.campaign.study import (
     Result as Result,
     Study as Study,
     Workers as Workers,
+    hold_for as hold_for,
     kept_in as kept_in,
     no_workers as no_workers,
 )
@@ -26,7 +26,6 @@ from paraflex.campaign.tables import (
     read_data as read_data,
     read_table as read_table,
     tables_of as tables_of,
-    write_table as write_table,
 )
 from paraflex.campaign.workers import (
     DASK as DASK,

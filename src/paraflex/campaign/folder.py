@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from paraflex.campaign.journal import JOURNAL, LOCK, Journal, held, no_folder, write_journal
-from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA, UNFINISHED, read_table
+from paraflex.campaign.journal import JOURNAL, Journal, write_journal
+from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA, UNFINISHED, read_table, write_table
 from paraflex.errors import InputError, OutputError
+from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, files_of, foreign_files, hold_folder
 from paraflex.writing import GO_ON, read_json, write_json
 
 if TYPE_CHECKING:
@@ -21,8 +23,41 @@ STUDY = "study.json"
 TRAJECTORIES = "trajectories"
 
 
+@dataclass(frozen=True)
+class Campaign:
+    """A folder that a study of many runs writes to.
+
+    Attributes
+    ----------
+    folder : ResultsFolder
+    journal : Journal
+        Rows that are added to it stay, whatever happens.
+    """
+
+    folder: ResultsFolder
+    journal: Journal
+
+    @contextmanager
+    def published(self, *, finished: bool) -> Iterator[Path]:
+        """A folder with the table of all rows, to write more results to; they take the place of what was found before.
+
+        Parameters
+        ----------
+        finished : bool
+            Whether all runs are done.
+
+        Raises
+        ------
+        OutputError
+            The disk is full, or cannot be written for another reason.
+        """
+        with self.folder.replaced(but=(STUDY, f"{JOURNAL}*", f"{TRAJECTORIES}/*")) as new:
+            write_table(new, self.journal, finished=finished)
+            yield new
+
+
 @contextmanager
-def open_campaign(folder: Path, study: Mapping[str, Any], schema: pa.Schema) -> Iterator[Journal]:
+def open_campaign(folder: Path, study: Mapping[str, Any], schema: pa.Schema) -> Iterator[Campaign]:
     """A folder, made that of a study or seen to be; rows that are added to its journal stay, whatever happens.
 
     Parameters
@@ -40,13 +75,13 @@ def open_campaign(folder: Path, study: Mapping[str, Any], schema: pa.Schema) -> 
     OutputError
         It cannot be written, or is damaged.
     """
-    with held(folder) as locks:
-        _check_ours(folder)
+    with hold_folder(folder, STUDY_OF_RUNS, field="--output", remedy=GO_ON) as held:
         for left in [*folder.glob("*.part"), *folder.glob(f"{TRAJECTORIES}/*.part")]:
             left.unlink(missing_ok=True)
+        _check_ours(folder)
         said = read_study(folder / STUDY) if (folder / STUDY).exists() else study
         _check_same(folder, said, study)
-        with write_journal(folder, locks=locks) as journal:
+        with write_journal(folder, locks=held.locks) as journal:
             noted = journal.noted("study")
             _check_same(folder, study if noted is None else json.loads(noted), study)
             if noted is None:
@@ -54,8 +89,9 @@ def open_campaign(folder: Path, study: Mapping[str, Any], schema: pa.Schema) -> 
                 journal.note(SCHEMA, schema.serialize().to_pybytes())
                 journal.note("study", json.dumps(study, default=str).encode())
             if not (folder / STUDY).exists():
-                write_json(folder / STUDY, study, remedy=GO_ON)
-            yield journal
+                with held.amended() as new:
+                    write_json(new / STUDY, study, remedy=GO_ON)
+            yield Campaign(held, journal)
 
 
 def read_study(file: Path) -> dict[str, Any]:
@@ -72,31 +108,19 @@ def read_study(file: Path) -> dict[str, Any]:
     return found
 
 
-def not_ours(folder: Path, names: Collection[str]) -> InputError:
-    """The error of a folder with files that no study wrote."""
-    problem = f"the folder holds other files ({', '.join(sorted(names)[:3])})"
-    return InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
-
-
-def of_another_study(folder: Path) -> InputError:
-    """The error of a folder whose results are not those of the study that is to go on there."""
-    problem = "the folder holds results of another study, or of this one before it was changed"
-    return InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
-
-
 def _check_ours(folder: Path) -> None:
     """Refuse a folder that holds files and no study."""
-    try:
-        names = {each.name for each in folder.iterdir()} - {LOCK}
-    except OSError as error:
-        raise no_folder(folder, error) from error
-    if names and not names & {STUDY, JOURNAL}:
-        raise not_ours(folder, names)
+    if not any((folder / name).is_file() for name in (STUDY, JOURNAL)):
+        names = [*files_of(folder), *foreign_files(folder)]
+        if names:
+            problem = f"the folder holds other files ({', '.join(sorted(names)[:3])})"
+            raise InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
 
 
 def _check_same(folder: Path, found: Mapping[str, Any], study: Mapping[str, Any]) -> None:
     if found.get("content") != study["content"]:
-        raise of_another_study(folder)
+        problem = "the folder holds results of another study, or of this one before it was changed"
+        raise InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
     for name, wanted in study["versions"].items():
         had = found.get("versions", {}).get(name)
         if had != wanted:

@@ -11,12 +11,11 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from paraflex.errors import InputError, OutputError, ResultWarning, warn_user
+from paraflex.errors import OutputError, ResultWarning, warn_user
 from paraflex.interrupts import uninterrupted
 from paraflex.writing import GO_ON
 
 JOURNAL = "journal.sqlite"
-LOCK = ".lock"
 # Rows are committed when so many wait, or the first has waited so long [s]: what a crash can cost.
 _ROWS, _SECONDS = 2048, 2.0
 # How long a commit waits for those who read, and they for a commit [s].
@@ -109,41 +108,6 @@ class Journal:
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[bool]:
-    """Keep others from writing to a folder; the system lets go of it when this process ends, however it does.
-
-    Yields False on a file system without locks.
-
-    Raises
-    ------
-    InputError
-        Another process writes to it.
-    OutputError
-        It cannot be made.
-    """
-    locks = True
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = sqlite3.connect(folder / LOCK, timeout=0.0)
-    except (OSError, sqlite3.OperationalError) as error:
-        raise no_folder(folder, error) from error
-    with closing(lock):
-        try:
-            # Nothing is written to this file, nor to a journal of it.
-            lock.executescript("PRAGMA journal_mode = MEMORY; BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError as error:
-            if _code(error) == sqlite3.SQLITE_BUSY:
-                remedy = "wait for it, or stop it"
-                raise InputError(
-                    "another process writes to it", field="--output", value=str(folder), remedy=remedy
-                ) from None
-            if _code(error) != sqlite3.SQLITE_IOERR:
-                raise no_folder(folder, error) from error
-            locks = False
-        yield locks
-
-
-@contextmanager
 def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
     """The journal of a folder that this process holds; what was added is on the disk at the end, whatever ends it.
 
@@ -174,14 +138,6 @@ def read_journal(file: Path) -> Iterator[Journal]:
     # Not mode=ro: what a killed process left half written is undone first.
     with _open(file, "mode=rw") as connection:
         yield Journal(connection)
-
-
-def no_folder(folder: Path, error: Exception) -> OutputError:
-    """The error of a folder that cannot be made or written."""
-    reason = (getattr(error, "strerror", None) or str(error)).lower()
-    return OutputError(
-        f"cannot be written ({reason})", field="--output", value=str(folder), remedy="choose another folder"
-    )
 
 
 @contextmanager

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shutil
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
@@ -12,12 +13,14 @@ from typing import Any, ClassVar, Generic, TypeVar
 import xarray as xr
 
 from paraflex.arguments import CheckedFields
+from paraflex.campaign.folder import STUDY
 from paraflex.campaign.tables import CSV, RESULTS, UNFINISHED, read_data
 from paraflex.campaign.workers import THREADS, Engine, open_engine
 from paraflex.display import Shown
 from paraflex.errors import InputError
+from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, hold_folder
 from paraflex.results.storage import write_results
-from paraflex.writing import whole_file, write_json
+from paraflex.writing import GO_ON, write_json
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,9 @@ class Workers(CheckedFields):
 class Result(Shown, ABC):
     """What a study gives."""
 
-    # Files that `save` writes: of the data, empty where the plain values tell all, and of the plain values.
+    # The kind of results that a folder holds, and files that `save` writes: of the data, empty where the plain values
+    # tell all, and of the plain values.
+    kept_as: ClassVar[str]
     data_file: ClassVar[str] = ""
     values_file: ClassVar[str]
 
@@ -109,23 +114,36 @@ class Result(Shown, ABC):
         """What was found in plain values, ready for JSON."""
 
     def save(self, folder: str | Path) -> Path:
-        """Write data and plain values into a folder, each file whole or not at all; the folder.
+        """Write data and plain values into a folder, in place of the results of this kind that it held; the folder.
 
         Raises
         ------
+        InputError
+            It holds results of another kind, or another process writes to it.
         OutputError
-            It cannot be written.
+            It cannot be written; what it held is all there.
         """
-        folder, data = Path(folder), self.data if self.data_file else None
+        with hold_folder(Path(folder), self.kept_as) as held:
+            self.save_in(held)
+        return Path(folder)
+
+    def save_in(self, folder: ResultsFolder) -> None:
+        """Write what `save` writes into a folder that is held already."""
+        with folder.replaced() as new:
+            self.write_files(new)
+
+    def write_files(self, folder: Path) -> None:
+        """Write the files that `save` writes."""
+        data = self.data if self.data_file else None
         if data is not None:
             write_results(data, folder / self.data_file)
         write_json(folder / self.values_file, self.to_dict())
-        return folder
 
 
 class KeptResult(Result):
     """What a study of many runs gives: it stands in a folder, with the table of all runs."""
 
+    kept_as = STUDY_OF_RUNS
     folder: Path
 
     @property
@@ -139,13 +157,26 @@ class KeptResult(Result):
         return read_data(self.table)
 
     def save(self, folder: str | Path) -> Path:
-        """Copy the tables and the plain values into another folder; see `Result.save`."""
-        target = Path(folder)
-        for name in dict.fromkeys((self.table.name, CSV, self.values_file)):
-            if (self.folder / name).is_file() and target.resolve() != self.folder.resolve():
-                with whole_file(target / name) as unfinished:
-                    shutil.copyfile(self.folder / name, unfinished)
-        return target
+        """Copy the study, its tables and the plain values into another folder; see `Result.save`."""
+        return Path(folder) if Path(folder).resolve() == self.folder.resolve() else super().save(folder)
+
+    @contextmanager
+    def added(self) -> Iterator[Path]:
+        """A folder to write more files to, which become part of the study's results.
+
+        Raises
+        ------
+        OutputError
+            They cannot be written.
+        """
+        with hold_folder(self.folder, self.kept_as, remedy=GO_ON) as held, held.amended() as new:
+            yield new
+
+    def write_files(self, folder: Path) -> None:
+        """Copy the files that `save` copies."""
+        for name in dict.fromkeys((STUDY, self.table.name, CSV, self.values_file)):
+            if (self.folder / name).is_file():
+                shutil.copyfile(self.folder / name, folder / name)
 
 
 R_co = TypeVar("R_co", bound=Result, covariant=True)
@@ -186,6 +217,11 @@ class Study(ABC, Generic[R_co]):
         OutputError
             The folder cannot be written any more; what was written stays, and the same call goes on from there.
         """
+
+
+def hold_for(folder: str | Path | None, kind: str) -> AbstractContextManager[ResultsFolder | None]:
+    """A folder held for results of a kind, as `hold_folder` does; None where none is given."""
+    return nullcontext() if folder is None else hold_folder(Path(folder), kind)
 
 
 def no_workers(workers: Workers | None, why: str) -> None:

@@ -43,13 +43,12 @@ def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    file, other = (folder / name for name in ((RESULTS, UNFINISHED) if finished else (UNFINISHED, RESULTS)))
+    file = folder / (RESULTS if finished else UNFINISHED)
     schema, held = _schema(journal), min(_HELD, _GROUP)
     pieces = _pieces(journal, held)
     with whole_file(file, remedy=GO_ON) as unfinished, pq.ParquetWriter(unfinished, schema) as writer:
         while group := list(islice(pieces, _GROUP // held)):
             writer.write_table(pa.concat_tables(group).combine_chunks(), row_group_size=_GROUP)
-    other.unlink(missing_ok=True)
     if finished:
         _write_csv(file, folder / CSV)
     return file

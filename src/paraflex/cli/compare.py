@@ -11,7 +11,7 @@ from paraflex.cli.commands.runs import CompareRequest
 from paraflex.cli.compare_tables import print_comparison
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.motion import own_motion, start_of
-from paraflex.cli.replacing import say_replaced
+from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     at_fault,
     find_mode,
@@ -19,13 +19,14 @@ from paraflex.cli.request import (
     flagged,
     of_assembly,
     plan_study,
-    results_folder,
 )
 from paraflex.cli.tables import plain_console
+from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import AssemblyError, InputError
 from paraflex.files import Model, load
+from paraflex.folders import COMPARISON, ResultsFolder
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
 from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_case, tracking_case
@@ -33,13 +34,24 @@ from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_ca
 
 def compare_command(request: CompareRequest) -> int:
     """Run all methods, write what they took and how far off they are; the exit code."""
-    console = plain_console(stderr=True)
     model = load(request.model.name)
     options, methods = _options(request), _methods(request)
     # Every check that needs no computing comes before the first minute is spent.
     mode = _mode(model, request)
-    folder = results_folder(request.out)
-    say_replaced(folder, "comparison of methods")
+    with hold_results(request.out, COMPARISON, force=request.force) as folder:
+        return _compare(request, model, mode, methods, options, folder)
+
+
+def _compare(
+    request: CompareRequest,
+    model: Model,
+    mode: str | None,
+    methods: list[str],
+    options: ComparisonOptions,
+    folder: ResultsFolder,
+) -> int:
+    """Run all methods in a mode, None without a path; write results into a folder that is held."""
+    console = plain_console(stderr=True)
     compile_kernels_for(model.mechanism, console.print)
     began = time.perf_counter()
     if mode is None:
@@ -51,17 +63,16 @@ def compare_command(request: CompareRequest) -> int:
     asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
     study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
     with counting(console) as report:
-        comparison = study.run(folder, on_progress=report)
+        comparison = study.run(on_progress=report)
     summary = comparison.to_dict()
     if comparison.measurements:
-        from paraflex.plots import save_figures
-
-        save_figures(summary, folder / "figures")
+        comparison.save_in(folder)
+        write_drawn(summary, folder)
 
     def show(out: Console) -> None:
         print_comparison(out, summary)
         if comparison.measurements:
-            say_where(began, "numbers and figure", folder)
+            say_where(began, "numbers and figure", folder.path)
 
     tell(summary, show, as_json=request.json, doubts=())
     done = any(run.status == "complete" for run in comparison.measurements)

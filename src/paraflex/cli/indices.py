@@ -31,7 +31,8 @@ def indices_command(request: IndicesRequest) -> int:
         console.print(f"interrupted; so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return signals.exit_code()
     numbers = result.to_dict()
-    save_figures(numbers, request.folder / "figures")
+    with result.added() as new:
+        save_figures(numbers, new / "figures")
     verdict = study.sweep.setting.verdict()
 
     def show(out: Console) -> None:

@@ -17,19 +17,19 @@ from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, say_where, tell
-from paraflex.cli.replacing import say_replaced
+from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     UNBALANCED,
     at_fault,
     of_assembly,
-    results_folder,
 )
-from paraflex.cli.tables import FINISHED, validity
+from paraflex.cli.tables import FINISHED, plain_console, validity
 from paraflex.cli.writing import write_run
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
 from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning, ValidityWarning
 from paraflex.files import Model, StudyDefaults
+from paraflex.folders import RUN, ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion
@@ -64,11 +64,22 @@ def run_motion(
             value=request.after,
             remedy="leave it out",
         )
-    folder = results_folder(request.out)
-    say_replaced(folder, "run")
+    with hold_results(request.out, RUN, force=request.force) as folder:
+        return _run_held(request, replace(model, study=study), mechanism, options, how, folder)
+
+
+def _run_held(
+    request: RunRequest,
+    model: Model,
+    mechanism: Mechanism,
+    options: IntegrationOptions,
+    how: dict[str, Any],
+    folder: ResultsFolder,
+) -> int:
+    console, study = plain_console(stderr=True), model.study
     compile_kernels_for(mechanism, console.print)
     began = time.perf_counter()
-    run = _simulate(console, replace(model, study=study), mechanism, options, balanced=request.balanced)
+    run = _simulate(console, model, mechanism, options, balanced=request.balanced)
     parameters = {
         "model": dict(model.parameters),
         "run": {"mechanism": model.source, "duration": study.duration, "samples": study.samples} | how,
@@ -80,7 +91,7 @@ def run_motion(
 
     def show(out: Console) -> None:
         _report(out, summary, data)
-        say_where(began, "results, figures", folder, report=request.report)
+        say_where(began, "results, figures", folder.path, report=request.report)
 
     tell(summary, show, as_json=request.json)
     finished = run.solution.status in FINISHED

@@ -3,54 +3,71 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from paraflex.cli.tables import plain_console
+from paraflex.folders import (
+    COMPARISON,
+    KINDS,
+    MANIFEST,
+    SENSITIVITY,
+    STUDY_OF_RUNS,
+    ResultsFolder,
+    foreign_files,
+    hold_folder,
+    kind_of_folder,
+)
 from paraflex.writing import read_json
 
-# Beside the files of numbers all commands write these.
-_DRAWN = ("figures", "report.html")
-# Files of each kind of results, that which tells of it first. A sweep has a summary.json besides.
-_FILES = {
-    "sweep": ("study.json", "results.parquet"),
-    "verification": ("verify.json", "verify.nc"),
-    "comparison of methods": ("compare-methods.json",),
-    "sensitivity": ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
-    "run": ("summary.json", "results.nc"),
-}
+# Foreign files that are named.
+_NAMED = 3
 
 
-def say_replaced(folder: Path, kind: str) -> None:
-    """Say on stderr which results of a folder a command is about to replace; nothing where it replaces none.
+@contextmanager
+def hold_results(out: str | Path, kind: str, *, force: bool, field: str = "--out") -> Iterator[ResultsFolder]:
+    """A folder held for the results of a command: what it is about to replace is said on stderr.
 
     Parameters
     ----------
-    folder : Path
+    out : str or Path
     kind : str
-        Of the results that the command writes: "run", "verification", "comparison of methods" or "sensitivity".
+        See `paraflex.folders.KINDS`.
+    force : bool
+        Whether results of another kind may be replaced.
+    field : str
+        The option that names the folder.
+
+    Raises
+    ------
+    InputError, OutputError
+        See `hold_folder`.
     """
-    # Of several kinds that lie there a sweep, else that which is written.
-    order = dict.fromkeys(["sweep", kind, *_FILES])
-    there = next((one for one in order if any((folder / name).is_file() for name in _FILES[one])), None)
-    if there is None:
-        return
-    if there == kind:
-        what, how = "it will be replaced", "keeps both"
-    else:
-        files = [name for name in (*_FILES[kind], *_DRAWN) if (folder / name).exists()]
-        lost = f"its {', '.join(files)} will be replaced" if files else "its files stay"
-        what, how = f"{lost}, and a {kind} comes beside it", "keeps them apart"
-    plain_console(stderr=True).print(
-        f"{folder} holds {_described(folder, there)}; {what} (--out another folder {how})", soft_wrap=True
-    )
+    with hold_folder(Path(out), kind, force=force, field=field) as folder:
+        say_replaced(folder.path)
+        yield folder
+
+
+def say_replaced(folder: Path) -> None:
+    """Say on stderr which results of a folder a command is about to replace, and which files it leaves."""
+    kind, foreign = kind_of_folder(folder), foreign_files(folder)
+    said = []
+    if kind:
+        said.append(f"{folder} holds {_described(folder, kind)}; it will be replaced (--out another folder keeps both)")
+    if foreign:
+        more = f" and {len(foreign) - _NAMED} more" if len(foreign) > _NAMED else ""
+        said.append(f"{folder} holds files that are not of paraflex and stay: {', '.join(foreign[:_NAMED])}{more}")
+    for line in said:
+        plain_console(stderr=True).print(line, soft_wrap=True)
 
 
 def _described(folder: Path, kind: str) -> str:
-    file = next(folder / name for name in _FILES[kind] if (folder / name).is_file())
+    file = next(folder / name for name in (*KINDS[kind], MANIFEST) if (folder / name).is_file())
     when = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime))
     try:
-        text = _what(folder, kind, read_json(folder / _FILES[kind][0]))
+        text = _what(folder, kind, read_json(folder / KINDS[kind][0]))
     except (KeyError, TypeError, AttributeError):
         # Damaged, or of another version: it is replaced all the same.
         text = f"a {kind}"
@@ -59,9 +76,9 @@ def _described(folder: Path, kind: str) -> str:
 
 def _what(folder: Path, kind: str, found: dict[str, Any]) -> str:
     """What the first file of some results tells of them."""
-    if kind == "sensitivity":
+    if kind == SENSITIVITY:
         return f'sensitivities "{found["name"]}"'
-    if kind == "sweep":
+    if kind == STUDY_OF_RUNS:
         searched = read_json(folder / "result.json").get("kind", "sweep")
         kind = "study of indices" if (folder / "indices.json").is_file() else searched
         article = "an" if kind[0] in "aeiou" else "a"
@@ -72,7 +89,7 @@ def _what(folder: Path, kind: str, found: dict[str, Any]) -> str:
 
     run = found["parameters"]["run"]
     text = f"a {kind} of {mechanism_argument(run['mechanism'])}"
-    if "path" not in run or kind == "comparison of methods":
+    if "path" not in run or kind == COMPARISON:
         return text
     modes = run["modes"]
     return f'{text} along "{run["path"]}", {"mode " + modes[0] if len(modes) == 1 else f"{len(modes)} modes"}'

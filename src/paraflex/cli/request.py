@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
-from pathlib import Path
 
 from paraflex.cli.commands.options import FramesChoice, PlanChoice
 from paraflex.cli.commands.requests import flags
@@ -15,7 +14,6 @@ from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.tracking import TrackingTask
 from paraflex.validity import to_blame
-from paraflex.writing import unwritable
 
 
 def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:
@@ -104,21 +102,3 @@ def at_fault(error: InputError, model: Model) -> InputError:
     if error.field in flags:
         return error.at(flags[error.field])
     return error.in_file(model.source)
-
-
-def results_folder(out: str) -> Path:
-    """The results folder, proved writable; nothing is left of the proof until there are results."""
-    folder = Path(out)
-    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".paraflex-writable"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise unwritable(error, "--out", "choose another folder", out) from error
-    finally:
-        for parent in made:
-            if parent.is_dir() and not any(parent.iterdir()):
-                parent.rmdir()
-    return folder

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from typing import Any
 
 from rich.console import Console
 from rich.progress import TimeElapsedColumn
@@ -18,14 +19,13 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
-from paraflex.cli.replacing import say_replaced
+from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     at_fault,
     find_modes,
     find_path,
     flagged,
     plan_study,
-    results_folder,
     with_frames,
 )
 from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of
@@ -34,7 +34,9 @@ from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import Model, load
+from paraflex.folders import RUN, ResultsFolder
 from paraflex.integrators import IntegrationOptions
+from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, finite_segments, proportional_segments
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.studies import Simulator, TrackingStudy
@@ -52,11 +54,24 @@ def run_command(request: RunRequest) -> int:
         mechanism = _without_path(model, request)
         check_stops(mechanism, options, request.stop_at)
         return run_motion(request, model, mechanism, options, console, how)
-    path, path_name = find_path(model, request.path)
+    along = find_path(model, request.path)
     modes = find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
-    folder = results_folder(request.out)
-    say_replaced(folder, "run")
+    with hold_results(request.out, RUN, force=request.force) as folder:
+        return _run_along(request, model, along, modes, options, how, folder)
+
+
+def _run_along(
+    request: RunRequest,
+    model: Model,
+    along: tuple[Path, str],
+    modes: list[ActuationMode],
+    options: IntegrationOptions,
+    how: dict[str, Any],
+    folder: ResultsFolder,
+) -> int:
+    """Run along a path, and its name; write results into a folder that is held."""
+    console, (path, path_name) = plain_console(stderr=True), along
     mechanism = asked_mechanism(model, request)
     if request.segments is None:
         check_stops(mechanism, options, request.stop_at)
@@ -89,7 +104,7 @@ def run_command(request: RunRequest) -> int:
     def show(out: Console) -> None:
         print_study(out, summary, task, _model_name(request, mechanism))
         validity(out, {name: mode.get("validity") for name, mode in summary["modes"].items()})
-        say_where(began, "results, figures", folder, report=request.report)
+        say_where(began, "results, figures", folder.path, report=request.report)
 
     tell(summary, show, as_json=request.json)
     failures(console, result)

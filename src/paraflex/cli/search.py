@@ -33,7 +33,8 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
         return signals.exit_code()
     numbers = result.to_dict()
     if not result.interrupted:
-        save_figures(numbers, request.folder / "figures")
+        with result.added() as new:
+            save_figures(numbers, new / "figures")
     verdict = study.base.setting.verdict()
 
     def show(out: Console) -> None:

@@ -12,10 +12,11 @@ from rich.table import Table
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.studies import SensitivityRequest
 from paraflex.cli.ending import tell
-from paraflex.cli.replacing import say_replaced
+from paraflex.cli.replacing import hold_results
 from paraflex.cli.tables import number, plain_table, print_titled
+from paraflex.cli.writing import write_drawn
 from paraflex.errors import InputError
-from paraflex.plots import save_figures
+from paraflex.folders import SENSITIVITY
 from paraflex.studies import Sensitivities, load_sensitivities
 from paraflex.studies.sensitivities.study import FIGURES, LINES, TABLE
 
@@ -29,10 +30,11 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     study = load_sensitivities(request.study, [name for name in named if name])
     folder = request.folder
     study = replace(study, at=_values(request.at))
-    # Told of the first path when the folder is seen to be this study's.
-    found = study.run(folder, on_progress=lambda at: None if at.done else say_replaced(folder, "sensitivity"))
-    summary = found.to_dict()
-    save_figures(summary, folder / FIGURES)
+    with hold_results(folder, SENSITIVITY, force=request.force, field="--output") as held:
+        found = study.run()
+        found.save_in(held)
+        summary = found.to_dict()
+        write_drawn(summary, held)
 
     def show(out: Console) -> None:
         for row in range(len(found.rows)):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict
-from pathlib import Path
 
 from rich.console import Console
 
@@ -12,37 +11,52 @@ from paraflex.cli.agreement import print_agreement
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import VerifyRequest
 from paraflex.cli.ending import exit_code, say_where, tell
-from paraflex.cli.replacing import say_replaced
+from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     find_mode,
     find_modes,
     find_path,
     flagged,
     plan_study,
-    results_folder,
     with_frames,
 )
 from paraflex.cli.tables import plain_console
+from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
-from paraflex.files import load
-from paraflex.mechanism import Geometry
-from paraflex.studies import FIDELITIES, Verification, VerificationOptions, VerificationStudy, check_model
+from paraflex.files import Model, load
+from paraflex.folders import VERIFICATION, ResultsFolder
+from paraflex.kinematics import Path
+from paraflex.mechanism import ActuationMode, Geometry
+from paraflex.report import verification_page
+from paraflex.studies import FIDELITIES, VerificationOptions, VerificationStudy, check_model
 
 
 def verify_command(request: VerifyRequest) -> int:
     """Run all models, write what they say of each other; the exit code."""
-    console = plain_console(stderr=True)
     model = load(request.model.name)
     path, path_name = find_path(model, request.path)
     modes = find_modes(model, request.modes) if request.modes else [find_mode(model, [])]
-    options, mechanism = _options(request), with_frames(model.mechanism, request.frames)
+    _options(request)
     models = _models(request)
     for name in models:
-        check_model(name, mechanism)
-    folder = results_folder(request.out)
-    say_replaced(folder, "verification")
+        check_model(name, with_frames(model.mechanism, request.frames))
+    with hold_results(request.out, VERIFICATION, force=request.force) as folder:
+        return _verify(request, model, (path, path_name), modes, models, folder)
+
+
+def _verify(
+    request: VerifyRequest,
+    model: Model,
+    along: tuple[Path, str],
+    modes: list[ActuationMode],
+    models: list[str],
+    folder: ResultsFolder,
+) -> int:
+    """Run all models along a path, and its name; write results into a folder that is held."""
+    console, (path, path_name) = plain_console(stderr=True), along
+    options, mechanism = _options(request), with_frames(model.mechanism, request.frames)
     for geometry in Geometry:
         if geometry is Geometry.LINEAR or "second-order" in models:
             compile_kernels(geometry, console.print)
@@ -60,12 +74,15 @@ def verify_command(request: VerifyRequest) -> int:
         verification = study.run(on_progress=report)
     summary = verification.to_dict()
     if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
-        _write(verification, summary, folder, report=request.report)
+        data = verification.data
+        assert data is not None
+        verification.save_in(folder)
+        write_drawn(data, folder, (lambda: verification_page(data, summary)) if request.report else None)
 
     def show(out: Console) -> None:
         for mode in summary["modes"]:
             print_agreement(out, summary, mode)
-        say_where(began, "numbers, figures", folder, report=request.report)
+        say_where(began, "numbers, figures", folder.path, report=request.report)
 
     tell(summary, show, as_json=request.json)
     for mode, by_model in verification.runs.items():
@@ -90,16 +107,3 @@ def _models(request: VerifyRequest) -> list[str]:
             if name not in known:
                 raise InputError(f"unknown {flag[2:]}", field=flag, value=name, remedy=suggestion(name, known))
     return list(dict.fromkeys([*(request.fidelities or FIDELITIES), *request.engines]))
-
-
-def _write(verification: Verification, summary: dict, folder: Path, *, report: bool) -> None:
-    from paraflex.plots import save_figures
-
-    verification.save(folder)
-    data = verification.data
-    assert data is not None
-    save_figures(data, folder / "figures")
-    if report:
-        from paraflex.report import save_page, verification_page
-
-        save_page(verification_page(data, summary), folder / "report.html")

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.campaign import (
+    RESULTS,
     TRAJECTORIES,
+    UNFINISHED,
+    Campaign,
     Engine,
-    Journal,
     KeptResult,
     LostWorker,
     OnProgress,
@@ -27,7 +29,6 @@ from paraflex.campaign import (
     kept_in,
     open_campaign,
     outcomes,
-    write_table,
 )
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
@@ -192,8 +193,8 @@ class SweepStudy(Study["SweepResult"]):
         if limit is not None and limit < 1:
             raise InputError("must be positive", field="--limit", value=limit, remedy="say how many runs")
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
-        with open_campaign(folder, account, table_schema(setting, self.motors)) as journal:
-            session = _Session(self, folder, journal, on_progress)
+        with open_campaign(folder, account, table_schema(setting, self.motors)) as campaign:
+            session = _Session(self, campaign, on_progress)
             interrupted = False
             if not session.complete:
                 compile_kernels_for(self.model().mechanism)
@@ -256,12 +257,12 @@ def sweep(
 class _Session:
     """One session of a sweep: what is done, and how it ended."""
 
-    def __init__(self, study: SweepStudy, folder: Path, journal: Journal, on_progress: OnProgress | None) -> None:
-        self.study, self.setting, self.folder, self.journal = study, study.setting, folder, journal
+    def __init__(self, study: SweepStudy, campaign: Campaign, on_progress: OnProgress | None) -> None:
+        self.study, self.setting, self.campaign = study, study.setting, campaign
         self.on_progress = on_progress
         self.began, self.fresh = time.perf_counter(), 0
         rows = np.zeros(study.runs // len(self.setting.modes), dtype=np.intp)
-        for number in journal.runs():
+        for number in campaign.journal.runs():
             rows[number // len(self.setting.modes)] += 1
         # Of a task that lacks a row all are made again.
         self.done: NDArray[np.bool_] = rows == len(self.setting.modes)
@@ -289,19 +290,19 @@ class _Session:
         """Write the table, and counts beside it."""
         import pyarrow.parquet as pq
 
-        file = write_table(self.folder, self.journal, finished=self.complete)
-        table = pq.read_table(file, columns=["status", VALIDITY])
-        result = SweepResult(
-            name=self.study.name,
-            folder=self.folder,
-            total=self.study.runs,
-            counts={each["values"]: each["counts"] for each in table["status"].value_counts().to_pylist()},
-            fresh=self.fresh,
-            seconds=time.perf_counter() - self.began,
-            interrupted=interrupted,
-            beyond=int(np.sum(table[VALIDITY].to_numpy() > 1.0)),
-        )
-        write_json(self.folder / result.values_file, result.to_dict(), remedy=GO_ON)
+        with self.campaign.published(finished=self.complete) as new:
+            table = pq.read_table(new / (RESULTS if self.complete else UNFINISHED), columns=["status", VALIDITY])
+            result = SweepResult(
+                name=self.study.name,
+                folder=self.campaign.folder.path,
+                total=self.study.runs,
+                counts={each["values"]: each["counts"] for each in table["status"].value_counts().to_pylist()},
+                fresh=self.fresh,
+                seconds=time.perf_counter() - self.began,
+                interrupted=interrupted,
+                beyond=int(np.sum(table[VALIDITY].to_numpy() > 1.0)),
+            )
+            write_json(new / result.values_file, result.to_dict(), remedy=GO_ON)
         return result
 
     def _tasks(self, limit: int | None) -> Iterator[Task]:
@@ -317,7 +318,7 @@ class _Session:
     def _take(self, outcome: Outcome) -> None:
         # A trajectory stands before its row does: a row without one would never be made again.
         for name, data in outcome.trajectories.items():
-            write_results(data, self.folder / TRAJECTORIES / f"{name}.nc", remedy=GO_ON)
-        self.journal.add(outcome.rows)
+            write_results(data, self.campaign.folder.path / TRAJECTORIES / f"{name}.nc", remedy=GO_ON)
+        self.campaign.journal.add(outcome.rows)
         self.done[outcome.task.number] = True
         self.fresh += len(outcome.rows)

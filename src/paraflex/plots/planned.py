@@ -39,7 +39,7 @@ class PlannedFigure:
         return f"{self.figure.name}_{self.of}" if self.of else self.figure.name
 
 
-# Of results read from JSON, what must be there for a figure.
+# What must be there for a figure besides its variables.
 _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "convergence": lambda found: any(value is not None for _, value, _ in found.get("history", ())),
     "targets_reached": lambda found: any(target["value"] != 0.0 for target in found.get("targets", ())),
@@ -47,6 +47,7 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "work_precision": lambda found: any(
         run["status"] == "complete" for method in found["methods"].values() for run in method["runs"]
     ),
+    "link_deflections": lambda found: bool(found["tip_transverse"].any()),
     "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
 
@@ -114,9 +115,8 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
         return source.designs is not None and bool(source.designs.series)
     if figure.takes == "models":
         return prototype_pair(source.data) is not None
-    if figure.name in _DRAWABLE:
-        return _DRAWABLE[figure.name](source.data)
-    return all(name in source.data for name in figure.variables)
+    there = all(name in source.data for name in figure.variables)
+    return there and (figure.name not in _DRAWABLE or _DRAWABLE[figure.name](source.data))
 
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
+from paraflex.folders import added_to
 from paraflex.plots.layout import column_width
 from paraflex.plots.planned import PlannedFigure, drawings, figures_of
 from paraflex.plots.sources import Source, kind_of_numbers
@@ -59,14 +60,15 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
         raise InputError("not the numbers of a result", field="results", remedy="give what its to_dict() returns")
     source = Source(kind, results, folder)
     written: list[Path] = []
-    for figure in figures_of(source):
-        if not figure.written_as:
-            continue
-        for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
-            one_of_many = figure.takes in ("models", "run")
-            stem = f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as
-            written += _write(drawing.draw(), [folder / f"{_file_name(stem)}.{suffix}" for suffix in ("png", "svg")])
-    return written
+    with added_to(folder) as new:
+        for figure in figures_of(source):
+            if not figure.written_as:
+                continue
+            for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
+                one_of_many = figure.takes in ("models", "run")
+                stem = _file_name(f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as)
+                written += _write(drawing.draw(), [new / f"{stem}.{suffix}" for suffix in ("png", "svg")])
+    return [folder / file.name for file in written]
 
 
 def write_figures(
@@ -111,11 +113,12 @@ def write_figures(
             remedy="add --force to write over it, or name another --output",
         )
     written: list[Path] = []
-    for drawing in drawn:
-        with column_width(style):
-            figure = drawing.draw()
-        written += _write(figure, files[drawing.stem], dpi)
-    return written
+    with added_to(folder) as new:
+        for drawing in drawn:
+            with column_width(style):
+                figure = drawing.draw()
+            written += _write(figure, [new / file.name for file in files[drawing.stem]], dpi)
+    return [folder / file.name for file in written]
 
 
 def _write(figure: Figure, files: Iterable[Path], dpi: float | None = None) -> list[Path]:

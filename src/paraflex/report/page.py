@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError
+from paraflex.folders import added_to
 from paraflex.report.film import Animation
 from paraflex.report.packing import Series
 from paraflex.writing import write_text
@@ -278,7 +279,9 @@ def save_page(page: Page, path: str | Path) -> None:
     OutputError
         It cannot be written.
     """
-    write_text(Path(path), render(page), remedy="choose another file")
+    path = Path(path)
+    with added_to(path.parent) as folder:
+        write_text(folder / path.name, render(page), remedy="choose another file")
 
 
 @cache

@@ -16,6 +16,7 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.campaign import Result
 from paraflex.errors import as_enum
 from paraflex.findings import Finding, Verdict
+from paraflex.folders import VERIFICATION
 from paraflex.results.dataset import part_of, tracking_dataset
 from paraflex.results.following import HEADLINE, ErrorSpan, Part
 from paraflex.results.formulas import rms
@@ -80,7 +81,7 @@ class Verification(Result):
         whole run.
     """
 
-    data_file = "verify.nc"
+    kept_as, data_file = VERIFICATION, "verify.nc"
     values_file = "verify.json"
     task: TrackingTask
     models: tuple[str, ...]

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, checked_arguments
-from paraflex.campaign import OnProgress, Progress, Study, Workers, no_workers
+from paraflex.campaign import OnProgress, Progress, Study, Workers, hold_for, no_workers
 from paraflex.errors import InputError, IntegrationError, NumericalError
+from paraflex.folders import COMPARISON
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.methods import Family, Method, find_method
 from paraflex.studies.cases import Case
@@ -120,6 +121,13 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
             No converged run to compare with.
         """
         no_workers(workers, "runs come one after the other")
+        with hold_for(folder, COMPARISON) as held:
+            result = self._run(on_progress)
+            if held is not None and result.measurements:
+                result.save_in(held)
+        return result
+
+    def _run(self, on_progress: OnProgress | None) -> MethodComparison:
         case, options = self.case, self.options or ComparisonOptions()
         chosen = _chosen(METHODS if self.methods is None else self.methods)
         plans = {method.name: _plan(method, options) for method in chosen}
@@ -139,7 +147,7 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
                     found.append(measurement)
         except KeyboardInterrupt:
             interrupted = True
-        result = MethodComparison(
+        return MethodComparison(
             case=case.name,
             mechanism=case.system.mechanism.name,
             duration=case.duration,
@@ -151,9 +159,6 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
             interrupted=interrupted,
             parameters=self.parameters,
         )
-        if folder is not None and found:
-            result.save(folder)
-        return result
 
 
 @checked_arguments()

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.campaign import Result
+from paraflex.folders import COMPARISON
 from paraflex.integrators import DEFAULT_METHOD, METHODS
 
 # Errors at which times are compared [m], and the one in the table.
@@ -114,7 +115,7 @@ class MethodComparison(Result):
         Kept as provenance.
     """
 
-    values_file = "compare-methods.json"
+    kept_as, values_file = COMPARISON, "compare-methods.json"
     case: str
     mechanism: str
     duration: float

@@ -14,9 +14,10 @@ from typing import Any, Protocol
 import xarray as xr
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
-from paraflex.campaign import THREADS, OnProgress, Progress, Result, Study, Workers
+from paraflex.campaign import THREADS, OnProgress, Progress, Result, Study, Workers, hold_for
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.findings import Finding
+from paraflex.folders import RUN
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import summary, tracking_dataset
@@ -48,7 +49,7 @@ class StudyResult(Result):
         Whether the user stopped it.
     """
 
-    data_file = "results.nc"
+    kept_as, data_file = RUN, "results.nc"
     values_file = "summary.json"
     dataset: xr.Dataset | None
     failed: dict[str, str]
@@ -127,6 +128,13 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
         if workers.engine != THREADS:
             raise InputError("modes run in threads", field="workers", value=workers.engine, remedy="leave it out")
         chosen = list(dict.fromkeys(self.task.mode(mode) for mode in self.modes))
+        with hold_for(folder, RUN) as held:
+            result = self._run(chosen, workers, on_progress)
+            if held is not None and result.data is not None:
+                result.save_in(held)
+        return result
+
+    def _run(self, chosen: Sequence[ActuationMode], workers: Workers, on_progress: OnProgress | None) -> StudyResult:
         stop = threading.Event()
         # The kernels release the GIL, so threads are enough; each run is the same whichever thread it is in.
         with ThreadPoolExecutor(workers.number or os.cpu_count()) as pool:
@@ -139,10 +147,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
                 # Ctrl-C reaches the main thread only; the runs hear of it at their next report and keep what they have.
                 stop.set()
         outcomes = {name: future.result() for name, future in futures.items()}
-        result = self._result(outcomes, interrupted=stop.is_set())
-        if folder is not None and result.data is not None:
-            result.save(folder)
-        return result
+        return self._result(outcomes, interrupted=stop.is_set())
 
     def _mode(
         self, mode: ActuationMode, stop: threading.Event, on_progress: OnProgress | None

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments
-from paraflex.campaign import OnProgress, Progress, Study, Workers, no_workers
+from paraflex.campaign import OnProgress, Progress, Study, Workers, hold_for, no_workers
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
 from paraflex.errors import InputError, IntegrationError, NumericalError, as_enum, suggestion
+from paraflex.folders import VERIFICATION
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import MethodField
 from paraflex.mechanism import (
@@ -109,11 +110,12 @@ class VerificationStudy(Study[Verification], CheckedFields):
                 check_dwell(name, self.task)
         chosen = list(dict.fromkeys(self.task.mode(mode) for mode in self.modes))
         runs: dict[str, dict[str, ModelRuns]] = {mode.name: {} for mode in chosen}
-        interrupted = self._do(chosen, models, runs, on_progress)
         error = as_enum(ErrorSpan, self.error, "error")
-        result = Verification(self.task, models, runs, interrupted, self.parameters, error)
-        if folder is not None:
-            result.save(folder)
+        with hold_for(folder, VERIFICATION) as held:
+            interrupted = self._do(chosen, models, runs, on_progress)
+            result = Verification(self.task, models, runs, interrupted, self.parameters, error)
+            if held is not None:
+                result.save_in(held)
         return result
 
     def _do(

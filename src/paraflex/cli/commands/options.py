@@ -29,6 +29,7 @@ StudyArgument = Annotated[str, Argument(metavar="STUDY.toml", help="What is free
 OutputOption = Annotated[
     str | None, Option("--output", "--out", metavar="DIR", help="Folder for results. Default: results/STUDY.")
 ]
+ReplaceOption = Annotated[bool, Option("--force", help="Replace results of another kind that the folder holds.")]
 ReportOption = Annotated[bool, Option("--report/--no-report", help="Write report.html, or leave it out.")]
 
 

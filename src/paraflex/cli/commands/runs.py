@@ -14,6 +14,7 @@ from paraflex.cli.commands.options import (
     ModelChoice,
     PathOption,
     PlanChoice,
+    ReplaceOption,
     ReportOption,
 )
 
@@ -83,6 +84,7 @@ class RunRequest:
         Option(metavar="free|hold", help="The active motors after the path: hold is by brakes. Default: free."),
     ] = None
     out: Annotated[str, Option(metavar="DIR", help="Folder for results and figures.")] = "results"
+    force: ReplaceOption = False
     report: ReportOption = True
     json: Json = False
 
@@ -116,6 +118,7 @@ class VerifyRequest:
     frames: FramesChoice = field(default_factory=FramesChoice)
     plan: PlanChoice = field(default_factory=PlanChoice)
     out: Annotated[str, Option(metavar="DIR", help="Folder for numbers and figures.")] = "verification"
+    force: ReplaceOption = False
     report: ReportOption = True
     json: Json = False
 
@@ -142,4 +145,5 @@ class CompareRequest:
     limit: Annotated[float | None, Option(metavar="S", help="Wall time of a run. Default: 60.")] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
     out: Annotated[str, Option(metavar="DIR", help="Folder for numbers and figure.")] = "comparison"
+    force: ReplaceOption = False
     json: Json = False

@@ -8,7 +8,15 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from paraflex.cli.commands.options import Json, OutputOption, ReportOption, StudyArgument, WorkersChoice, study_folder
+from paraflex.cli.commands.options import (
+    Json,
+    OutputOption,
+    ReplaceOption,
+    ReportOption,
+    StudyArgument,
+    WorkersChoice,
+    study_folder,
+)
 
 
 class StudyRequest:
@@ -36,6 +44,7 @@ class SensitivityRequest(StudyRequest):
     metrics: Annotated[
         list[str], Option(metavar="NAME,...", help="What is differentiated; repeatable. Default: the study's.")
     ] = field(default_factory=list)
+    force: ReplaceOption = False
     json: Json = False
 
 

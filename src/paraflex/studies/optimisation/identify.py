@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -109,10 +110,8 @@ class IdentificationStudy(DesignStudy[IdentificationResult]):
         """Look for the parameters; see `OptimisationStudy.run`."""
         folder, solution = kept_in(folder), _Solution(self)
         watch = None if on_progress is None else _watch(self, on_progress)
-        session = search(self, folder, (workers or Workers()).open, solution.solve, watch, run=run)
-        result = _result(self, folder, session, solution)
-        result.write(self)
-        return result
+        result = partial(_result, self, folder, solution)
+        return search(self, folder, (workers or Workers()).open, solution.solve, watch, run=run, result=result)
 
 
 @checked_arguments()
@@ -211,7 +210,7 @@ def _how(study: IdentificationStudy, slopes: object) -> str:
     return f"differences ({reason})" if reason else "differences"
 
 
-def _result(study: IdentificationStudy, folder: Path, session: Session, solution: _Solution) -> IdentificationResult:
+def _result(study: IdentificationStudy, folder: Path, solution: _Solution, session: Session) -> IdentificationResult:
     history, targets = session.evaluate.history, study.targets
     start, best = session.evaluate.known.get(study.start), solution.best or closest(targets, history)
     running = start is not None and start.complete

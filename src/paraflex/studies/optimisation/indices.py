@@ -109,9 +109,10 @@ class IndicesStudy(Study[IndicesResult]):
         done = self.sweep.run(folder, workers=workers, on_progress=on_progress, run=run)
         result = IndicesResult(done, _dataset(self, _indices(self, done.table) if done.complete else []))
         if done.complete:
-            write_json(result.folder / result.values_file, result.to_dict(), remedy=GO_ON)
-            with whole_file(result.table, remedy=GO_ON) as unfinished:
-                pq.write_table(pa.Table.from_pylist(result.to_dict()["indices"]), unfinished)
+            with result.added() as new:
+                write_json(new / result.values_file, result.to_dict(), remedy=GO_ON)
+                with whole_file(new / result.table.name, remedy=GO_ON) as unfinished:
+                    pq.write_table(pa.Table.from_pylist(result.to_dict()["indices"]), unfinished)
         return result
 
 

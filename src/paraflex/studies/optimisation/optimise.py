@@ -95,10 +95,8 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
         """
         folder = kept_in(folder)
         watch = _Watch(self, on_progress)
-        session = search(self, folder, (workers or Workers()).open, partial(_solve, self), watch, run=run)
-        result = _result(self, folder, session)
-        result.write(self)
-        return result
+        result, solve = partial(_result, self, folder), partial(_solve, self)
+        return search(self, folder, (workers or Workers()).open, solve, watch, run=run, result=result)
 
 
 @checked_arguments()

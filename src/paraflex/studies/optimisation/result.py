@@ -77,11 +77,11 @@ class SearchResult(KeptResult):
         listed = {"history": [list(each) for each in self.history], "reasons": list(self.reasons)}
         return {"kind": self.kind} | out | listed
 
-    def write(self, study: DesignStudy[Result]) -> None:
+    def write(self, study: DesignStudy[Result], folder: Path) -> None:
         """Write `result.json`, and the best design's mechanism where there is one."""
-        write_json(self.folder / self.values_file, self.to_dict(), remedy=GO_ON)
+        write_json(folder / self.values_file, self.to_dict(), remedy=GO_ON)
         if self.values:
-            write_best(self.folder, study, tuple(self.values.values()))
+            write_best(folder, study, tuple(self.values.values()))
 
 
 def of_session(study: DesignStudy[Result], folder: Path, session: Session, best: Evaluated | None) -> dict[str, Any]:

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from paraflex.campaign import Engine, open_campaign, write_table
+from paraflex.campaign import Engine, open_campaign
 from paraflex.campaign.study import Result
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
@@ -54,6 +54,16 @@ class Session:
     seconds: float
 
 
+class Found(Protocol):
+    """What a search finds."""
+
+    def write(self, study: DesignStudy[Result], folder: Path) -> None:
+        """Write it into a folder."""
+
+
+R = TypeVar("R", bound=Found)
+
+
 def search(
     study: DesignStudy[Result],
     folder: Path,
@@ -62,7 +72,8 @@ def search(
     on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
     *,
     run: RunTask | None = None,
-) -> Session:
+    result: Callable[[Session], R],
+) -> R:
     """Solve a study in a folder, which is held while it lasts.
 
     Parameters
@@ -78,6 +89,8 @@ def search(
         Called with each design as it is done.
     run : callable, optional
         What is done for a task: `run_task` but in tests.
+    result : callable
+        Makes the result of a session, which is written with the table.
 
     Raises
     ------
@@ -89,15 +102,17 @@ def search(
     began = time.perf_counter()
     exact = _slopes_run(study, run)
     account = study_account(study.name, study.setting, study.parameters, study.content())
-    with open_campaign(folder, account, record_schema(study, slopes=exact is not None)) as journal:
+    with open_campaign(folder, account, record_schema(study, slopes=exact is not None)) as campaign:
         compile_kernels_for(study.base.model().mechanism)
-        evaluate = Evaluate(study, journal, open_workers(), run or run_task, on_evaluated, exact)
+        evaluate = Evaluate(study, campaign.journal, open_workers(), run or run_task, on_evaluated, exact)
         try:
             stopped, interrupted = _solved(evaluate, solve), False
         except KeyboardInterrupt:
             stopped, interrupted = "interrupted", True
-        write_table(folder, journal, finished=not interrupted)
-    return Session(evaluate, stopped, interrupted, time.perf_counter() - began)
+        with campaign.published(finished=not interrupted) as new:
+            found = result(Session(evaluate, stopped, interrupted, time.perf_counter() - began))
+            found.write(study, new)
+    return found
 
 
 def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, held, no_workers, not_ours, of_another_study
+from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, hold_for, no_workers
 from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
@@ -23,9 +23,10 @@ from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, digest, make_setting
 from paraflex.errors import InputError, OutputError
 from paraflex.findings import Verdict
+from paraflex.folders import SENSITIVITY
 from paraflex.mechanism.quantities import known
 from paraflex.results.summary import finite_or_none
-from paraflex.writing import read_json, whole_file
+from paraflex.writing import whole_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +66,7 @@ class Sensitivities(Result):
         What is doubtful about the design that the file describes.
     """
 
-    values_file = "sensitivity.json"
+    kept_as, values_file = SENSITIVITY, "sensitivity.json"
     name: str
     mechanism: str
     rows: tuple[tuple[str, str], ...]
@@ -145,14 +146,14 @@ class Sensitivities(Result):
             ],
         }
 
-    def save(self, folder: str | Path) -> Path:
+    def write_files(self, folder: Path) -> None:
         """Write `sensitivity.json`, and its lines as `sensitivity.csv` and `sensitivity.parquet`; see `Result.save`."""
-        target, lines = super().save(folder), self.to_frame()
-        with whole_file(target / TABLE) as unfinished:
+        super().write_files(folder)
+        lines = self.to_frame()
+        with whole_file(folder / TABLE) as unfinished:
             lines.to_csv(unfinished, index=False)
-        with whole_file(target / LINES) as unfinished:
+        with whole_file(folder / LINES) as unfinished:
             _to_parquet(lines, unfinished)
-        return target
 
     def _metric(self, i: int, j: int) -> dict[str, Any]:
         arrays = {"derivatives": self.derivatives, "relative": self.relative, "errors": self.errors}
@@ -208,12 +209,10 @@ class SensitivityStudy(Study[Sensitivities]):
             A run that cannot be made.
         """
         no_workers(workers, "one path is differentiated after the other")
-        if folder is None:
-            return self._found(on_progress)
-        with held(Path(folder)):
-            _claim(Path(folder), self.content())
+        with hold_for(folder, SENSITIVITY) as held:
             found = self._found(on_progress)
-            found.save(folder)
+            if held is not None:
+                found.save_in(held)
         return found
 
     def _found(self, on_progress: OnProgress | None) -> Sensitivities:
@@ -320,17 +319,6 @@ def _gathered(
         content=study.content(),
         verdict=study.setting.verdict(),
     )
-
-
-def _claim(folder: Path, asked: str) -> None:
-    """Check that the folder is empty or holds what the same study wrote."""
-    ours = {Sensitivities.values_file, TABLE, LINES, FIGURES, ".lock"}
-    others = {entry.name for entry in folder.iterdir()} - ours
-    if others:
-        raise not_ours(folder, others)
-    file = folder / Sensitivities.values_file
-    if file.exists() and read_json(file).get("content") != asked:
-        raise of_another_study(folder)
 
 
 def _to_parquet(lines: Any, file: Path) -> None:

@@ -1,0 +1,268 @@
+"""Kill every command at its changes of files and at any time, look at what it left, and run it again.
+
+    python benchmarks/kills.py [--kills 100] [--seed 0] [--only sweep ...]
+
+Each kill is in a process of its own: before its nth change of a file in the results folder (opening for writing,
+renaming, removing, making and removing folders), or, every second one, at a random time by SIGKILL, also within SQLite.
+Every third command is killed over results that are there. It counts
+
+- silent: a reader takes a file that is not the one its folder's manifest lists, or results of two runs are mixed,
+- error: the same command again does not end well, or a raw exception is shown,
+- differs: what it leaves is not what a command leaves that nobody killed; wall times aside,
+- left: files that nobody lists.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+CHANGES = {"open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "sqlite3.connect"}
+KILLED = -signal.SIGKILL
+STUDY = """
+name = "bars"
+mechanism = "five_bar"
+paths = ["square"]
+modes = ["++"]
+metrics = ["tracking_rms"]
+duration = 0.02
+samples = 6
+trajectories = {trajectories}
+{sampling}
+[vary.thickness]
+fields = ["section.bar.thickness"]
+low = 0.004
+high = 0.006
+{more}
+"""
+SOBOL = '[sampling]\nkind = "sobol"\nnumber = 8\n'
+FILES = {
+    "sweep": STUDY.format(trajectories="true", sampling=SOBOL, more=""),
+    "optimise": STUDY.format(
+        trajectories="false", sampling="",
+        more="[objective]\nminimise = { tracking_rms = 1.0 }\n[search]\nevaluations = 12\n",
+    ),
+    "identify": STUDY.format(
+        trajectories="false", sampling="",
+        more='[[target]]\nmetric = "tracking_rms"\nvalue = 1e-6\n[search]\nevaluations = 12\n',
+    ),
+    "indices": STUDY.format(trajectories="false", sampling="", more=""),
+    "sensitivity": STUDY.format(trajectories="false", sampling="", more=""),
+}  # fmt: skip
+SHORT = ["five_bar", "--duration", "0.02", "--samples", "6"]
+LINES = {
+    "run": ["run", *SHORT, "--tol", "1e-3"],
+    "motion": ["run", "pendulum", "--duration", "0.05", "--samples", "6"],
+    "verify": ["verify", *SHORT, "--model", "rigid", "--model", "linear"],
+    "compare-methods": ["compare-methods", *SHORT, "--method", "esdirk5", "--tol", "1e-3"],
+    "sensitivity": ["sensitivity", "sensitivity.toml"],
+    "sweep": ["sweep", "sweep.toml", "--workers", "2"],
+    "optimise": ["optimise", "optimise.toml", "--workers", "2"],
+    "identify": ["identify", "identify.toml", "--workers", "2"],
+    "indices": ["indices", "indices.toml", "--samples", "8", "--workers", "2"],
+}
+MANY = ("sweep", "optimise", "identify", "indices")
+# What takes time is not the same twice; figures and the report show it.
+NOT_COMPARED = (
+    ".lock", "manifest.json", "journal.sqlite", "report.html", "compare-methods.json", "compare-methods.png",
+)  # fmt: skip
+
+
+def in_child(work: Callable[[], None], log: Path, seconds: float = 300.0, kill_after: float | None = None) -> int:
+    """Do some work in another process; its exit code, a negative signal where one ended it."""
+    child = os.fork()
+    if child == 0:
+        os.setsid()
+        opened = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        for stream in (1, 2):
+            os.dup2(opened, stream)
+        code = 1
+        try:
+            work()
+            code = 0
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(bool(end.code))
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(code)
+    until = time.monotonic() + (seconds if kill_after is None else kill_after)
+    while True:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status)
+        if time.monotonic() > until:
+            os.killpg(child, signal.SIGKILL)
+            code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            return code if kill_after is not None else -999
+        time.sleep(0.002)
+
+
+def command(line: list[str], out: Path, at: int | None = None, count: Path | None = None) -> Callable[[], None]:
+    """A command into a folder; killed before its nth change of a file there, or its changes counted into a file."""
+
+    def work() -> None:
+        from paraflex.cli.app import main
+
+        seen, inside = [0], str(out)
+
+        def hook(event: str, arguments: tuple) -> None:
+            if event not in CHANGES or (event == "open" and arguments[1] in ("r", "rb")):
+                return
+            if inside in str(arguments[0]):
+                seen[0] += 1
+                if seen[0] == at:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+        sys.addaudithook(hook)
+        sys.argv = ["paraflex", *line, "--out", str(out)]
+        try:
+            main()
+        finally:
+            if count is not None:
+                count.write_text(str(seen[0]))
+
+    return work
+
+
+def silent(folder: Path) -> str:
+    """What a reader of a folder takes for right and is not; empty where all is well."""
+    from paraflex.errors import InputError
+    from paraflex.folders import check_listed, finish_change, read_manifest
+
+    finish_change(folder)
+    manifest = read_manifest(folder)
+    if manifest is None:
+        return ""
+    for name in manifest.files:
+        if not (folder / name).is_file():
+            return f"{name} is listed and missing"
+        try:
+            check_listed(folder / name)
+        except InputError as error:
+            return str(error)
+    listed = {*manifest.files, "manifest.json"}
+    stray = [each.name for each in folder.iterdir() if each.is_file() and each.name not in listed]
+    numbers = [name for name in stray if name.endswith((".nc", ".parquet", ".json", ".html")) and name != "study.json"]
+    return f"not listed: {numbers}" if numbers else ""
+
+
+def content(folder: Path) -> dict[str, object]:
+    """What a folder of results holds, by file; wall times aside."""
+    import xarray as xr
+
+    from paraflex.results import open_results
+
+    found: dict[str, object] = {}
+    for file in sorted(each for each in folder.rglob("*") if each.is_file()):
+        name = file.relative_to(folder).as_posix()
+        if name.startswith("figures/"):
+            found[name] = None
+        elif file.suffix == ".nc":
+            data: xr.Dataset = open_results(file)
+            data = data.drop_vars([each for each in data.variables if "wall" in str(each)])
+            found[name] = (
+                data.sizes,
+                {str(k): v.values.tobytes() for k, v in data.variables.items() if v.dtype != object},
+            )
+        elif file.name in ("summary.json", "verify.json") and not (folder / "study.json").exists():
+            found[name] = without_times(json.loads(file.read_text(encoding="utf-8")))
+        elif file.name not in NOT_COMPARED:
+            found[name] = file.read_bytes()
+    return found
+
+
+def without_times(value: object) -> object:
+    """Plain values without wall times and the digest over them."""
+    if isinstance(value, dict):
+        return {key: without_times(one) for key, one in value.items() if "wall" not in key and key != "digest"}
+    return [without_times(one) for one in value] if isinstance(value, list) else value
+
+
+def attack(name: str, place: Path, kills: int, chance: random.Random) -> Counter[str]:
+    """Kill a command many times; how it went."""
+    line, log, counted = LINES[name], place / "log", place / "count"
+    whole = place / f"{name}-whole"
+    began = time.perf_counter()
+    code = in_child(command(line, whole, count=counted), log)
+    seconds = time.perf_counter() - began
+    if code != 0:
+        sys.exit(f"{name} does not run:\n{log.read_text()}")
+    changes, expected = int(counted.read_text()), content(whole)
+    steps = [1 + (i * changes) // kills for i in range(kills)]
+    told: Counter[str] = Counter(changes=changes)
+    for i, at in enumerate(steps):
+        out = place / f"{name}-{i}"
+        again = i % 3 == 2
+        if again:
+            shutil.copytree(whole, out)
+        if i % 2:
+            code = in_child(command(line, out), log, kill_after=chance.uniform(0.0, 1.1 * seconds))
+        else:
+            code = in_child(command(line, out, at=at), log)
+        told["killed"] += code == KILLED
+        problem = silent(out) if out.exists() else ""
+        if problem:
+            report(told, "silent", f"{name}, kill {i}: {problem}")
+        code = in_child(command(line, out), log)
+        if code != 0 or "Traceback" in log.read_text():
+            report(told, "error", f"{name}, kill {i}: exit code {code}\n{log.read_text()}")
+        elif (found := content(out)) != expected:
+            files = [each for each in {*found, *expected} if found.get(each, 0) != expected.get(each, 0)]
+            report(told, "differs", f"{name}, kill {i}: {sorted(files)}")
+        left = [each.name for each in out.iterdir() if each.name in (".new", ".ready") or each.suffix == ".part"]
+        if left:
+            report(told, "left", f"{name}, kill {i}: {left}")
+        shutil.rmtree(out)
+    return told
+
+
+def report(told: Counter[str], what: str, text: str) -> None:
+    """Count a failure and print it."""
+    told[what] += 1
+    print(f"{what}: {text}", flush=True)
+
+
+def main() -> None:
+    """Kill all commands, and print a table of what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kills", type=int, default=100, help="of each command")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", nargs="*", choices=LINES, default=list(LINES))
+    asked = parser.parse_args()
+    # Imported once, not in every child.
+
+    import paraflex.cli.app
+    import paraflex.plots
+    import paraflex.report
+    import paraflex.studies  # noqa: F401
+
+    heads = ("changes", "killed", "silent", "error", "differs", "left")
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        for name, text in FILES.items():
+            Path(f"{name}.toml").write_text(text, encoding="utf-8")
+        for name in asked.only:
+            began = time.perf_counter()
+            told = attack(name, Path(folder), asked.kills, random.Random(f"{asked.seed} {name}"))
+            rows.append((name, *(told[head] for head in heads), f"{time.perf_counter() - began:.0f} s"))
+            print(*rows[-1], flush=True)
+    print("\n" + "".join(f"{head:>16}" for head in ("command", *heads, "took")))
+    for row in rows:
+        print("".join(f"{cell!s:>16}" for cell in row))
+    sys.exit(any(sum(row[3:7]) for row in rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,241 @@
+"""Folders of results are replaced whole or not at all, whenever the writer is killed; foreign files are noticed."""
+
+import json
+import os
+import shutil
+import sys
+
+import pytest
+
+from paraflex.errors import InputError, OutputError
+from paraflex.folders import (
+    COMPARISON,
+    MANIFEST,
+    RUN,
+    STUDY_OF_RUNS,
+    added_to,
+    check_listed,
+    files_of,
+    foreign_files,
+    hold_folder,
+    kind_of_folder,
+    lock_folder,
+    read_manifest,
+)
+
+BEFORE = {"results.nc": "old", "summary.json": "old", "figures/a.png": "old", "figures/b.png": "old"}
+AFTER = {"results.nc": "new", "summary.json": "new", "figures/b.png": "new", "figures/c.png": "new"}
+CHANGES = {"open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "shutil.rmtree"}
+
+
+def write(folder, files):
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
+def replace(folder, files, kind=RUN, **options):
+    with hold_folder(folder, kind, **options) as held, held.replaced() as new:
+        write(new, files)
+
+
+def ours(folder):
+    return {name: (folder / name).read_text() for name in files_of(folder)}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    replace(tmp_path / "out", BEFORE)
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    (tmp_path / "out" / "figures" / "mine.png").write_text("mine")
+    return tmp_path / "out"
+
+
+def killed_at(change, work):
+    """Whether work in another process was killed at its nth change of a file."""
+    child = os.fork()
+    if child == 0:
+        left = [change]
+
+        def count(event, arguments):
+            if event in CHANGES and not (event == "open" and arguments[1] in ("r", "rb")):
+                left[0] -= 1
+                if left[0] == 0:
+                    os._exit(9)
+
+        sys.addaudithook(count)
+        work()
+        os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")
+def test_killed_at_any_change_of_a_file_the_results_are_the_old_or_the_new_ones(folder, tmp_path):
+    found, change = [], 1
+    while True:
+        copy = tmp_path / str(change)
+        shutil.copytree(folder, copy)
+        if not killed_at(change, lambda: replace(copy, AFTER)):  # noqa: B023
+            break
+        assert kind_of_folder(copy) == RUN
+        found.append(ours(copy))
+        assert found[-1] in (BEFORE, AFTER), change
+        for name in found[-1]:
+            check_listed(copy / name)
+        assert foreign_files(copy) == ["figures/mine.png", "notes.txt"]
+        replace(copy, AFTER)
+        assert ours(copy) == AFTER
+        assert not [each for each in copy.iterdir() if each.name in (".new", ".ready")]
+        change += 1
+    assert ours(copy) == AFTER
+    assert found.index(AFTER) > 5
+    assert len(found) - found.index(AFTER) > 5
+    assert found == [BEFORE] * found.index(AFTER) + [AFTER] * (len(found) - found.index(AFTER))
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
+def test_broken_off_it_leaves_what_was_there(folder, error):
+    def broken_off():
+        with hold_folder(folder, RUN) as held, held.replaced() as new:
+            write(new, {"results.nc": "new"})
+            raise error
+
+    with pytest.raises((KeyboardInterrupt, OutputError)) as raised:
+        broken_off()
+    if isinstance(error, OSError):
+        said = f"{folder}: cannot be written (no space left on device); choose another folder"
+        assert str(raised.value) == said
+    assert ours(folder) == BEFORE
+    assert not (folder / ".new").exists()
+
+
+def test_ctrl_c_waits_until_all_files_are_in_their_place(folder, monkeypatch):
+    import paraflex.folders as module
+
+    put, calls = module._put, []
+
+    def broken_off(ready, target):
+        calls.append(ready)
+        if len(calls) == 1:
+            (ready / "results.nc").replace(target / "results.nc")
+            raise KeyboardInterrupt
+        put(ready, target)
+
+    monkeypatch.setattr(module, "_put", broken_off)
+    with pytest.raises(KeyboardInterrupt):
+        replace(folder, AFTER)
+    assert ours(folder) == AFTER
+
+
+def test_errors_name_the_folder_and_not_that_within(folder):
+    with pytest.raises(OutputError) as raised, hold_folder(folder, RUN) as held, held.replaced() as new:
+        raise OutputError("cannot be written (no)", field=str(new / "results.nc"))
+    assert raised.value.field == str(folder / "results.nc")
+
+
+def test_results_of_another_kind_need_force(folder):
+    with pytest.raises(InputError, match=r"^--out: the folder holds other results, a run .* or say --force"):
+        replace(folder, {"compare-methods.json": "new"}, COMPARISON, force=False, field="--out")
+    with pytest.raises(InputError, match=r"^folder: the folder holds other results, a run .*; name another folder$"):
+        replace(folder, {"compare-methods.json": "new"}, COMPARISON)
+    assert ours(folder) == BEFORE
+    replace(folder, {"compare-methods.json": "new"}, COMPARISON, force=True)
+    assert ours(folder) == {"compare-methods.json": "new"}
+    assert foreign_files(folder) == ["figures", "notes.txt"]
+
+
+def test_the_same_results_leave_all_as_it_is(folder):
+    with added_to(folder / "figures") as new:
+        write(new, {"later.png": "later"})
+    replace(folder, BEFORE)
+    assert ours(folder) == BEFORE | {"figures/later.png": "later"}
+    replace(folder, AFTER)
+    assert ours(folder) == AFTER
+
+
+def test_the_same_results_mend_a_damaged_file(folder):
+    (folder / "results.nc").write_text("0ld")
+    with pytest.raises(InputError, match=r"results\.nc: not the file that the manifest beside it lists"):
+        check_listed(folder / "results.nc")
+    replace(folder, BEFORE)
+    check_listed(folder / "results.nc")
+
+
+def test_figures_are_added_where_there_are_results_and_written_where_there_are_none(folder, tmp_path):
+    identity = read_manifest(folder).identity
+    with added_to(folder / "figures") as new:
+        assert new != folder / "figures"
+        write(new, {"d.png": "d"})
+    assert files_of(folder).keys() == {*BEFORE, "figures/d.png"}
+    assert read_manifest(folder).identity == identity
+    with added_to(tmp_path / "elsewhere") as new:
+        assert new == tmp_path / "elsewhere"
+
+
+def test_while_the_runs_of_a_study_go_on_a_report_is_written_beside_them(tmp_path):
+    replace(tmp_path / "out", {"results.csv": "old"}, STUDY_OF_RUNS)
+    with hold_folder(tmp_path / "out", STUDY_OF_RUNS) as held:
+        with added_to(tmp_path / "out") as new:
+            assert new == tmp_path / "out"
+            write(new, {"report.html": "of some runs"})
+        with held.replaced() as new:
+            write(new, {"results.csv": "new"})
+    assert ours(tmp_path / "out") == {"results.csv": "new"}
+    assert not (tmp_path / "out" / "report.html").exists()
+
+
+def test_a_file_of_other_results_is_noticed(folder, tmp_path):
+    replace(tmp_path / "other", AFTER)
+    shutil.copyfile(tmp_path / "other" / "summary.json", folder / "summary.json")
+    with pytest.raises(InputError, match=r"summary\.json: .*damaged, or of other results; copy the whole folder anew"):
+        check_listed(folder / "summary.json")
+    check_listed(folder / "notes.txt")
+
+
+@pytest.mark.parametrize("change", [lambda text: text[:-9], lambda text: text.replace("results.nc", "results.nd")])
+def test_a_damaged_manifest_is_noticed_and_replaced(folder, change):
+    text = (folder / MANIFEST).read_text()
+    (folder / MANIFEST).write_text(change(text))
+    with pytest.raises(InputError, match=r"manifest\.json: the list of the folder's files is damaged"):
+        check_listed(folder / "results.nc")
+    assert kind_of_folder(folder) == RUN
+    replace(folder, AFTER)
+    assert ours(folder) == AFTER
+
+
+def test_a_folder_of_an_earlier_release_is_known_by_its_files(tmp_path):
+    write(tmp_path, {"results.nc": "old", "summary.json": "old", "report.html": "old", "mine.txt": "mine"})
+    assert kind_of_folder(tmp_path) == RUN
+    assert foreign_files(tmp_path) == ["mine.txt"]
+    check_listed(tmp_path / "results.nc")
+    replace(tmp_path, {"results.nc": "new"})
+    assert ours(tmp_path) == {"results.nc": "new"}
+    assert foreign_files(tmp_path) == ["mine.txt"]
+
+
+def test_nothing_is_left_where_nothing_came_of_it(tmp_path):
+    with pytest.raises(ZeroDivisionError), hold_folder(tmp_path / "a" / "b", RUN):
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_writers_of_one_folder(folder):
+    with hold_folder(folder, RUN):
+        for writer in (lambda: replace(folder, AFTER), lambda: added_to(folder).__enter__()):
+            with pytest.raises(InputError, match="another process writes to it"):
+                writer()
+    assert ours(folder) == BEFORE
+
+
+def test_a_reader_finishes_what_a_killed_writer_left_or_waits_for_a_living_one(folder, monkeypatch):
+    ready = folder / ".ready"
+    write(ready, {"summary.json": "new", "removed.json": "[]"})
+    manifest = json.loads((folder / MANIFEST).read_text())
+    (ready / MANIFEST).write_text(json.dumps(manifest))
+    monkeypatch.setattr("paraflex.folders._PATIENCE", 0.1)
+    with lock_folder(folder):
+        write(ready, {"removed.json": "[]", MANIFEST: json.dumps(manifest)})
+        with pytest.raises(InputError, match="another process writes to it"):
+            check_listed(folder / "results.nc")
+    check_listed(folder / "results.nc")
+    assert not ready.exists()
