@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import sqlite3
 import sys
@@ -151,6 +152,30 @@ def test_a_killed_process_holds_nothing(tmp_path):
     with lock_folder(tmp_path) as locks:
         assert locks
     assert [each.name for each in tmp_path.iterdir()] == [".lock"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere files that are open cannot be deleted")
+def test_a_folder_that_is_deleted_in_the_middle(file, whole, tmp_path):
+    out, told = tmp_path / "out", []
+
+    def delete(progress):
+        told.append(progress)
+        if len(told) == 1:
+            shutil.rmtree(out)
+
+    with pytest.raises(OutputError, match=r"journal.sqlite: was deleted while it was written; run the same command"):
+        sweep(file, out, on_progress=delete)
+    assert sweep(file, out).table.read_bytes() == whole.table.read_bytes()
+
+
+def test_a_folder_of_others_keeps_its_files(file, tmp_path):
+    """Also those that are called as what we have not yet written; a first write that was broken off is no file."""
+    (tmp_path / "film.part").touch()
+    with pytest.raises(InputError, match="the folder holds other files"):
+        sweep(file, tmp_path)
+    assert (tmp_path / "film.part").exists()
+    (tmp_path / "film.part").rename(tmp_path / "study.json.part")
+    assert sweep(file, tmp_path).complete
 
 
 def test_a_file_system_without_locks_is_written_without(file, whole, tmp_path, monkeypatch):

@@ -1,5 +1,6 @@
 """Kernels on disk: what was compiled from other sources, or by another compiler, is never loaded."""
 
+import errno
 import gc
 import os
 import shutil
@@ -135,3 +136,45 @@ def test_workers_say_nothing_of_compiling(monkeypatch):
     for _ in range(2):
         notice.announce_compiling(said.append)
     assert said == [notice.NOTICE]
+
+
+def truncated(content):
+    return content[: len(content) // 2]
+
+
+def emptied(_):
+    return b""
+
+
+def flipped(content):
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [truncated, emptied, flipped])
+def test_a_damaged_kernel_is_compiled_anew(tmp_path, damage, ending):
+    streams(KERNELS.format(""), tmp_path)
+    # The kernel that Python calls, and no other: all of its code is in one file.
+    (file,) = tmp_path.rglob(f"dense.factor_dense_from_python*.{ending}")
+    file.write_bytes(damage(file.read_bytes()))
+    said = f"paraflex: a compiled kernel is damaged and compiled anew ({file})\n"
+    assert streams(KERNELS.format(""), tmp_path) == ("0\n", said)
+    assert streams(KERNELS.format(""), tmp_path) == ("1\n", "")
+
+
+def test_what_cannot_be_kept_is_compiled_all_the_same(tmp_path, monkeypatch):
+    said = []
+    monkeypatch.setattr(notice, "_announced", set())
+    monkeypatch.setattr(notice.LOG, "warning", said.append)
+    cache = disk_cache.KernelCache(python)
+
+    def full(self, signature, data):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(disk_cache.FunctionCache, "_save_overload", full)
+    monkeypatch.setattr(disk_cache, "make_folder", lambda place: None)
+    for _ in range(2):
+        cache._save_overload(None, None)
+    assert len(said) == 1
+    assert said[0].endswith("(no space left on device): the next process compiles anew")

@@ -139,6 +139,30 @@ def test_a_folder_that_others_can_write_to_is_not_used(tmp_path, monkeypatch):
     assert Path(named["NUMBA_CACHE_DIR"]) != own
 
 
+@pytest.mark.parametrize("place", ["file", "file/within", "locked"])
+def test_a_named_place_that_cannot_be_written_is_not_used(tmp_path, monkeypatch, caplog, place):
+    (tmp_path / "file").touch()
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "locked" and access(path, mode))
+    (tmp_path / "locked").mkdir()
+    named = {"NUMBA_CACHE_DIR": str(tmp_path / place), "XDG_CACHE_HOME": str(tmp_path)}
+    cache_folder.ensure_cache_folder(Path("/nowhere/that/can/be/written"), named)
+    assert "NUMBA_CACHE_DIR" not in named
+    (said,) = (record.getMessage() for record in caplog.records)
+    assert (
+        said == f"paraflex: NUMBA_CACHE_DIR={tmp_path / place} cannot be written: compiled kernels are kept elsewhere"
+    )
+
+
+def test_a_kernel_is_kept_elsewhere_than_in_a_file(tmp_path):
+    """As a user meets it: one line, which processes that it starts do not repeat."""
+    (tmp_path / "file").touch()
+    work = "import paraflex.kernel.dense; import subprocess, sys; subprocess.run([sys.executable, '-c', 'import paraflex'])"
+    done = run(sys.executable, "-c", work, env={"NUMBA_CACHE_DIR": str(tmp_path / "file")}, check=True)
+    assert done.stderr.count("\n") == 1
+    assert "cannot be written: compiled kernels are kept elsewhere" in done.stderr
+
+
 def test_a_place_that_numba_finds_is_left_to_it(tmp_path):
     named = {"XDG_CACHE_HOME": str(tmp_path)}
     cache_folder.ensure_cache_folder(Path("/nowhere/that/can/be/written"), named)

@@ -153,6 +153,9 @@ def _open(file: Path, how: str) -> Iterator[sqlite3.Connection]:
         if _code(error) in _DAMAGED:
             remedy = "delete this file and run the same command again: its runs are made again"
             raise OutputError(f"cannot be read ({error})", field=str(file), remedy=remedy) from error
+        if not file.exists():
+            remedy = "run the same command again: its runs are made again"
+            raise OutputError("was deleted while it was written", field=str(file), remedy=remedy) from error
         reason = "no space left on device" if _code(error) == sqlite3.SQLITE_FULL else str(error)
         raise OutputError(f"cannot be written ({reason})", field=str(file), remedy=GO_ON) from error
 
