@@ -12,7 +12,8 @@ from journals import rows_in
 from paraflex.interrupts import uninterrupted
 from processes import started, wait_until
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals")
+if os.name != "posix":
+    pytest.skip("signals", allow_module_level=True)
 PARAFLEX = (sys.executable, "-m", "paraflex")
 STUDY = """
 mechanism = "raparm_i"

@@ -157,7 +157,7 @@ def test_a_named_place_that_cannot_be_written_is_not_used(tmp_path, monkeypatch,
 def test_a_kernel_is_kept_elsewhere_than_in_a_file(tmp_path):
     """As a user meets it: one line, which processes that it starts do not repeat."""
     (tmp_path / "file").touch()
-    work = "import paraflex.kernel.dense; import subprocess, sys; subprocess.run([sys.executable, '-c', 'import paraflex'])"
+    work = "import subprocess, sys, paraflex.kernel.dense; subprocess.run([sys.executable, '-c', 'import paraflex'])"
     done = run(sys.executable, "-c", work, env={"NUMBA_CACHE_DIR": str(tmp_path / "file")}, check=True)
     assert done.stderr.count("\n") == 1
     assert "cannot be written: compiled kernels are kept elsewhere" in done.stderr

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,6 +18,9 @@ from typing import Any
 from paraflex.errors import OutputError
 
 ELSEWHERE = "choose another folder"
+# What Windows takes in no name, and the names that it keeps for devices.
+_FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
+_DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(10))}
 # Of what is gone on with where it was left.
 GO_ON = "what is written stays; free some space and run the same command again: it goes on from there"
 
@@ -106,6 +110,12 @@ def read_json(file: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
+
+
+def portable_name(text: str) -> str:
+    """A file's name on every system, of what users call modes, paths and models; the same where it is one already."""
+    name = _FORBIDDEN.sub("_", text).rstrip(". ")
+    return f"_{name}" if name.partition(".")[0].upper() in _DEVICES else name or "_"
 
 
 def unwritable(error: OSError, field: str, remedy: str, value: str | None = None) -> OutputError:
