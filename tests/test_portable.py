@@ -15,9 +15,10 @@ PACKAGE = Path(paraflex.__file__).parent
 MODULES = {"crypt", "fcntl", "grp", "posix", "pty", "pwd", "resource", "spwd", "syslog", "termios", "tty", "nis"}
 # What Windows lacks; of `os` as its documentation says.
 OF_OS = """
-    chown chroot fork forkpty getegid geteuid getgid getgroups getloadavg getpgid getpgrp getresuid getsid getuid initgroups
-    killpg lchown major makedev minor mkfifo mknod nice openpty pathconf posix_spawn pread pwrite register_at_fork
-    sched_getaffinity sched_yield setpgid setsid setuid statvfs sync sysconf tcgetpgrp ttyname uname wait3 wait4 waitid
+    chown chroot fork forkpty getegid geteuid getgid getgroups getloadavg getpgid getpgrp getresuid getsid getuid
+    initgroups killpg lchown major makedev minor mkfifo mknod nice openpty pathconf posix_spawn pread pwrite
+    register_at_fork sched_getaffinity sched_yield setpgid setsid setuid statvfs sync sysconf tcgetpgrp ttyname uname
+    wait3 wait4 waitid
     WIFEXITED WNOHANG O_CLOEXEC O_DIRECTORY O_NOFOLLOW O_NONBLOCK O_SYNC
 """
 OF_SIGNAL = """
