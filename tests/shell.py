@@ -4,30 +4,37 @@ import contextlib
 import io
 import signal
 import sys
-import time
 import traceback
 import warnings
-from subprocess import PIPE, CompletedProcess, Popen
+from subprocess import CompletedProcess
 from unittest.mock import patch
 
 from paraflex.cli.app import main
+from processes import started
+
+# Says when the time loop has begun.
+BEGUN = """
+import sys
+from paraflex.__main__ import main
+from paraflex.integrators.native import NativeRun
+start = NativeRun.start
+def begun(run):
+    start(run)
+    print("begun", file=sys.stderr, flush=True)
+NativeRun.start = begun
+main()
+"""
 
 
-def interrupted(*arguments, said=""):
-    """What a command that would take minutes says on stderr when Ctrl-C ends it; its exit code is 130.
-
-    On a busy machine the first Ctrl-C may come before Python is ready for it, or before it has said `said`.
-    """
-    for wait in (4.0, 12.0, 40.0, 100.0):
-        process = Popen([sys.executable, "-m", "paraflex", *arguments], stderr=PIPE, stdout=PIPE, text=True)
-        time.sleep(wait)
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
-        if process.returncode == 130 and said in errors:
-            break
-    assert process.returncode == 130, errors
-    assert "Traceback" not in errors
-    return errors
+def interrupted(*arguments):
+    """What a command that would take minutes says on stderr when Ctrl-C ends it in its run; its exit code is 130."""
+    with started(sys.executable, "-c", BEGUN, *arguments) as child:
+        child.until(lambda: "begun\n" in child.err)
+        child.send(signal.SIGINT)
+        done = child.end()
+    assert done.returncode == 130, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
 
 
 def paraflex(*arguments, cwd=None):

@@ -1,11 +1,9 @@
 """Drawings and films of runs: what they show, where things are in them, files of every kind, what is refused."""
 
-import os
 import re
 import signal
-import subprocess
 import sys
-import time
+import weakref
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -21,11 +19,13 @@ from paraflex.cli.app import app, main
 from paraflex.errors import InputError, OutputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
-from paraflex.plots import mechanism_drawing
-from paraflex.plots.film import FilmOptions, animate, find_encoder, plan_film
+from paraflex.plots import film_files, mechanism_drawing
+from paraflex.plots.film import FilmOptions, animate, plan_film
+from paraflex.plots.film_files import find_encoder
 from paraflex.plots.marks import block, ground_of, is_guide, zigzag
 from paraflex.plots.scene import figure_of, scale_bar, scene, select
 from paraflex.results import motion_dataset
+from processes import run, started
 
 OLD = Path(__file__).parent / "data" / "schema1.nc"
 SMALL = FilmOptions(magnify=50.0, fps=10.0, speed=0.1, size=(320, 240))
@@ -204,6 +204,38 @@ def test_a_gif_moves_and_keeps_its_ground(data, tmp_path):
     assert np.sum(np.any(pictures[0] != pictures[1], axis=-1)) > 200
 
 
+@pytest.fixture
+def drawn(data, monkeypatch):
+    """Pictures as they are asked for, two of them as the one before: copies, and how many there are at once."""
+    reduced, copies, alive, most = film_files._reduced, [], [], [0]
+
+    def kept(film, report):
+        for k, picture in enumerate(reduced(film, report)):
+            picture = copies[1].copy() if k in (2, 3) else picture
+            copies.append(picture.copy())
+            alive.append(weakref.ref(picture))
+            most[0] = max(most[0], sum(each() is not None for each in alive))
+            yield picture
+
+    monkeypatch.setattr(film_files, "_reduced", kept)
+    return copies, most
+
+
+def test_a_gif_is_what_was_drawn_and_few_pictures_are_held(data, drawn, tmp_path):
+    copies, most = drawn
+    animate(data, tmp_path / "film.gif", ["++++"], SMALL)
+    assert len(copies) == 11
+    # Pillow's own writer holds all eleven.
+    assert most[0] <= 3
+    with Image.open(tmp_path / "film.gif") as film:
+        # Those that do not move are one that lasts longer.
+        assert film.n_frames == 9
+        for k, shown in enumerate(copies[:2] + copies[4:]):
+            film.seek(k)
+            np.testing.assert_array_equal(np.asarray(film.convert("RGB")), np.asarray(shown.convert("RGB")))
+            assert film.info["duration"] == (300 if k == 1 else 100)
+
+
 def test_a_folder_of_pictures_and_one_picture(data, slider, tmp_path):
     told = []
     animate(data, tmp_path / "frames", ["++++", "+--+"], SMALL, on_progress=lambda *how_far: told.append(how_far))
@@ -270,7 +302,7 @@ def test_an_mp4_decodes_to_what_was_drawn(data, tmp_path):
     animate(data, tmp_path / "frames", ["++++"], SMALL)
     decode = [find_encoder(), "-loglevel", "error", "-i", str(tmp_path / "film.mp4"), "-f", "rawvideo",
               "-pix_fmt", "rgb24", "-"]  # fmt: skip
-    raw = subprocess.run(decode, capture_output=True, check=True).stdout
+    raw = run(*decode, text=False, check=True).stdout
     film = np.frombuffer(raw, dtype=np.uint8).reshape(-1, 240, 320, 3).astype(float)
     assert len(film) == 11
     for k in (0, 10):
@@ -368,22 +400,11 @@ def test_the_command_names_the_option_at_fault(folder, tmp_path, monkeypatch, ca
 
 
 def test_ctrl_c_ends_it_with_130_and_no_half_film(folder, tmp_path):
-    code = "from paraflex.cli.app import main; main()"
-    arguments = ["animate", str(folder), str(tmp_path / "film.gif"), "--speed", "0.0002", "--mode", "++++"]
-    process = subprocess.Popen([sys.executable, "-c", code, *arguments], stderr=subprocess.PIPE)
-    deadline = time.monotonic() + 60.0
-    while not (tmp_path / "film.gif.part").exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    told = b""
-    for _ in range(6):
-        # One that arrives in a callback of a library is lost there: as a user does, press again.
-        os.kill(process.pid, signal.SIGINT)
-        try:
-            _, told = process.communicate(timeout=10.0)
-            break
-        except subprocess.TimeoutExpired:
-            continue
-    process.kill()
-    assert process.returncode == 130
-    assert b"interrupted: nothing was written" in told
+    arguments = ["animate", folder, tmp_path / "film.gif", "--speed", "0.0002", "--mode", "++++"]
+    with started(sys.executable, "-m", "paraflex", *arguments) as child:
+        child.until((tmp_path / "film.gif.part").exists)
+        child.send(signal.SIGINT)
+        done = child.end()
+    assert done.returncode == 130
+    assert "interrupted: nothing was written" in done.stderr
     assert not list(tmp_path.iterdir())

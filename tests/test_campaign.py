@@ -2,11 +2,10 @@
 
 import json
 import os
+import shutil
 import signal
 import sqlite3
-import subprocess
 import sys
-import time
 
 import pytest
 
@@ -19,6 +18,7 @@ from paraflex.folders import lock_folder
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
 from paraflex.writing import read_json
+from processes import started
 
 STUDY = """
 mechanism = "raparm_i"
@@ -107,29 +107,17 @@ def counted():
     return run
 
 
-def start(script, *arguments, until=None):
-    """A process of its own, when it has said something."""
-    process = subprocess.Popen([sys.executable, "-c", script, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
-    if until:
-        assert process.stdout is not None
-        assert process.stdout.readline().strip() == until
-    return process
-
-
-def kill(process):
-    with process:
-        os.kill(process.pid, signal.SIGKILL)
-    assert process.returncode == -signal.SIGKILL
+def kill(child):
+    child.send(signal.SIGKILL)
+    assert child.end().returncode == -signal.SIGKILL
 
 
 @kills
 def test_a_killed_sweep_goes_on_to_the_same_table(file, whole, counted, tmp_path):
     out = tmp_path / "out"
-    process = start(SLOWLY, file, out)
-    while not rows_in(out):
-        assert process.poll() is None
-        time.sleep(0.05)
-    kill(process)
+    with started(sys.executable, "-c", SLOWLY, file, out) as child:
+        child.until(lambda: rows_in(out))
+        kill(child)
     kept = rows_in(out)
     assert 0 < kept < 64
     # No table was made, but the rows are there for reports and figures.
@@ -144,7 +132,9 @@ def test_a_killed_sweep_goes_on_to_the_same_table(file, whole, counted, tmp_path
 
 @kills
 def test_a_process_killed_in_a_commit_leaves_what_was_committed(tmp_path):
-    kill(start(HALF_A_COMMIT, tmp_path, until="half"))
+    with started(sys.executable, "-c", HALF_A_COMMIT, tmp_path) as child:
+        child.until(lambda: child.out == "half\n")
+        kill(child)
     assert (tmp_path / f"{JOURNAL}-journal").stat().st_size > 0
     assert (tmp_path / JOURNAL).stat().st_size > 1_000_000
     assert rows_in(tmp_path) == 10
@@ -154,14 +144,39 @@ def test_a_process_killed_in_a_commit_leaves_what_was_committed(tmp_path):
 
 @kills
 def test_a_killed_process_holds_nothing(tmp_path):
-    process = start(HOLDS, tmp_path, until="held")
-    said = r"another process writes to it .*wait for it, or stop it"
-    with pytest.raises(InputError, match=said), lock_folder(tmp_path):
-        pass
-    kill(process)
+    with started(sys.executable, "-c", HOLDS, tmp_path) as child:
+        child.until(lambda: child.out == "held\n")
+        says = r"another process writes to it .*wait for it, or stop it"
+        with pytest.raises(InputError, match=says), lock_folder(tmp_path):
+            pass
+        kill(child)
     with lock_folder(tmp_path) as locks:
         assert locks
     assert [each.name for each in tmp_path.iterdir()] == [".lock"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere files that are open cannot be deleted")
+def test_a_folder_that_is_deleted_in_the_middle(file, whole, tmp_path):
+    out, told = tmp_path / "out", []
+
+    def delete(progress):
+        told.append(progress)
+        if len(told) == 1:
+            shutil.rmtree(out)
+
+    with pytest.raises(OutputError, match=r"journal.sqlite: was deleted while it was written; run the same command"):
+        sweep(file, out, on_progress=delete)
+    assert sweep(file, out).table.read_bytes() == whole.table.read_bytes()
+
+
+def test_a_folder_of_others_keeps_its_files(file, tmp_path):
+    """Also those that are called as what we have not yet written; a first write that was broken off is no file."""
+    (tmp_path / "film.part").touch()
+    with pytest.raises(InputError, match="the folder holds other files"):
+        sweep(file, tmp_path)
+    assert (tmp_path / "film.part").exists()
+    (tmp_path / "film.part").rename(tmp_path / "study.json.part")
+    assert sweep(file, tmp_path).complete
 
 
 def test_a_file_system_without_locks_is_written_without(file, whole, tmp_path, monkeypatch):

@@ -1,15 +1,13 @@
 """Compiling beforehand: it covers what a study calls, and knows when it has been done."""
 
-import os
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import numba
 import numpy as np
 
+import processes
 from paraflex.compilation import are_compiled, compile_kernels
 from paraflex.kernel.plain import TESTED, VARIABLE, choose
 
@@ -72,10 +70,7 @@ print(sum(motion_forces.from_python.stats.cache_hits.values()))
 
 
 def python(*arguments: str, **environment: str) -> str:
-    done = subprocess.run(
-        [sys.executable, *arguments], capture_output=True, text=True, check=True, env={**os.environ, **environment}
-    )
-    return done.stdout.strip()
+    return processes.python(*arguments, env=environment, check=True).stdout.strip()
 
 
 def test_a_study_calls_nothing_that_was_not_compiled_beforehand():

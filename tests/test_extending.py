@@ -1,13 +1,12 @@
 """What the page on extending says is done in a copy of the package, and gives what the page says."""
 
-import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import paraflex
+import processes
 from pages import Block, apply_diff, blocks_of, check_output
 
 # The first line of a definition by name, what modules begin with, or the line between two additions.
@@ -83,10 +82,8 @@ def run(block, folder, package=None):
     else:
         assert block.language == "sh", block
         commands = [[sys.executable, "-m", *line.split()] for line in block.text.splitlines()]
-    environment = {**os.environ, "PYTHONPATH": str(package or folder), "COLUMNS": "80"}
+    environment = {"PYTHONPATH": str(package or folder), "COLUMNS": "80"}
     printed = ""
     for command in commands:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, env=environment)
-        assert done.returncode == 0, done.stderr
-        printed += done.stdout
+        printed += processes.run(*command, cwd=folder, env=environment, check=True).stdout
     return printed

@@ -1,15 +1,15 @@
 """Kernels on disk: what was compiled from other sources, or by another compiler, is never loaded."""
 
+import errno
 import gc
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import paraflex
+import processes
 from paraflex.kernel import disk_cache, notice
 from paraflex.kernel.compiling import Kernel
 
@@ -37,9 +37,7 @@ print(FOLDER)
 
 
 def python(*arguments, **environment):
-    command = [sys.executable, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env={**os.environ, **environment})
-    return done.stdout.strip().splitlines()
+    return processes.python(*arguments, env=environment, check=True).stdout.strip().splitlines()
 
 
 @pytest.fixture
@@ -119,8 +117,7 @@ SILENT = "import logging; logging.getLogger('paraflex').setLevel('ERROR')"
 
 def streams(code, place):
     """Standard output and standard error of a process with a place for its kernels."""
-    command, environment = [sys.executable, "-c", code], {**os.environ, "NUMBA_CACHE_DIR": str(place)}
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    done = processes.python("-c", code, env={"NUMBA_CACHE_DIR": str(place)}, check=True)
     return done.stdout, done.stderr
 
 
@@ -132,10 +129,52 @@ def test_that_kernels_are_compiled_is_said_once_and_only_where_they_are(tmp_path
 
 def test_workers_say_nothing_of_compiling(monkeypatch):
     said = []
-    monkeypatch.setattr(notice, "_announced", False)
+    monkeypatch.setattr(notice, "_announced", set())
     monkeypatch.setattr(notice.multiprocessing, "parent_process", lambda: "a process")
     notice.announce_compiling(said.append)
     monkeypatch.setattr(notice.multiprocessing, "parent_process", lambda: None)
     for _ in range(2):
         notice.announce_compiling(said.append)
     assert said == [notice.NOTICE]
+
+
+def truncated(content):
+    return content[: len(content) // 2]
+
+
+def emptied(_):
+    return b""
+
+
+def flipped(content):
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [truncated, emptied, flipped])
+def test_a_damaged_kernel_is_compiled_anew(tmp_path, damage, ending):
+    streams(KERNELS.format(""), tmp_path)
+    # The kernel that Python calls, and no other: all of its code is in one file.
+    (file,) = tmp_path.rglob(f"dense.factor_dense_from_python*.{ending}")
+    file.write_bytes(damage(file.read_bytes()))
+    said = f"paraflex: a compiled kernel is damaged and compiled anew ({file})\n"
+    assert streams(KERNELS.format(""), tmp_path) == ("0\n", said)
+    assert streams(KERNELS.format(""), tmp_path) == ("1\n", "")
+
+
+def test_what_cannot_be_kept_is_compiled_all_the_same(tmp_path, monkeypatch):
+    said = []
+    monkeypatch.setattr(notice, "_announced", set())
+    monkeypatch.setattr(notice.LOG, "warning", said.append)
+    cache = disk_cache.KernelCache(python)
+
+    def full(self, signature, data):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(disk_cache.FunctionCache, "_save_overload", full)
+    monkeypatch.setattr(disk_cache, "make_folder", lambda place: None)
+    for _ in range(2):
+        cache._save_overload(None, None)
+    assert len(said) == 1
+    assert said[0].endswith("(no space left on device): the next process compiles anew")

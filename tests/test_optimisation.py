@@ -2,9 +2,7 @@
 
 import json
 import signal
-import subprocess
 import sys
-import time
 import tomllib
 from contextlib import ExitStack
 
@@ -26,6 +24,7 @@ from paraflex.studies import load_optimisation, optimise
 from paraflex.studies.optimisation.evaluate import Evaluate
 from paraflex.studies.optimisation.problem import DesignProblem
 from paraflex.studies.optimisation.slopes import differences, slopes_of
+from processes import started
 from shell import paraflex
 
 OBJECTIVE = """
@@ -510,16 +509,14 @@ def test_control_c_keeps_what_is_done(tmp_path):
     text = STUDY.replace("duration = 0.15", "duration = 0.7").replace("line", "square") + OBJECTIVE
     text = text.replace("1e-4", "1e-5") + '[search]\nevaluations = 5000\nmethod = "differential-evolution"\n'
     file, out = write_study(tmp_path, text), tmp_path / "out"
-    command = [sys.executable, "-W", "error", "-m", "paraflex", "optimise", str(file), "--output", str(out)]
-    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    until = time.monotonic() + 60.0
-    while not rows_in(out) and time.monotonic() < until:
-        time.sleep(0.1)
-    running.send_signal(signal.SIGINT)
-    said, complained = running.communicate(timeout=60)
-    assert running.returncode == 130, complained
-    assert "interrupted" in said
-    assert "objective" in said
-    assert "the same command goes on from there" in complained
+    command = [sys.executable, "-W", "error", "-m", "paraflex", "optimise", file, "--output", out]
+    with started(*command) as child:
+        child.until(lambda: rows_in(out))
+        child.send(signal.SIGINT)
+        done = child.end()
+    assert done.returncode == 130, done.stderr
+    assert "interrupted" in done.stdout
+    assert "objective" in done.stdout
+    assert "the same command goes on from there" in done.stderr
     assert len(pd.read_parquet(out / "unfinished.parquet")) > 0
     assert json.loads((out / "result.json").read_text())["interrupted"]

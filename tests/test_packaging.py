@@ -1,9 +1,7 @@
 """What is shipped: contents and metadata of wheel and source distribution, the command, completion, citation."""
 
 import email
-import os
 import re
-import subprocess
 import sys
 import tarfile
 import tomllib
@@ -11,6 +9,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+
+from processes import python, run
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -21,8 +21,7 @@ NAME = f"paraflex-{PROJECT['version']}"
 def built(tmp_path_factory):
     """Wheel and source distribution, made without a network."""
     folder = tmp_path_factory.mktemp("dist")
-    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = python("-m", "build", "--no-isolation", "--outdir", folder, ROOT)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
@@ -51,7 +50,7 @@ def test_metadata_of_the_wheel(wheel):
     extras = set(metadata.get_all("Provides-Extra") or [])
     assert extras == set(PROJECT["optional-dependencies"])
     entry_points = wheel.read(f"{NAME}.dist-info/entry_points.txt").decode()
-    assert "paraflex = paraflex.cli.app:main" in entry_points
+    assert "paraflex = paraflex.__main__:main" in entry_points
 
 
 def test_all_extras_but_that_of_developers_are_in_all():
@@ -106,15 +105,11 @@ def test_completion_of_commands_and_options():
 
 
 def complete(command, instruction, **words):
-    environment = {**os.environ, "_PARAFLEX_COMPLETE": instruction, **words}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = run(*command, env={"_PARAFLEX_COMPLETE": instruction, **words})
     assert not done.stderr
     return done.stdout
 
 
 def ask(arguments, folder):
-    command = [sys.executable, "-m", "paraflex", *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, env=environment)
-    assert done.returncode == 0, done.stderr
+    done = python("-m", "paraflex", *arguments, cwd=folder, env={"PYTHONPATH": str(folder)}, check=True)
     return done.stdout.strip()

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +26,7 @@ from paraflex.plots.save import write_figures
 from paraflex.plots.sources import Source, open_source
 from paraflex.results import motion_dataset, save_results, tracking_dataset
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
+from processes import python
 from test_plots import STUDIES, stays_on_the_page
 
 MADE_UP = {
@@ -420,4 +419,4 @@ def test_neither_numba_nor_kernels_are_imported(results: Path, tmp_path: Path) -
         "loaded = {'numba', 'llvmlite', 'paraflex.kernel', 'paraflex.integrators'} & set(sys.modules)\n"
         "assert not loaded, loaded\n"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    python("-c", code, check=True)

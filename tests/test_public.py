@@ -1,13 +1,12 @@
 """What a newcomer meets first: the package's names, and that the project stands alone."""
 
 import operator
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import paraflex
+from processes import python
 
 ROOT = Path(__file__).parents[1]
 
@@ -19,8 +18,7 @@ def test_import_is_light():
         "heavy = {'numba', 'scipy', 'xarray', 'matplotlib', 'pydantic', 'rich'} & set(sys.modules); "
         "assert not heavy, heavy"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    python("-c", code, check=True)
 
 
 @pytest.mark.parametrize("name", paraflex.__all__)

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -11,6 +10,7 @@ import pytest
 
 import paraflex
 from paraflex import cache_folder
+from processes import run
 
 HEAVY = ("numba", "matplotlib", "xarray", "scipy", "numpy", "netCDF4", "pydantic")
 
@@ -56,9 +56,7 @@ def python(*arguments, read_only=(), **environment):
     command = [sys.executable, *arguments]
     if read_only and os.getuid() == 0:
         command = ["unshare", "--mount", "sh", "-c", MOUNT, "sh", *map(str, read_only), *command]
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, cwd="/", env={**os.environ, **environment}
-    )
+    done = run(*command, cwd="/", env=environment)
     if done.returncode == 77 or "unshare failed" in done.stderr:
         pytest.skip("root may write anywhere, and nothing can be mounted here")
     assert done.returncode == 0, done.stderr
@@ -139,6 +137,30 @@ def test_a_folder_that_others_can_write_to_is_not_used(tmp_path, monkeypatch):
     cache_folder.ensure_cache_folder(tmp_path, named)
     tempfile.tempdir = None
     assert Path(named["NUMBA_CACHE_DIR"]) != own
+
+
+@pytest.mark.parametrize("place", ["file", "file/within", "locked"])
+def test_a_named_place_that_cannot_be_written_is_not_used(tmp_path, monkeypatch, caplog, place):
+    (tmp_path / "file").touch()
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "locked" and access(path, mode))
+    (tmp_path / "locked").mkdir()
+    named = {"NUMBA_CACHE_DIR": str(tmp_path / place), "XDG_CACHE_HOME": str(tmp_path)}
+    cache_folder.ensure_cache_folder(Path("/nowhere/that/can/be/written"), named)
+    assert "NUMBA_CACHE_DIR" not in named
+    (said,) = (record.getMessage() for record in caplog.records)
+    assert (
+        said == f"paraflex: NUMBA_CACHE_DIR={tmp_path / place} cannot be written: compiled kernels are kept elsewhere"
+    )
+
+
+def test_a_kernel_is_kept_elsewhere_than_in_a_file(tmp_path):
+    """As a user meets it: one line, which processes that it starts do not repeat."""
+    (tmp_path / "file").touch()
+    work = "import subprocess, sys, paraflex.kernel.dense; subprocess.run([sys.executable, '-c', 'import paraflex'])"
+    done = run(sys.executable, "-c", work, env={"NUMBA_CACHE_DIR": str(tmp_path / "file")}, check=True)
+    assert done.stderr.count("\n") == 1
+    assert "cannot be written: compiled kernels are kept elsewhere" in done.stderr
 
 
 def test_a_place_that_numba_finds_is_left_to_it(tmp_path):

@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import subprocess
 import sys
 import time
 
@@ -15,6 +14,7 @@ from paraflex.campaign import LostCluster, Workers
 from paraflex.designs.run import Outcome, run_task
 from paraflex.errors import InputError
 from paraflex.studies import load_sweep, sweep
+from processes import started
 
 distributed = pytest.importorskip("distributed")
 
@@ -119,24 +119,17 @@ def test_dask_with_a_worker_killed_in_the_middle(study, table, tmp_path):
 
 def test_a_cluster_that_goes_away_leaves_what_is_written(study, table, tmp_path):
     file = tmp_path / "scheduler.json"
-    dask, quiet = [sys.executable, "-m", "dask"], {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    scheduler = [*dask, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1"]
-    processes = [subprocess.Popen([*scheduler, "--scheduler-file", str(file)], **quiet)]
-    try:
-        while not (file.exists() and file.read_text().strip().endswith("}")):
-            time.sleep(0.1)
+    dask = [sys.executable, "-m", "dask"]
+    scheduler = [*dask, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", file]
+    with started(*scheduler) as child:
+        child.until(lambda: file.exists() and file.read_text().strip().endswith("}"))
         address = json.loads(file.read_text())["address"]
-        processes.append(subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-dashboard"], **quiet))
-
-        def kill_scheduler(_):
-            processes[0].kill()
-
-        with pytest.raises(LostCluster, match="run the same command again"):
-            sweep(study, tmp_path / "out", workers=Workers("dask", cluster=address), on_progress=kill_scheduler)
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
+        cluster = Workers("dask", cluster=address)
+        with (
+            started(*dask, "worker", address, "--nthreads", "1", "--no-dashboard"),
+            pytest.raises(LostCluster, match="run the same command again"),
+        ):
+            sweep(study, tmp_path / "out", workers=cluster, on_progress=lambda _: child.send(signal.SIGKILL))
     made = []
 
     def counted(setting, task, watch=None):
@@ -175,17 +168,13 @@ def test_bad_engines_say_what_to_do(study, tmp_path, asked, says):
 def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(study, tmp_path):
     file, out = tmp_path / "study.toml", tmp_path / "out"
     file.write_text(STUDY.replace("number = 12", "number = 4096"), encoding="utf-8")
-    command = [sys.executable, "-W", "error", "-m", "paraflex", "sweep", str(file), "--output", str(out)]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    ) as process:
-        while not rows_in(out):
-            assert process.poll() is None
-            time.sleep(0.05)
-        os.killpg(process.pid, signal.SIGINT)
-        said, told = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "of 8192 runs:" in said
-    assert "the same command goes on from there" in told
-    assert "Traceback" not in told
+    command = [sys.executable, "-W", "error", "-m", "paraflex", "sweep", file, "--output", out]
+    with started(*command) as child:
+        child.until(lambda: rows_in(out))
+        child.send(signal.SIGINT, group=True)
+        done = child.end()
+    assert done.returncode == 130
+    assert "of 8192 runs:" in done.stdout
+    assert "the same command goes on from there" in done.stderr
+    assert "Traceback" not in done.stderr
     assert 0 < len(pd.read_parquet(out / "unfinished.parquet")) < 8192

@@ -17,7 +17,8 @@ HEAD = """# The command line
 This page is made from the commands themselves; `paraflex COMMAND --help` says the same.
 
 Exit codes: 0 done, 1 numerical trouble (what was computed is kept and marked), 2 bad input (one line says which file,
-field and value, and what to do), 130 interrupted (what was computed is kept and marked).
+field and value, and what to do), 130 interrupted by Ctrl-C,
+143 by SIGTERM, 129 by a terminal that closes (what was computed is kept and marked).
 
 Commands of a model take its name or file as an argument or by `--mechanism`. An option takes one value; a second one
 is an error, unless its text says *repeatable*.

@@ -1,7 +1,7 @@
 """A place for compiled kernels where Numba finds none: neither beside the sources nor in the user's cache folder.
 
-Numba tries NUMBA_CACHE_DIR, the folder of the sources, and the user's cache folder, and refuses to import kernels
-where it may write to none of them: a read-only installation, run by a user without a home.
+Numba tries the folder of the sources and the user's cache folder, or NUMBA_CACHE_DIR alone where that is set, and
+refuses to import kernels where it may write to none of them: a read-only installation, run by a user without a home.
 """
 
 from __future__ import annotations
@@ -24,8 +24,14 @@ def ensure_cache_folder(sources: Path, environment: MutableMapping[str, str] = o
     environment : mapping
         Changed where a folder is named.
     """
-    if environment.get(VARIABLE) or not hasattr(os, "getuid"):
+    if not hasattr(os, "getuid"):
         return
+    if named := environment.get(VARIABLE):
+        if _can_write(Path(named)):
+            return
+        # Handed on to processes that this one starts, which say nothing then.
+        del environment[VARIABLE]
+        _warn(f"{VARIABLE}={named} cannot be written: compiled kernels are kept elsewhere")
     if not any(_can_write(folder) for folder in (sources / "__pycache__", _users(environment))):
         environment[VARIABLE] = str(_own_folder())
 
@@ -40,7 +46,13 @@ def _users(environment: MutableMapping[str, str]) -> Path:
 def _can_write(folder: Path) -> bool:
     """Whether files can be made in a folder, or the folder itself."""
     existing = next((place for place in (folder, *folder.parents) if place.exists()), None)
-    return existing is not None and os.access(existing, os.W_OK | os.X_OK)
+    return existing is not None and existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
+
+
+def _warn(text: str) -> None:
+    import logging
+
+    logging.getLogger("paraflex").warning("paraflex: %s", text)
 
 
 def _own_folder() -> Path:

@@ -21,12 +21,22 @@ from paraflex.dynamics.state import check_accelerations
 from paraflex.errors import as_enum
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
+from paraflex.interrupts import starting_processes
 from paraflex.kernel.march import march
 from paraflex.kernel.notice import LOG, announce_compiling
 from paraflex.kernel.plain import PLAIN, STATE
 from paraflex.kinematics import Line
 from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
 from paraflex.tracking import plan_tracking
+
+# What each of the processes does; first of all it sees to it that it does not outlive this one.
+_CHILD = """
+import sys
+from paraflex.interrupts import end_with_parent
+end_with_parent(sys.stdin.fileno())
+from paraflex.compilation import compile_parts
+compile_parts(sys.argv[1:])
+"""
 
 
 def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:
@@ -65,9 +75,13 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None)
     if not missing:
         return
     announce_compiling(announce)
-    command = [sys.executable, "-m", "paraflex.compilation"]
-    processes = [subprocess.Popen([*command, *share], stdout=subprocess.DEVNULL) for share in _shares(missing)]
+    processes: list[subprocess.Popen[bytes]] = []
     try:
+        for share in _shares(missing):
+            with starting_processes():
+                # They end where the other end of the pipe is closed.
+                line = [sys.executable, "-c", _CHILD, *share]
+                processes.append(subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL))
         # What a process fails to leave in the cache is compiled when it is first called.
         codes = [process.wait() for process in processes]
         if not any(codes):
@@ -75,7 +89,8 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None)
                 _stamp(geometry).touch()
     finally:
         for process in processes:
-            process.terminate()
+            process.kill()
+            process.communicate()
 
 
 def _shares(geometries: list[Geometry]) -> list[list[str]]:
@@ -118,17 +133,19 @@ def _call_plan(_: Geometry) -> None:
     plan_tracking(raparm_i(), path, samples=2).torques("++++")
 
 
+def compile_parts(parts: list[str]) -> None:
+    """Compile kernels in this process, which does nothing else: parts as `_shares` names them."""
+    # Who started this process has said so.
+    LOG.setLevel(logging.ERROR)
+    # Nothing that compiling makes is garbage before the end.
+    gc.disable()
+    for part in parts:
+        geometry, what = part.split(":")
+        _PARTS[what](Geometry(geometry))
+
+
 # The time loop takes as long as everything else together.
 _PARTS = {"time-loop": _call_time_loop, "start": _call_start, "plan": _call_plan}
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        # Who started this process has said so.
-        LOG.setLevel(logging.ERROR)
-        # Nothing that compiling makes is garbage before the end.
-        gc.disable()
-        for _given in sys.argv[1:]:
-            _name, _part = _given.split(":")
-            _PARTS[_part](Geometry(_name))
-    else:
-        compile_all_kernels()
+    compile_all_kernels()

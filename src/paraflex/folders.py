@@ -21,6 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from paraflex.errors import InputError, OutputError
+from paraflex.interrupts import uninterrupted
 from paraflex.seals import damaged
 from paraflex.writing import ELSEWHERE, read_json, unwritable, write_json
 
@@ -371,15 +372,13 @@ def foreign_files(folder: Path) -> list[str]:
 
 
 def _move(folder: Path) -> None:
-    """Put a change that is ready in its place; begun again where it was broken off, Ctrl-C waits for its end."""
+    """Put a change that is ready in its place; where it was broken off, the rest of it. Ctrl-C waits for its end."""
     ready = folder / _READY
     if not ready.is_dir():
         return
     try:
-        _put(ready, folder)
-    except KeyboardInterrupt:
-        _put(ready, folder)
-        raise
+        with uninterrupted():
+            _put(ready, folder)
     except OSError as error:
         raise unwritable(error, str(folder), ELSEWHERE) from error
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -21,6 +22,9 @@ from paraflex.seals import damaged, seal
 ELSEWHERE = "choose another folder"
 # Under which key a file of JSON has the digest of the others.
 _DIGEST = "digest"
+# What Windows takes in no name, and the names that it keeps for devices.
+_FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
+_DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(10))}
 # Of what is gone on with where it was left.
 GO_ON = "what is written stays; free some space and run the same command again: it goes on from there"
 
@@ -160,6 +164,12 @@ def read_values(file: Path, remedy: str) -> Any:
 def _digest(table: dict[str, Any]) -> str:
     text = json.dumps(table, sort_keys=True, separators=(",", ":"))
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def portable_name(text: str) -> str:
+    """A file's name on every system, of what users call modes, paths and models; the same where it is one already."""
+    name = _FORBIDDEN.sub("_", text).rstrip(". ")
+    return f"_{name}" if name.partition(".")[0].upper() in _DEVICES else name or "_"
 
 
 def unwritable(error: OSError, field: str, remedy: str, value: str | None = None) -> OutputError:

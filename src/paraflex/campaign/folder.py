@@ -82,9 +82,11 @@ def open_campaign(
         It cannot be written, or is damaged.
     """
     with hold_folder(folder, STUDY_OF_RUNS, field="--output", remedy=GO_ON) as held:
+        # All that an earlier release left where it was killed at its very first write.
+        (folder / f"{STUDY}.part").unlink(missing_ok=True)
+        _check_ours(folder)
         for left in [*folder.glob("*.part"), *folder.glob(f"{TRAJECTORIES}/*.part")]:
             left.unlink(missing_ok=True)
-        _check_ours(folder)
         said = read_study(folder / STUDY) if (folder / STUDY).exists() else study
         _check_same(folder, said, study)
         with write_journal(folder, locks=held.locks) as journal:

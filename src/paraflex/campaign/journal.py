@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import OutputError, ResultWarning, warn_user
+from paraflex.interrupts import uninterrupted
 from paraflex.writing import GO_ON, whole_file
 
 JOURNAL = "journal.sqlite"
@@ -185,7 +186,8 @@ def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
         try:
             yield journal
         finally:
-            journal.commit()
+            with uninterrupted():
+                journal.commit()
 
 
 @contextmanager
@@ -293,6 +295,9 @@ def _errors(file: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.DatabaseError as error:
+        if not file.exists():
+            remedy = "run the same command again: its runs are made again"
+            raise OutputError("was deleted while it was written", field=str(file), remedy=remedy) from error
         if _code(error) not in _UNWRITABLE:
             raise _damaged(file, str(error), _MEND) from error
         reason = "no space left on device" if _code(error) == sqlite3.SQLITE_FULL else str(error)

@@ -9,7 +9,6 @@ import logging
 import math
 import multiprocessing
 import os
-import signal
 import sys
 import threading
 import time
@@ -23,13 +22,12 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import contextmanager
-from functools import partial
 from importlib import import_module
 from itertools import islice
 from typing import Any, TypeVar
 
 from paraflex.errors import InputError, ParaflexError, suggestion
+from paraflex.interrupts import end_with_parent, starting_processes
 
 THREADS = "threads"
 PROCESSES = "processes"
@@ -124,6 +122,11 @@ class Processes(Engine):
         super().__init__(workers)
         self._pool = self._start()
 
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """See `Engine`; processes are started here."""
+        with starting_processes():
+            return super().submit(function, *arguments)
+
     def restart(self) -> None:
         """See `Engine`."""
         self._pool.shutdown(wait=False, cancel_futures=True)
@@ -138,8 +141,9 @@ class Processes(Engine):
     def _start(self) -> ProcessPoolExecutor:
         # Not forked: threads of this process may hold locks.
         context = multiprocessing.get_context("spawn")
-        deaf = partial(signal.signal, signal.SIGINT, signal.SIG_IGN)
-        return ProcessPoolExecutor(self.workers, mp_context=context, initializer=deaf)
+        with starting_processes():
+            # It starts one that keeps count of locks.
+            return ProcessPoolExecutor(self.workers, mp_context=context, initializer=end_with_parent)
 
 
 class Dask(Engine):
@@ -154,10 +158,8 @@ class Dask(Engine):
             raise InputError("Dask is not installed", field="--engine", value=DASK, remedy=remedy) from None
         self._cluster = None
         if address is None:
-            with _deaf_to_interrupts():
-                self._cluster = distributed.LocalCluster(
-                    n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
-                )
+            quiet = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
+            self._cluster = _apart(lambda: distributed.LocalCluster(n_workers=workers, threads_per_worker=1, **quiet))
         try:
             self._client = distributed.Client(address or self._cluster, timeout=_REACHED_WITHIN, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
@@ -183,7 +185,13 @@ class Dask(Engine):
         raise LostCluster(_GONE)
 
     def close(self, *, abandon: bool = False) -> None:
-        """See `Engine`."""
+        """See `Engine`; workers of our own that are told to stop need seconds for it, which nobody waits for."""
+        if abandon and self._cluster is not None:
+            threading.Thread(target=self._let_go, args=[True], daemon=True).start()
+        else:
+            self._let_go(abandon)
+
+    def _let_go(self, abandon: bool) -> None:
         self._pool.shutdown(wait=not abandon)
         self._client.close(timeout=5)
         if self._cluster is not None:
@@ -289,6 +297,21 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def _apart(start: Callable[[], T]) -> T:
+    """What a function gives that starts processes for seconds: in a thread, which Ctrl-C does not wait for."""
+    started: Future[T] = Future()
+
+    def run() -> None:
+        with starting_processes():
+            try:
+                started.set_result(start())
+            except BaseException as error:
+                started.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    return started.result()
+
+
 def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Future[Any]:
     try:
         return engine.submit(function, task)
@@ -296,16 +319,3 @@ def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Futur
         broken: Future[Any] = Future()
         broken.set_exception(error)
         return broken
-
-
-@contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Processes started within ignore Ctrl-C, which reaches all of a terminal: this one stops them."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
-from paraflex.cli import COMPLETE, INTERRUPTED
+from paraflex.cli import COMPLETE, signals
 from paraflex.cli.bars import bars, begun_late
 from paraflex.cli.commands.results import AnimateRequest
 from paraflex.cli.tables import plain_console
@@ -39,7 +39,7 @@ def animate_command(request: AnimateRequest) -> int:
         film = _drawn(console, lambda report: animate(data, output, request.modes, options, on_progress=report))
     except KeyboardInterrupt:
         console.print("interrupted: nothing was written")
-        return INTERRUPTED
+        return signals.exit_code()
     except InputError as error:
         raise _at_fault(error, request) from None
     width, height = film.size

@@ -10,11 +10,12 @@ from typing import Annotated
 
 import typer
 
-from paraflex.cli import BAD_INPUT, INTERRUPTED, TROUBLE
+from paraflex.cli import BAD_INPUT, TROUBLE
 from paraflex.cli.collected import collecting
 from paraflex.cli.commands.once import Command
 from paraflex.cli.commands.requests import with_options
 from paraflex.cli.commands.shell import COMMANDS
+from paraflex.cli.signals import exit_code
 from paraflex.errors import InputError, ParaflexError
 
 app: typer.Typer = typer.Typer(
@@ -66,9 +67,9 @@ def main() -> None:
             raise
         _complain(InputError("too long a name", field="file", value=error.filename, remedy="choose a shorter one"))
         sys.exit(BAD_INPUT)
-    except KeyboardInterrupt:
-        typer.echo("interrupted", err=True)
-        sys.exit(INTERRUPTED)
+    except KeyboardInterrupt as interrupt:
+        typer.echo(": ".join(["interrupted", *map(str, interrupt.args)]), err=True)
+        sys.exit(exit_code())
 
 
 def _start_quickly() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from paraflex.cli import COMPLETE, INTERRUPTED, TROUBLE
+from paraflex.cli import COMPLETE, TROUBLE, signals
 from paraflex.cli.tables import plain_console, warn_of
 from paraflex.findings import Finding
 
@@ -18,7 +18,7 @@ from paraflex.findings import Finding
 def exit_code(well: bool, *, interrupted: bool) -> int:
     """Of a command that did what was asked for, or not, or was interrupted."""
     if interrupted:
-        return INTERRUPTED
+        return signals.exit_code()
     return COMPLETE if well else TROUBLE
 
 

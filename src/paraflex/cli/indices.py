@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.console import Console
 
-from paraflex.cli import COMPLETE, INTERRUPTED
+from paraflex.cli import COMPLETE, signals
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import IndicesRequest
 from paraflex.cli.ending import tell
@@ -28,8 +28,8 @@ def indices_command(request: IndicesRequest) -> int:
             on_progress=lambda at: progress.update(bar, completed=at.done),
         )  # fmt: skip
     if not result.complete:
-        console.print(f"so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
-        return INTERRUPTED
+        console.print(f"interrupted; so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
+        return signals.exit_code()
     numbers = result.to_dict()
     verdict = study.sweep.setting.verdict()
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from paraflex.campaign import Progress
-from paraflex.cli import INTERRUPTED
+from paraflex.cli import signals
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.ending import exit_code, tell
@@ -30,7 +30,7 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
     result = _with_bar(console, study, request, what)
     if result.interrupted and not result.values:
         console.print("interrupted before the first design was done")
-        return INTERRUPTED
+        return signals.exit_code()
     numbers = result.to_dict()
     verdict = study.base.setting.verdict()
 
@@ -40,7 +40,8 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
 
     more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
     tell(numbers | more, show, as_json=request.json, doubts=verdict)
-    save_figures(numbers, request.folder / "figures")
+    if not result.interrupted:
+        save_figures(numbers, request.folder / "figures")
     return exit_code(bool(result.values), interrupted=result.interrupted)
 
 
@@ -74,6 +75,6 @@ def _say_end(console: Console, result: OptimisationResult | IdentificationResult
         console.print(f"a design that does not run: {reason}", soft_wrap=True)
     console.print(f"{result.fresh} designs in {result.seconds:.1f} s now")
     if result.interrupted:
-        console.print(f"so far: {result.table}; the same command goes on from there", soft_wrap=True)
+        console.print(f"interrupted; so far: {result.table}; the same command goes on from there", soft_wrap=True)
     else:
         console.print(f"every run: {result.table}; the best mechanism: {folder / 'best.toml'}", soft_wrap=True)

@@ -33,8 +33,8 @@ def sweep_command(request: SweepRequest) -> int:
 
     more = {"part": parts, "verdict": verdict.to_dict()}
     tell(_figures(result) | more, lambda _: _report(console, result), as_json=request.json, doubts=verdict)
-    if request.report and result.done and _write_report(console, folder) and not request.json:
-        console.print(f"report: {folder / REPORT}", soft_wrap=True)
+    if request.report and result.done:
+        _write_report(console, folder, result)
     return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)
 
 
@@ -50,16 +50,15 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
         return study.run(folder, workers=request.workers.chosen, on_progress=report, limit=request.limit)
 
 
-def _write_report(console: Console, folder: Path) -> bool:
-    """Whether the report is written: another Ctrl-C leaves it out."""
+def _write_report(console: Console, folder: Path, result: SweepResult) -> None:
+    """Write the report; whoever stopped the sweep does not want to wait for more."""
     from paraflex.cli.report import save_study_report
 
-    try:
-        save_study_report(folder, console)
-    except KeyboardInterrupt:
+    if result.interrupted:
         console.print(f"no report: paraflex report {folder} writes it", soft_wrap=True)
-        return False
-    return True
+        return
+    save_study_report(folder, console)
+    console.print(f"report: {folder / REPORT}", soft_wrap=True)
 
 
 def _report(console: Console, result: SweepResult) -> None:
@@ -74,7 +73,8 @@ def _report(console: Console, result: SweepResult) -> None:
     if result.complete:
         console.print(f"one table: {result.table}", soft_wrap=True)
     else:
-        console.print(f"so far: {result.table}; the same command goes on from there", soft_wrap=True)
+        stopped = "interrupted; " if result.interrupted else ""
+        console.print(f"{stopped}so far: {result.table}; the same command goes on from there", soft_wrap=True)
 
 
 def _figures(result: SweepResult) -> dict:

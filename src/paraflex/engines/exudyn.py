@@ -7,8 +7,6 @@ frame, no assumption of small slopes.
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,6 +22,7 @@ from paraflex.dynamics import System
 from paraflex.engines.cables import Cable, Columns, Ground, Link, Linkage, RigidLink, RigidState, Trajectory
 from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
 from paraflex.errors import InputError, IntegrationError, Moment
+from paraflex.interrupts import uninterrupted
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
 from paraflex.results.drawing import Drawing, drawing
 from paraflex.results.outlines import outlines
@@ -175,19 +174,6 @@ def _silent(exu: Any) -> Iterator[None]:
         exu.config.printToConsole, exu.config.suppressWarnings = before
 
 
-@contextmanager
-def _noted(interrupts: list[bool]) -> Iterator[None]:
-    """Context in which Ctrl-C is noted, not raised: in a callback Exudyn would take it for a failure of the step."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, lambda *_: interrupts.append(True))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 class _Model(NamedTuple):
     """The model in Exudyn: links; loads of each motor and their signs; multipliers of each joint."""
 
@@ -312,7 +298,7 @@ class _Recorder:
     torques: Array
     states: list[tuple[Array, Array, Array]] = field(default_factory=list)
     multipliers: list[Array] = field(default_factory=list)
-    interrupts: list[bool] = field(default_factory=list)
+    interrupts: list[int] = field(default_factory=list)
     finite: bool = True
 
     def before(self, mbs: Any, _: float) -> bool:
@@ -357,7 +343,8 @@ def _run(
     mbs.SetPreStepUserFunction(recorder.before)
     mbs.SetPostStepUserFunction(recorder.after)
     try:
-        with _noted(recorder.interrupts):
+        # Raised in a function that Exudyn calls, Ctrl-C would pass for a failure of that.
+        with uninterrupted() as recorder.interrupts:
             if solver.InitializeSolver(mbs, settings):
                 solver.SolveSteps(mbs, settings)
             solver.FinalizeSolver(mbs, settings)
@@ -366,8 +353,6 @@ def _run(
     finally:
         mbs.SetPreStepUserFunction(0)
         mbs.SetPostStepUserFunction(0)
-    if recorder.interrupts:
-        raise KeyboardInterrupt
     cause, k = cause or recorder.verdict(), len(recorder.states)
     states = np.reshape(recorder.states, (k, 3, reference.size)).swapaxes(0, 1)
     # Exudyn 1.13 has a method for the sum, GetODE2CoordinatesTotal, which corrupts memory.

@@ -1,11 +1,15 @@
 """Cache of kernels on disk: machine code of one state of the sources, made by one compiler.
 
 Numba looks at the file of a cached kernel, not at those of the kernels it calls. So each state of all kernels, of
-Numba, llvmlite and NumPy has a folder of its own, and what was compiled from another cannot be loaded.
+Numba, llvmlite and NumPy has a folder of its own, and what was compiled from another cannot be loaded. Files are
+pickles of machine code, which nothing should read that is not as it was written: each begins with a digest of the rest.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
+import pickle
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,6 +18,7 @@ from typing import Any
 
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from paraflex.kernel.notice import announce_damage, announce_no_room
 from paraflex.kernel.plain import STATE
 
 # States kept in one place: a checkout may be used by several environments, a cache in a home by several machines.
@@ -22,6 +27,47 @@ KEPT = 3
 _PREFIX = "paraflex-kernels-"
 
 FOLDER = _PREFIX + STATE
+
+
+class _Sealed(IndexDataCacheFile):
+    """The index of a kernel, signatures and the names of their files, and these; damaged ones are compiled anew."""
+
+    def _load_index(self) -> dict[Any, str]:
+        found = self._unsealed(self._index_path)
+        # The function may have been edited: those of others have no state of their own.
+        return found[1] if found is not None and found[0] == self._source_stamp else {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        self._seal(self._index_path, (self._source_stamp, overloads))
+
+    def _load_data(self, name: str) -> Any:
+        return self._unsealed(self._data_path(name))
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._seal(self._data_path(name), data)
+
+    def _seal(self, file: str, data: Any) -> None:
+        content = self._dump(data)
+        with self._open_for_write(file) as opened:
+            opened.write(_digest(content) + content)
+
+    def _unsealed(self, file: str) -> Any:
+        """What a file holds, or None; one that is damaged is removed."""
+        try:
+            content = Path(file).read_bytes()
+        except FileNotFoundError:
+            return None
+        size = len(_digest(b""))
+        if content[:size] == _digest(content[size:]):
+            return pickle.loads(content[size:])
+        announce_damage(Path(file))
+        with suppress(OSError):
+            os.unlink(file)
+        return None
+
+
+def _digest(content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=16).digest()
 
 
 class KernelCache(FunctionCache):
@@ -33,11 +79,14 @@ class KernelCache(FunctionCache):
         self._cache_path = str(self._place / FOLDER)
         # The function may stand in a file of somebody else's.
         stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
+        self._cache_file = _Sealed(self._cache_path, self._impl.filename_base, stamp)
 
     def _save_overload(self, sig: Any, data: Any) -> None:
-        make_folder(self._place)
-        super()._save_overload(sig, data)
+        try:
+            make_folder(self._place)
+            super()._save_overload(sig, data)
+        except OSError as error:
+            announce_no_room(self._place, error)
 
 
 def make_folder(place: Path) -> Path:

@@ -17,7 +17,7 @@ from paraflex.plots.planned import PlannedFigure, drawings, figures_of
 from paraflex.plots.sources import Source, kind_of_numbers
 from paraflex.plots.style import journal_style
 from paraflex.results.kinds import kind_of
-from paraflex.writing import whole_file
+from paraflex.writing import portable_name, whole_file
 
 # Files that do not depend on when they were written.
 _METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -66,7 +66,7 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
                 continue
             for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
                 one_of_many = figure.takes in ("models", "run")
-                stem = _file_name(f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as)
+                stem = portable_name(f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as)
                 written += _write(drawing.draw(), [new / f"{stem}.{suffix}" for suffix in ("png", "svg")])
     return [folder / file.name for file in written]
 
@@ -103,7 +103,7 @@ def write_figures(
     for name in formats or ("",):
         if name not in FORMATS:
             raise InputError("unknown format", field="--format", value=name, remedy=suggestion(name, FORMATS))
-    files = {drawing.stem: [folder / f"{_file_name(drawing.stem)}.{name}" for name in formats] for drawing in drawn}
+    files = {drawing.stem: [folder / f"{portable_name(drawing.stem)}.{name}" for name in formats] for drawing in drawn}
     there = [file for each in files.values() for file in each if file.exists()]
     if there and not force:
         more = f" and {len(there) - 1} more" if len(there) > 1 else ""
@@ -129,8 +129,3 @@ def _write(figure: Figure, files: Iterable[Path], dpi: float | None = None) -> l
             figure.savefig(unfinished, format=suffix, metadata=_METADATA[suffix], dpi="figure" if dpi is None else dpi)
         written.append(path)
     return written
-
-
-def _file_name(stem: str) -> str:
-    """A stem that is a valid file name, whatever the names of modes and paths."""
-    return stem.replace("/", "_").replace("\\", "_")

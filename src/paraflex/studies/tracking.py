@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -138,13 +138,15 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
         stop = threading.Event()
         # The kernels release the GIL, so threads are enough; each run is the same whichever thread it is in.
         with ThreadPoolExecutor(workers.number or os.cpu_count()) as pool:
-            futures = [pool.submit(self._mode, mode, stop, on_progress) for mode in chosen]
+            futures: dict[str, Future[TrackingRun | str | None]] = {}
             try:
-                wait(futures)
+                for mode in chosen:
+                    futures[mode.name] = pool.submit(self._mode, mode, stop, on_progress)
+                wait(futures.values())
             except KeyboardInterrupt:
                 # Ctrl-C reaches the main thread only; the runs hear of it at their next report and keep what they have.
                 stop.set()
-        outcomes = {mode.name: future.result() for mode, future in zip(chosen, futures, strict=True)}
+        outcomes = {name: future.result() for name, future in futures.items()}
         return self._result(outcomes, interrupted=stop.is_set())
 
     def _mode(

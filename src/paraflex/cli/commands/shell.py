@@ -8,10 +8,17 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, NamedTuple
 
+import typer
+
 from paraflex.cli.commands.models import InfoRequest, MethodsRequest, ModesRequest, NewRequest, SchemaRequest
 from paraflex.cli.commands.results import AnimateRequest, ExportRequest, PlotRequest, ReportRequest
 from paraflex.cli.commands.runs import CompareRequest, RunRequest, VerifyRequest
 from paraflex.cli.commands.studies import IndicesRequest, SearchRequest, SensitivityRequest, SweepRequest
+from paraflex.cli.signals import exit_code, is_taken, raised
+
+# What says how to go on with a study of many runs, and what with other commands.
+_GOES_ON = "interrupted; what is done is kept, and the same command goes on from there"
+_BEGINS = "interrupted; the same command begins anew"
 
 
 class ListedCommand(NamedTuple):
@@ -25,9 +32,20 @@ class ListedCommand(NamedTuple):
     def answer(self, request: Any) -> int | None:
         """Do what is asked for; the exit code."""
         module, _, function = self.function.partition(".")
-        return getattr(import_module(f"paraflex.cli.{module}"), function)(request)
+        do = getattr(import_module(f"paraflex.cli.{module}"), function)
+        try:
+            with raised():
+                return do(request)
+        except BaseException as error:
+            # A library that is interrupted may make an error of its own of it.
+            if not isinstance(error, KeyboardInterrupt) and not is_taken():
+                raise
+            typer.echo(_GOES_ON if self.request in _STUDIES else _BEGINS, err=True)
+            return exit_code()
 
 
+# They keep every run.
+_STUDIES = (SweepRequest, SearchRequest, IndicesRequest)
 # In the order of `paraflex --help`.
 COMMANDS = (
     ListedCommand("run", RunRequest, "run.run_command", """

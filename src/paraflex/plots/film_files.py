@@ -1,0 +1,199 @@
+"""Files of films: mp4, gif, one animated SVG, a sequence of PNG or one of them; a few pictures at a time in memory."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from html import escape
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+from PIL import GifImagePlugin, Image, ImageChops
+
+from paraflex.errors import InputError, OutputError
+from paraflex.interrupts import starting_processes
+from paraflex.plots.drawing import caption
+from paraflex.plots.film_pictures import clock, frames, stage
+from paraflex.plots.labels import mode_label
+from paraflex.plots.scene import at_times
+from paraflex.plots.style import journal_style
+from paraflex.plots.svg import Pen, animated, moving_elements
+
+if TYPE_CHECKING:
+    from paraflex.plots.film import Film
+
+Report = Callable[[int, int], None]
+
+_GIF_COLOURS, _NEAR = 128, 12
+# What a GIF ends with.
+_TRAILER = b";"
+# Key frames a second of an SVG; browsers go on evenly between them.
+_KEYS, _MOST_KEYS = 25.0, 400
+
+
+def write_film(film: Film, kind: str, file: Path, report: Report) -> None:
+    """Write a film of a kind that `film_kind` names; pictures of a sequence go into the folder that `file` is."""
+    if kind == ".svg":
+        file.write_text(_animated_svg(film), encoding="utf-8")
+        report(len(film.time), len(film.time))
+    elif kind == ".mp4":
+        _write_mp4(film, file, find_encoder(), report)
+    elif kind == ".gif":
+        _write_gif(film, file, report)
+    elif kind == ".png":
+        still = next(frames(film, len(film.time) - 1))
+        Image.fromarray(still).convert("RGB").save(file, format="PNG")
+        report(1, 1)
+    else:
+        digits = max(4, len(str(len(film.time))))
+        for i, frame in enumerate(frames(film), 1):
+            Image.fromarray(frame).convert("RGB").save(file / f"frame_{i:0{digits}d}.png")
+            report(i, len(film.time))
+
+
+def find_encoder() -> str:
+    """The program that makes mp4."""
+    found = shutil.which("ffmpeg")
+    if found:
+        return found
+    try:
+        import imageio_ffmpeg
+
+        return imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
+        raise InputError(
+            "no encoder for mp4 (ffmpeg) on this machine", field="output",
+            remedy="install one with pip install 'paraflex[video]' (the package imageio-ffmpeg), or write .gif, .svg "
+            "or a folder of PNG, which need none",
+        ) from None  # fmt: skip
+
+
+def _animated_svg(film: Film) -> str:
+    """One file that plays by itself in browsers: what stays from Matplotlib, what moves as values in time (SMIL)."""
+    (width, height), time = film.size, film.time
+    seconds = max(float(time[-1] - time[0]) / film.speed, 1e-3)
+    count = min(time.size, _MOST_KEYS, round(seconds * _KEYS) + 1)
+    keys = np.unique(np.linspace(0, time.size - 1, count).round()).astype(int)
+    with journal_style(), rc_context({"svg.fonttype": "none", "font.family": ["DejaVu Sans", "sans-serif"]}):
+        figure, sketches, texts = stage(film)
+        texts[-1].set_text(f"t = {time[0]:.4g} to {clock(time[-1], time[-1])[4:]}")
+        still = _still_svg(figure, [artist for sketch in sketches for artist in sketch.artists])
+    moving = []
+    for shown, sketch in zip(film.scenes, sketches, strict=True):
+        box = sketch.axes.get_position()
+        scale = box.width * width / (sketch.limits.right - sketch.limits.left)
+        corner = box.x0 * width - scale * sketch.limits.left, (1.0 - box.y1) * height + scale * sketch.limits.top
+        pen = Pen(corner, scale, min(box.width * width, box.height * height) / 480.0, film.look, seconds)
+        moving += moving_elements(at_times(shown, keys), sketch.limits, pen)
+    named = ", ".join(mode_label(shown.mode) for shown in film.scenes if shown.mode)
+    title = f"{film.scenes[0].mechanism}{', mode ' + named if named else ''}: {caption(film.scenes[0])}"
+    # SMIL cannot count: a line fills as time passes.
+    line = (
+        f'<path d="M0 {height - 1.5}H{width}" stroke="{film.look.trail}" stroke-width="3" stroke-dasharray="{width}">'
+    )
+    view = f'viewBox="0 0 {width} {height}" width="{width}" height="{height}"'
+    return "\n".join([
+        f'<svg xmlns="http://www.w3.org/2000/svg" {view} style="max-width:100%;max-height:100vh" role="img">',
+        f"<title>{escape(title)}</title>", f'<svg width="{width}" height="{height}" {still}', *moving,
+        line + animated("stroke-dashoffset", [f"{width}", "0"], seconds) + "</path>", "</svg>", "",
+    ])  # fmt: skip
+
+
+def _still_svg(figure: Figure, moving: list[Artist]) -> str:
+    """A figure without what moves as SVG, from its `viewBox` on; its rules of style, which hold beyond it, left out."""
+    for artist in moving:
+        artist.set_visible(False)
+    out = StringIO()
+    figure.savefig(out, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    text = re.sub(r"<defs>\s*<style.*?</defs>", "", out.getvalue(), flags=re.DOTALL)
+    return text[text.index("viewBox=") :]
+
+
+def _write_gif(film: Film, file: Path, report: Report) -> None:
+    """One palette for all pictures: what does not move keeps its colour, and files are small.
+
+    Pillow's own writer of films holds every picture until the last is there; here two are held.
+    """
+    lasts = round(1000.0 / film.fps)
+    pictures = _reduced(film, report)
+    shown = next(pictures)
+    with file.open("wb") as stream:
+        stream.writelines(GifImagePlugin.getheader(shown, info={"loop": 0})[0])
+        # Where the part of it that is written lies, and how long it is seen [ms].
+        box, duration = (0, 0, *shown.size), lasts
+        for picture in pictures:
+            changed = ImageChops.difference(picture, shown).getbbox()
+            if changed is None:
+                duration += lasts
+                continue
+            stream.writelines(GifImagePlugin.getdata(shown.crop(box), box[:2], duration=duration))
+            shown, box, duration = picture, changed, lasts
+        stream.writelines(GifImagePlugin.getdata(shown.crop(box), box[:2], duration=duration))
+        stream.write(_TRAILER)
+
+
+def _reduced(film: Film, report: Report) -> Iterator[Image.Image]:
+    palette = _palette(film)
+    for i, frame in enumerate(frames(film), 1):
+        report(i, len(film.time))
+        yield Image.fromarray(frame).convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)
+
+
+def _palette(film: Film) -> Image.Image:
+    """Colours of the first, a middle and the last picture."""
+    chosen = np.array([0, len(film.time) // 2, len(film.time) - 1])
+    scenes = tuple(at_times(shown, chosen) for shown in film.scenes)
+    few = replace(film, scenes=scenes)
+    palette = Image.fromarray(np.concatenate(list(frames(few)))).convert("RGB").quantize(_GIF_COLOURS)
+    # The ground is exactly what it is: nothing near it may stand in for it.
+    colours = np.array(palette.getpalette(), dtype=np.int64).reshape(-1, 3)
+    ground = np.array(list(bytes.fromhex(film.look.ground[1:])))
+    colours[np.max(np.abs(colours - ground), axis=1) < _NEAR] = ground
+    palette.putpalette(colours.ravel().tolist())
+    return palette
+
+
+def _write_mp4(film: Film, file: Path, encoder: str, report: Report) -> None:
+    width, height = film.size
+    command = [
+        encoder, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}",
+        "-r", f"{film.fps:g}", "-i", "-", "-an", "-c:v", "libx264", "-preset", "veryfast", "-tune", "animation",
+        "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(file),
+    ]  # fmt: skip
+    with tempfile.TemporaryFile() as said:
+        with starting_processes():
+            process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)
+        assert process.stdin is not None
+        try:
+            for i, frame in enumerate(frames(film), 1):
+                process.stdin.write(frame.tobytes())
+                report(i, len(film.time))
+            process.stdin.close()
+            process.wait()
+        except BrokenPipeError:
+            process.wait()
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
+        finally:
+            if not process.stdin.closed:
+                with suppress(BrokenPipeError):
+                    process.stdin.close()
+        if process.returncode:
+            said.seek(0)
+            lines = said.read().decode(errors="replace").strip().splitlines()
+            raise OutputError(
+                f"the encoder {encoder} gave up ({lines[-1] if lines else f'exit code {process.returncode}'})",
+                field=str(file.with_suffix("")), remedy="write .gif, .svg or a folder of PNG instead",
+            )  # fmt: skip

@@ -1,0 +1,84 @@
+"""Pictures of a film, one after the other, drawn by Matplotlib."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from paraflex.plots.drawing import Sketch, bare, draw_scale_bar, name_links
+from paraflex.plots.labels import mode_label
+from paraflex.plots.scene import common_limits
+from paraflex.plots.style import journal_style
+
+if TYPE_CHECKING:
+    from paraflex.plots.film import Film
+
+# Parts of the picture's height above and below the drawing.
+HEAD, FOOT = 0.105, 0.11
+
+
+def frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:
+    """Pictures (height, width, 4) from one on, one after the other: what stays is drawn once."""
+    with journal_style():
+        figure, sketches, texts = stage(film)
+        canvas = FigureCanvasAgg(figure)
+        moving = [artist for sketch in sketches for artist in sketch.artists]
+        for artist in (*moving, *texts):
+            artist.set_animated(True)
+        canvas.draw()
+        background = canvas.copy_from_bbox(figure.bbox)
+        for i in range(start, len(film.time)):
+            time = film.time[i]
+            canvas.restore_region(background)
+            for sketch, text in zip(sketches, texts[:-1], strict=True):
+                sketch.show(i)
+                over = time > sketch.scene.reached + 1e-12
+                text.set_text(f"ended at {sketch.scene.reached:.4g} s" if over else "")
+                for artist in sketch.artists:
+                    sketch.axes.draw_artist(artist)
+                figure.draw_artist(text)
+            texts[-1].set_text(clock(time, float(film.time[-1])))
+            figure.draw_artist(texts[-1])
+            yield np.array(canvas.buffer_rgba())
+
+
+def clock(time: float, last: float) -> str:
+    """Time of a picture, with digits that do not jump."""
+    digits = max(0, 2 - math.floor(math.log10(last))) if last > 0.0 else 3
+    return f"t = {time:.{min(digits, 6)}f} s"
+
+
+def stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
+    """The figure, its sketches, and the texts that change: one a panel, then the clock."""
+    width, height = film.size
+    count = len(film.scenes)
+    # Text and lines are of one size against the picture, whatever its pixels.
+    dpi = min(height / 5.0, width / count / 4.6)
+    figure = Figure(figsize=(width / dpi, height / dpi), dpi=dpi, facecolor=film.look.ground)
+    limits = common_limits(list(film.scenes)).fitted(width / count / (height * (1.0 - HEAD - FOOT)))
+    sketches, texts = [], []
+    look = film.look
+    for k, shown in enumerate(film.scenes):
+        axes = figure.add_axes((k / count, FOOT, 1.0 / count, 1.0 - HEAD - FOOT))
+        sketches.append(Sketch(bare(axes, limits), shown, limits, look))
+        middle = (k + 0.5) / count
+        if count > 1 or shown.mode:
+            label = f"mode {mode_label(shown.mode)}"
+            figure.text(middle, 0.925, label, color=look.ink, fontsize=10.5, ha="center", va="center")
+        texts.append(figure.text(middle, 0.885, "", color=look.trail, fontsize=9.0, ha="center", va="center"))
+    first = film.scenes[0]
+    margin = 0.18 / (width / dpi)
+    figure.text(margin, 0.972, first.mechanism, color=look.ink, fontsize=10.5, va="center", parse_math=False)
+    figure.text(margin, 0.03, film.caption, color=look.earth, fontsize=9.0, va="center")
+    draw_scale_bar(figure, limits, look, (1.0 - margin, 0.022), 9.0, share=1.0 / count)
+    name_links(figure, first, look, 8.0, 0.088)
+    texts.append(
+        figure.text(1.0 - margin, 0.972, "", color=look.ink, fontsize=10.5, ha="right", va="center", parse_math=False)
+    )
+    return figure, sketches, texts
