@@ -27,6 +27,7 @@ from paraflex.results.metrics import METRICS
 from paraflex.results.run_traces import run_traces
 from paraflex.studies import load_sensitivities, metric_gradients, sensitivities
 from paraflex.tracking import simulate
+from paraflex.writing import read_json
 from shell import paraflex
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "sensitivity_study.toml"
@@ -426,7 +427,7 @@ def test_command_again_and_elsewhere(tmp_path, capsys):
     figures = json.loads(capsys.readouterr().out)
     assert ask(as_json=False) == 0
     assert "rms_torque.tau6 [N m]" in capsys.readouterr().out
-    assert json.loads((out / "sensitivity.json").read_text()) == figures
+    assert read_json(out / "sensitivity.json") == figures
     with pytest.raises(InputError, match="--output: the folder holds results of another study"):
         ask(at=["thickness=0.006"])
     with pytest.raises(InputError, match="--output: the folder holds other files"):
@@ -436,7 +437,7 @@ def test_command_again_and_elsewhere(tmp_path, capsys):
     with pytest.raises(InputError, match=r"metrics: has no derivative .got 'steps'"):
         ask(metrics=["work, steps"])
     (out / "sensitivity.json").write_text("{", encoding="utf-8")
-    with pytest.raises(InputError, match="--output: the folder holds results of another study"):
+    with pytest.raises(InputError, match=r"sensitivity.json: damaged: .*delete it and run the same command again"):
         ask()
 
 

@@ -14,7 +14,7 @@ from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA, UNFINISHED
 from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.results.parquet import read_parquet
 from paraflex.seals import damaged
-from paraflex.writing import GO_ON, read_json, write_json
+from paraflex.writing import GO_ON, read_values, write_json
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -73,8 +73,8 @@ def read_study(file: Path) -> dict[str, Any]:
     InputError
         It is damaged, cannot be read, or is none of ours.
     """
-    found = read_json(file, "delete it and run the same command again: it is written again")
-    if "content" not in found:
+    found = read_values(file, "delete it and run the same command again: it is written again")
+    if not isinstance(found, dict) or "content" not in found:
         raise InputError("not the study of a campaign", field=str(file), remedy="name a new folder")
     return found
 

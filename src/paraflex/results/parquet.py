@@ -54,5 +54,5 @@ def read_parquet(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
         table.validate(full=True)
     # Of a damaged file without a seal the library raises whatever its bytes lead it to.
     except Exception as error:
-        raise damaged(file, f"not a readable table ({(str(error) or 'no reason').splitlines()[0]})", _AGAIN) from error
+        raise damaged(file, "cut short, or not a readable table", _AGAIN) from error
     return table

@@ -331,5 +331,5 @@ def _claim(folder: Path, asked: str) -> None:
     if others:
         raise not_ours(folder, others)
     file = folder / Sensitivities.values_file
-    if file.exists() and read_json(file).get("content") != asked:
+    if file.exists() and read_json(file, "delete it and run the same command again").get("content") != asked:
         raise of_another_study(folder)
