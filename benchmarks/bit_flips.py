@@ -214,12 +214,17 @@ def _case(source: Path, file: Path, bit: int, readers: Sequence[tuple[Reader, st
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place) / "results"
             shutil.copytree(source, folder)
-            content = bytearray((folder / file).read_bytes())
-            content[bit // 8] ^= 1 << bit % 8
-            (folder / file).write_bytes(content)
+            (folder / file).write_bytes(_flipped((folder / file).read_bytes(), bit))
             found.append(_outcome(reader, folder, file.name, expected))
     outcome, detail = min(found, key=lambda each: OUTCOMES.index(each[0]))
-    return Case(source.name, file.name, bit, outcome, detail)
+    shown = f"{file.parent}/*{file.suffix}" if file.parent.name else file.name
+    return Case(source.name, shown, bit, outcome, detail)
+
+
+def _flipped(content: bytes, bit: int) -> bytes:
+    changed = bytearray(content)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)
 
 
 def _outcome(reader: Reader, folder: Path, name: str, expected: str) -> tuple[str, str]:
@@ -276,12 +281,9 @@ def main() -> None:
     for case in cases:
         if case.outcome in OUTCOMES[:2]:
             print(*case, file=sys.stderr)
-    counts = Counter(
-        (case.kind, case.file.replace(case.file.split(".")[0], "*") if len(case.file) > 24 else case.file, case.outcome)
-        for case in cases
-    )
-    rows = sorted({key[:2] for key in counts})
-    lines = [[f"{kind}: {file}", *(str(counts[kind, file, outcome]) for outcome in OUTCOMES)] for kind, file in rows]
+    counts = Counter((f"{case.kind}: {case.file}", case.outcome) for case in cases)
+    names = sorted({name for name, _ in counts})
+    lines = [[name, *(str(counts[name, outcome]) for outcome in OUTCOMES)] for name in names]
     totals = Counter(case.outcome for case in cases)
     lines.append(["all", *(str(totals[outcome]) for outcome in OUTCOMES)])
     print(table(["file", *OUTCOMES], lines))

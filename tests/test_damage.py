@@ -94,7 +94,7 @@ def test_a_seal_finds_every_flipped_bit_and_others_read_the_file(tmp_path, name)
     for place in passed:
         flip(file, place, 1 << place % 8)
         if place >= len(sealed) - 8:
-            with pytest.raises(InputError, match="damaged: not a readable table"):
+            with pytest.raises(InputError, match="damaged: cut short, or not a readable table"):
                 read_parquet(file)
         else:
             np.testing.assert_array_equal(read_parquet(file)["x"], values)

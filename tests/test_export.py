@@ -212,4 +212,4 @@ def test_the_table_of_a_study_becomes_csv_or_a_struct(study):
     assert "Parquet already" in str(refused.exception)
     (study / "results.parquet").write_bytes(b"PAR1 and no more")
     refused = CliRunner().invoke(app, ["export", str(study), "--to", "csv", "--force"])
-    assert "damaged: not a readable table" in str(refused.exception)
+    assert "damaged: cut short, or not a readable table" in str(refused.exception)

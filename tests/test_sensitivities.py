@@ -27,6 +27,7 @@ from paraflex.results.metrics import METRICS
 from paraflex.results.run_traces import run_traces
 from paraflex.studies import load_sensitivities, metric_gradients, sensitivities
 from paraflex.tracking import simulate
+from paraflex.writing import read_json
 from shell import paraflex
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "sensitivity_study.toml"
@@ -426,11 +427,11 @@ def test_command_again_and_elsewhere(tmp_path, capsys):
     figures = json.loads(capsys.readouterr().out)
     assert ask(as_json=False) == 0
     assert "rms_torque.tau6 [N m]" in capsys.readouterr().out
-    assert json.loads((out / "sensitivity.json").read_text()) == figures
+    assert read_json(out / "sensitivity.json") == figures
     capsys.readouterr()
     assert ask(at=["thickness=0.006"]) == 0
     assert 'holds sensitivities "sweep"' in capsys.readouterr().err
-    assert json.loads((out / "sensitivity.json").read_text())["parameters"]["thickness"]["value"] == 0.006
+    assert read_json(out / "sensitivity.json")["parameters"]["thickness"]["value"] == 0.006
     (tmp_path / "verify.json").write_text("{}", encoding="utf-8")
     with pytest.raises(InputError, match="--output: the folder holds other results, a verification"):
         ask(output=tmp_path)

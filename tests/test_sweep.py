@@ -23,6 +23,7 @@ from paraflex.results import load_results, summary, tracking_dataset
 from paraflex.results.metrics import METRICS
 from paraflex.studies import load_sweep, sweep
 from paraflex.tracking import plan_tracking
+from paraflex.writing import read_json, write_json
 from shell import paraflex as shell
 
 STUDY = """
@@ -307,9 +308,9 @@ def test_other_versions_do_not_mix(finished, tmp_path):
     file, _ = finished
     study = load_sweep(file)
     sweep(study, tmp_path / "out", run=stub, limit=1)
-    said = json.loads((tmp_path / "out" / "study.json").read_text())
+    said = read_json(tmp_path / "out" / "study.json")
     said["versions"]["numba"] = "0.1"
-    (tmp_path / "out" / "study.json").write_text(json.dumps(said))
+    write_json(tmp_path / "out" / "study.json", said)
     with pytest.raises(InputError, match=r"begun with numba 0.1"):
         sweep(study, tmp_path / "out", run=stub)
 

@@ -1,6 +1,5 @@
 """The report of a study: it holds the table's numbers, the best runs are those of the table, failures are told."""
 
-import json
 import re
 from dataclasses import replace
 
@@ -19,6 +18,7 @@ from paraflex.report.film import frames_of
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
 from paraflex.studies.sweeps.report import study_page
+from paraflex.writing import read_json, write_json
 from reports import array_of, chart_of, html_of, rows_of, told
 from shell import paraflex
 
@@ -166,9 +166,9 @@ def test_the_best_runs_are_made_again_and_move(finished, page, html):
 def test_a_run_that_differs_from_its_row_is_told(finished, tmp_path):
     for name in ("study.json", "results.parquet"):
         (tmp_path / name).write_bytes((finished.folder / name).read_bytes())
-    study = json.loads((tmp_path / "study.json").read_text(encoding="utf-8"))
+    study = read_json(tmp_path / "study.json")
     study["study"]["mechanism"]["material"]["aluminium"]["density"] = 2600.0
-    (tmp_path / "study.json").write_text(json.dumps(study), encoding="utf-8")
+    write_json(tmp_path / "study.json", study)
     assert any("come out otherwise than the table says" in note for note in study_page(tmp_path).notes)
 
 

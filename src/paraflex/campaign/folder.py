@@ -16,7 +16,7 @@ from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, check_listed, files_of, foreign_files, hold_folder
 from paraflex.results.parquet import read_parquet
 from paraflex.seals import damaged
-from paraflex.writing import GO_ON, read_json, write_json
+from paraflex.writing import GO_ON, read_values, write_json
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -111,9 +111,9 @@ def read_study(file: Path) -> dict[str, Any]:
     InputError
         It is damaged, cannot be read, or is none of ours.
     """
-    found = read_json(file, "delete it and run the same command again: it is written again")
+    found = read_values(file, "delete it and run the same command again: it is written again")
     check_listed(file)
-    if "content" not in found:
+    if not isinstance(found, dict) or "content" not in found:
         raise InputError("not the study of a campaign", field=str(file), remedy="name a new folder")
     return found
 

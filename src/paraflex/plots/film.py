@@ -8,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.plots.drawing import caption
 from paraflex.plots.film_files import find_encoder, write_film
-from paraflex.plots.film_pictures import FOOT, HEAD
+from paraflex.plots.film_pictures import FOOT, HEAD, Film
 from paraflex.plots.scene import Scene, common_limits, run_times, scene, select
-from paraflex.plots.themes import Theme, theme
+from paraflex.plots.themes import theme
 from paraflex.writing import whole_file, whole_folder
 
 FORMATS = (".mp4", ".gif", ".svg", ".png")
@@ -58,28 +56,6 @@ class FilmOptions:
     theme: str = "light"
     at: float | None = None
     model: str | None = None
-
-
-@dataclass(frozen=True)
-class Film:
-    """A film that can be drawn: scenes of all its panels at the times of its pictures."""
-
-    scenes: tuple[Scene, ...]
-    size: tuple[int, int]
-    fps: float
-    speed: float
-    look: Theme
-    plays: bool = True
-
-    @property
-    def caption(self) -> str:
-        """Text on the magnification and the speed."""
-        return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "")
-
-    @property
-    def time(self) -> NDArray[np.float64]:
-        """Time of the run in each picture [s]."""
-        return self.scenes[0].time
 
 
 def plan_film(

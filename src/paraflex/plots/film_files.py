@@ -12,7 +12,6 @@ from dataclasses import replace
 from html import escape
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import rc_context
@@ -23,14 +22,11 @@ from PIL import GifImagePlugin, Image, ImageChops
 from paraflex.errors import InputError, OutputError
 from paraflex.interrupts import starting_processes
 from paraflex.plots.drawing import caption
-from paraflex.plots.film_pictures import clock, frames, stage
+from paraflex.plots.film_pictures import Film, clock, frames, stage
 from paraflex.plots.labels import mode_label
 from paraflex.plots.scene import at_times
 from paraflex.plots.style import journal_style
 from paraflex.plots.svg import Pen, animated, moving_elements
-
-if TYPE_CHECKING:
-    from paraflex.plots.film import Film
 
 Report = Callable[[int, int], None]
 

@@ -4,23 +4,44 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paraflex.plots.drawing import Sketch, bare, draw_scale_bar, name_links
+from paraflex.plots.drawing import Sketch, bare, caption, draw_scale_bar, name_links
 from paraflex.plots.labels import mode_label
-from paraflex.plots.scene import common_limits
+from paraflex.plots.scene import Scene, common_limits
 from paraflex.plots.style import journal_style
-
-if TYPE_CHECKING:
-    from paraflex.plots.film import Film
+from paraflex.plots.themes import Theme
 
 # Parts of the picture's height above and below the drawing.
 HEAD, FOOT = 0.105, 0.11
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film that can be drawn: scenes of all its panels at the times of its pictures."""
+
+    scenes: tuple[Scene, ...]
+    size: tuple[int, int]
+    fps: float
+    speed: float
+    look: Theme
+    plays: bool = True
+
+    @property
+    def caption(self) -> str:
+        """Text on the magnification and the speed."""
+        return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "")
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time of the run in each picture [s]."""
+        return self.scenes[0].time
 
 
 def frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:

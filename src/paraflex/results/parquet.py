@@ -54,7 +54,9 @@ def read_parquet(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
         names = None if columns is None else list(columns)
         table = pq.read_table(file, columns=names, page_checksum_verification=True)
         table.validate(full=True)
+        for field in table.schema:
+            _ = [field.name, *(text.decode() for about in (field.metadata or {}).items() for text in about)]
     # Of a damaged file without a seal the library raises whatever its bytes lead it to.
     except Exception as error:
-        raise damaged(file, f"not a readable table ({(str(error) or 'no reason').splitlines()[0]})", _AGAIN) from error
+        raise damaged(file, "cut short, or not a readable table", _AGAIN) from error
     return table
