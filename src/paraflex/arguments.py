@@ -151,9 +151,14 @@ def _resolved(hint: Any, names: dict[str, Any]) -> Any:
         return Any
 
 
-@cache
 def take_as(hint: Any) -> Take | None:
-    """How what is given is taken as a type; None where anything is."""
+    """Function that takes a value as a type; None for a type that every value has."""
+    # Unions are equal in any order of their types, but errors name the types in the order of the annotation.
+    return _take_as(hint, repr(hint))
+
+
+@cache
+def _take_as(hint: Any, _spelling: str) -> Take | None:
     if hint in _PLAIN:
         return _PLAIN[hint]
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
@@ -324,7 +329,7 @@ def _same(given: Any, made: Any) -> Any:
 
 
 _NOUNS = {float: "a number", int: "a whole number", str: "a text", bool: "True or False"}
-_COUNTS = {2: "two", 3: "three"}
+_NUMBER_WORDS = {2: "two", 3: "three"}
 # What objects of a class are called, and how one comes by them.
 _GIVEN_AS: dict[Any, tuple[str, str]] = {}
 
@@ -349,7 +354,7 @@ def _noun(hint: Any) -> str:
     if origin in _UNIONS:
         return _either([_noun(kind) for kind in _members(inner)])
     if _is_row(hint):
-        return f"{_COUNTS.get(len(inner), str(len(inner)))} numbers" if set(inner) == {float} else "such a row"
+        return f"{_NUMBER_WORDS.get(len(inner), str(len(inner)))} numbers" if set(inner) == {float} else "such a row"
     if origin in _LISTS:
         return "a list"
     if origin in _TABLES or hint is dict:

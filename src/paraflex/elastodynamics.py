@@ -38,7 +38,7 @@ from paraflex.mechanism import ActuationMode, Geometry, grouped
 from paraflex.tracking import TrackingRun, TrackingTask
 
 # A sample spacing may be this much longer than a whole number of steps: rounding of the division.
-_ROUNDING = 1e-9
+_ROUNDED_SPACING = 1e-9
 
 
 @checked_arguments()
@@ -96,7 +96,7 @@ def simulate_ked(
         task = task.remodelled(task.mechanism.with_geometry(Geometry.LINEAR))
     torques, samples = task.torques(mode), task.motion.t
     condition = actuation_condition(task.effort, torques.mode)
-    substeps = max(1, math.ceil((samples[1] - samples[0]) / step * (1.0 - _ROUNDING)))
+    substeps = max(1, math.ceil((samples[1] - samples[0]) / step * (1.0 - _ROUNDED_SPACING)))
     times = np.linspace(samples[0], samples[-1], substeps * (samples.size - 1) + 1)
     nominal, rigid = _nominal(task, times), task.motion
     end = end_of_motion(rigid.system, rigid.t, rigid.q, rigid.v)

@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 
 # More designs than this are a slip: their table alone would fill the memory.
-_MOST = 10_000_000
+_MOST_DESIGNS = 10_000_000
 KINDS = GRID, LIST, RANDOM, SOBOL = "grid", "list", "random", "sobol"
 
 
@@ -206,5 +206,5 @@ def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, s
 
 
 def _check_total(total: int, field: str) -> None:
-    if total > _MOST:
-        raise InputError("too many designs", field=field, value=total, remedy=f"at most {_MOST}")
+    if total > _MOST_DESIGNS:
+        raise InputError("too many designs", field=field, value=total, remedy=f"at most {_MOST_DESIGNS}")

@@ -37,7 +37,7 @@ from paraflex.mechanism import GROUND, Damping, Joint, Mechanism, PointRef, Rigi
 # Conditions of which less than this part is left once the others hold follow from them.
 _DEPENDENT = 1e-9
 # An entry of the damping matrix less than this part of what its two modes lose is rounding.
-_ROUNDING = 1e-9
+_ROUNDED_ENTRY = 1e-9
 
 
 def damping_matrix(
@@ -75,7 +75,7 @@ def _by_modes(damping: Damping, squares: Numbers, omega: Numbers, modes: Numbers
 def _without_rounding(matrix: Numbers) -> Numbers:
     """The symmetric matrix, with zeros for off-diagonal entries of the size of rounding."""
     sizes = np.sqrt(np.abs(np.real(np.diag(matrix))))
-    small = np.abs(np.real(matrix)) <= _ROUNDING * np.outer(sizes, sizes)
+    small = np.abs(np.real(matrix)) <= _ROUNDED_ENTRY * np.outer(sizes, sizes)
     np.fill_diagonal(small, False)
     return np.where(small, 0.0, 0.5 * (matrix + matrix.T))
 

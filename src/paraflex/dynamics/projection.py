@@ -31,7 +31,7 @@ CLOSED = 1e-12
 _PROJECTIONS = 2
 # Joints named in an error.
 NAMED = 6
-_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
+_GAP_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
 # What helps where constraints contradict one another.
 AGREE = "leave one of these joints, gears or prescribed motions out, or choose places and laws that agree"
 # What constraints may leave of each other's rates (sizes of the mechanism, rad; s), as a fraction of what they ask for.
@@ -196,6 +196,6 @@ def contradiction(system: System, wanted: Array, found: Dependence, what: str) -
         names, size = list(gaps), max(gaps.values())
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (
-        f"the {what} of constraints contradict one another, by {size:.3g} {_UNITS[what]}: "
+        f"the {what} of constraints contradict one another, by {size:.3g} {_GAP_UNITS[what]}: "
         f"{', '.join(names[:NAMED])}{more},"
     )

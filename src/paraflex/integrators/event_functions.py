@@ -28,7 +28,7 @@ _PLACES = 4
 # A point may stand at the very end of its beam: rounding and the closing of loops leave it this part of the length off.
 _AT_END = 1e-9
 # Two places are always on their chord.
-_LINE = 3
+_LEAST_ON_LINE = 3
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def _deflection(system: System, name: str) -> Callable[[Array], Array]:
     """Largest deflection along a body from its chord."""
     body = system.body(name)
     rest, rows, shortening = deflection_rows(body)
-    if len(rest) < _LINE or np.all(rest[0] == rest[-1]):
+    if len(rest) < _LEAST_ON_LINE or np.all(rest[0] == rest[-1]):
         raise InputError(
             "a deflection is from the line between first and last point, which takes three points", field="events",
             value=name, remedy="give the body a point between, or leave the limit out",

@@ -15,7 +15,7 @@ from paraflex.mechanism.modal import ModalBody
 
 Place = tuple[float, float]
 # Points of a body nearer one another than this part of its size do not tell its angle.
-_APART = 1e-9
+_SAME_PLACE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | 
     if angle is None:
         arms = [(local[name][0] - cx, local[name][1] - cy, x - gx, y - gy) for name, (x, y) in found.items()]
         size = max(hypot(x - cx, y - cy) for x, y in local.values())
-        if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) <= _APART * size:
+        if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) <= _SAME_PLACE * size:
             return None
         # Best fit in the sense of least squares.
         angle = atan2(

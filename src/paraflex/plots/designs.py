@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 # Not what a design is chosen for.
 _OF_THE_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
 _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
-_FIRST, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
+_FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
 # A metric that changes by less, as a share of its size, is the same for all designs.
-_SAME = 1e-9
+_NOT_VARIED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class DesignTable:
     def _varies(self, name: str) -> bool:
         values = self.metrics[name][self.complete]
         values = values[np.isfinite(values)]
-        return values.size > 1 and float(np.ptp(values)) > _SAME * float(np.max(np.abs(values)))
+        return values.size > 1 and float(np.ptp(values)) > _NOT_VARIED * float(np.max(np.abs(values)))
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
@@ -145,7 +145,7 @@ def read_designs(files: Sequence[Path]) -> DesignTable:
             remedy="name a results.parquet that paraflex wrote",
         ) from error  # fmt: skip
     names = table.column_names
-    if not {*_FIRST, *_LAST} <= set(names):
+    if not {*_FIRST_COLUMNS, *_LAST} <= set(names):
         raise InputError(
             "not a table of designs", field=str(files[0]), remedy="name a results.parquet that paraflex wrote"
         )

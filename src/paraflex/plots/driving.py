@@ -16,7 +16,7 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label
 from paraflex.plots.layout import ONE_COLUMN, lay_out, panels
 from paraflex.plots.runs import draw_curves, finish_over_time
-from paraflex.plots.scales import LINE, list_lines, mark_powers
+from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
 from paraflex.plots.selection import names_of, select_run
 from paraflex.plots.style import BLUE, GREEN, VERMILLION
 from paraflex.results.following import headline, ranked_by_motion
@@ -74,7 +74,7 @@ def mode_comparison(data: xr.Dataset) -> Figure:
     _bars(axes[0, 2], names, peaks, VERMILLION)
     axes[0, 2].set_title(f"largest {label.partition(' [')[0]}")
     axes[0, 2].set_xlabel(label)
-    return lay_out(figure, axes, panel_height=LINE * len(names) + 2.0)
+    return lay_out(figure, axes, panel_height=LIST_LINE * len(names) + 2.0)
 
 
 @drawn
@@ -100,7 +100,7 @@ def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
     mark_powers(panel, "x")
     panel.set_xlim(1.0, None)
     panel.set_xlabel(axis_label("condition") + ", worst along the path")
-    return lay_out(figure, axes, panel_height=LINE * len(names) + 2.0)
+    return lay_out(figure, axes, panel_height=LIST_LINE * len(names) + 2.0)
 
 
 def _bars(panel: Axes, names: list[str], values: Any, colour: str, **look: Any) -> None:

@@ -33,19 +33,19 @@ from paraflex.plots.svg import Pen, animated, moving_elements
 from paraflex.plots.themes import Theme, theme
 from paraflex.writing import whole_file, whole_folder
 
-FORMATS = (".mp4", ".gif", ".svg", ".png")
+FILM_FORMATS = (".mp4", ".gif", ".svg", ".png")
 # A film of less is not worth looking at, one of more tires; speeds to choose from [s].
-_SHORTEST = 5.0
+_SHORTEST_FILM = 5.0
 _SPEEDS = tuple(step * 10.0**power for power in range(1, -7, -1) for step in (5.0, 2.0, 1.0))
 _MOST_FRAMES = 20_000
 # Places on the trail of a single picture.
 _TRAIL = 400
-_SMALLEST, _LARGEST = 64, 7680
+_SMALLEST_PICTURE, _LARGEST_PICTURE = 64, 7680
 # Parts of the picture's height above and below the drawing.
 _HEAD, _FOOT = 0.105, 0.11
 _GIF_COLOURS, _NEAR = 128, 12
 # Key frames a second of an SVG; browsers go on evenly between them.
-_KEYS, _MOST_KEYS = 25.0, 400
+_KEY_FRAMES, _MOST_KEYS = 25.0, 400
 _ELSEWHERE = "choose another place"
 
 
@@ -130,7 +130,7 @@ def plan_film(
     speed = options.speed
     if speed is None:
         # The highest round speed at which a run is not over too soon.
-        speed = next((one for one in _SPEEDS if duration / one >= _SHORTEST), _SPEEDS[-1])
+        speed = next((one for one in _SPEEDS if duration / one >= _SHORTEST_FILM), _SPEEDS[-1])
     fps = 100.0 / max(1, round(100.0 / options.fps)) if kind == ".gif" else options.fps
     if kind == ".png":
         at = 0.5 * (first + last) if options.at is None else options.at
@@ -207,7 +207,7 @@ def animate(
 def film_kind(file: Path) -> str:
     """The kind of film by the suffix of a name; a name without a suffix is a folder of pictures."""
     kind = file.suffix.lower()
-    if kind in FORMATS or kind == "":
+    if kind in FILM_FORMATS or kind == "":
         return kind
     raise InputError(
         "unknown kind of film", field="output", value=str(file),
@@ -241,9 +241,12 @@ def _check(options: FilmOptions) -> None:
             "more pictures a second than a screen shows", field="fps", value=options.fps, remedy="30 is smooth"
         )
     for side in options.size or ():
-        if not _SMALLEST <= side <= _LARGEST:
+        if not _SMALLEST_PICTURE <= side <= _LARGEST_PICTURE:
             raise InputError(
-                f"not between {_SMALLEST} and {_LARGEST} pixels", field="size", value=side, remedy="say 1280x720"
+                f"not between {_SMALLEST_PICTURE} and {_LARGEST_PICTURE} pixels",
+                field="size",
+                value=side,
+                remedy="say 1280x720",
             )
 
 
@@ -333,7 +336,7 @@ def _animated_svg(film: Film) -> str:
     """One animated file for browsers: fixed parts from Matplotlib, moving parts as values in time (SMIL)."""
     (width, height), time = film.size, film.time
     seconds = max(float(time[-1] - time[0]) / film.speed, 1e-3)
-    count = min(time.size, _MOST_KEYS, round(seconds * _KEYS) + 1)
+    count = min(time.size, _MOST_KEYS, round(seconds * _KEY_FRAMES) + 1)
     keys = np.unique(np.linspace(0, time.size - 1, count).round()).astype(int)
     with journal_style(), rc_context({"svg.fonttype": "none", "font.family": ["DejaVu Sans", "sans-serif"]}):
         figure, sketches, texts = _stage(film)

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 PIN, TRIANGLE, RAIL = 0.008, 0.028, 0.02
 _TEETH = 14
 # A joint that moves by less than this part of the picture stays where it is.
-_STILL = 1e-3
+_STILL_SHARE = 1e-3
 
 
 class MarkLook(NamedTuple):
@@ -84,7 +84,7 @@ def _joined(pieces: Sequence[Array] | Array) -> Array:
 
 def is_guide(joint: DrawnJoint, limits: Limits) -> bool:
     """Whether a slider moves through a fixed block, instead of a block along a rail."""
-    return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL * limits.size)
+    return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL_SHARE * limits.size)
 
 
 def triangle(place: Array, limits: Limits) -> Array:

@@ -36,7 +36,7 @@ class Look(NamedTuple):
     dash: int = 0
 
 
-PLAIN = Look()
+PLAIN_LOOK = Look()
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Curve:
     name: str
     y: ArrayLike
     x: ArrayLike | None = None
-    look: Look = PLAIN
+    look: Look = PLAIN_LOOK
     run: int | None = None
     shown: tuple[int, ...] | None = None
     choice: int | None = None

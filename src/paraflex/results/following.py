@@ -54,8 +54,8 @@ def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
 
 
 # Metrics that are variables of datasets; and those that tell how a run follows its path.
-KEPT = tuple(metric.name for metric in METRICS.values() if metric.kept)
-FOLLOWING = tuple(name for name in KEPT if not METRICS[name].per_motor)
+KEPT_METRICS = tuple(metric.name for metric in METRICS.values() if metric.kept)
+FOLLOWING = tuple(name for name in KEPT_METRICS if not METRICS[name].per_motor)
 
 
 def metric_variables(

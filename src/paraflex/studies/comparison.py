@@ -20,7 +20,7 @@ LEVELS, TABLE_LEVEL = (1e-3, 1e-4, 1e-5, 1e-6), 1e-5
 # Of a measurement what is no number.
 _TEXTS = ("method", "status", "reason")
 # Packages whose version has a part in the times.
-_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "scikit-sundae")
+_TIMING_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "scikit-sundae")
 
 
 @dataclass(frozen=True)
@@ -231,7 +231,7 @@ def machine() -> dict[str, Any]:
 
 def _versions() -> dict[str, str | None]:
     out: dict[str, str | None] = {}
-    for package in _PACKAGES:
+    for package in _TIMING_PACKAGES:
         try:
             out[package] = version(package)
         except PackageNotFoundError:

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 # Between places, as parts of a parameter's size. What is differentiated is smooth over many times as far: powers of a
 # number, sines and cosines.
-_SPACING = 4e-3
+_STENCIL_SPACING = 4e-3
 
 
 class Difference(NamedTuple):
@@ -66,7 +66,7 @@ def _weights(places: Array) -> Array:
 
 # About a value, and to either side of it alone.
 STENCILS = (
-    make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _SPACING),
-    make_stencil(range(9), _SPACING),
-    make_stencil(range(0, -9, -1), _SPACING),
+    make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _STENCIL_SPACING),
+    make_stencil(range(9), _STENCIL_SPACING),
+    make_stencil(range(0, -9, -1), _STENCIL_SPACING),
 )

@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 TABLE = "indices.parquet"
 # What SALib calls the shares, and a row of the table.
 _SHARES = {"first": "S1", "first_confidence": "S1_conf", "total": "ST", "total_confidence": "ST_conf"}
-_ROW = ("path", "mode", "metric", "parameter", *_SHARES, "samples", "dropped")
+_ROW_COLUMNS = ("path", "mode", "metric", "parameter", *_SHARES, "samples", "dropped")
 # Base samples unless asked otherwise, and the fewest of which anything can be said.
-_SAMPLES, _FEWEST = 128, 8
+_BASE_SAMPLES, _FEWEST_BASE_SAMPLES = 128, 8
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,11 @@ class IndicesResult(SweptResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The indices in plain values: one row per index and parameter."""
-        table = self.indices.to_dataframe(dim_order=["index", "parameter"]).reset_index().reindex(columns=list(_ROW))
+        table = (
+            self.indices.to_dataframe(dim_order=["index", "parameter"])
+            .reset_index()
+            .reindex(columns=list(_ROW_COLUMNS))
+        )
         plain = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
         return {"kind": "indices", "name": self.sweep.name, "indices": plain}
 
@@ -141,7 +145,7 @@ def load_indices(
         chosen = table.sampling.seed if seed is None else seed
         sampling = SamplingTable(kind=RANDOM, number=1, seed=chosen)
         base = make_study(table.model_copy(update={"sampling": sampling}), folder)
-    number = samples if samples is not None else table.sampling.number or _SAMPLES
+    number = samples if samples is not None else table.sampling.number or _BASE_SAMPLES
     _check_samples(number)
     wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].per_motor]
     columns = _columns(wanted, base)
@@ -194,7 +198,7 @@ def _analysed(
     """Indices from the base samples with complete runs only."""
     kept = usable.reshape(study.samples, -1).all(axis=1)
     count = int(np.count_nonzero(kept))
-    if count < _FEWEST:
+    if count < _FEWEST_BASE_SAMPLES:
         raise InputError(
             f"only {count} of {study.samples} base samples are complete in {names[1]}", field="vary",
             remedy="narrow the ranges: reasons stand in the table",
@@ -233,10 +237,10 @@ def _columns(names: list[str], base: SweepStudy) -> tuple[str, ...]:
 
 
 def _check_samples(number: int) -> None:
-    if number < _FEWEST or number & (number - 1):
+    if number < _FEWEST_BASE_SAMPLES or number & (number - 1):
         raise InputError(
             "Sobol's sequence wants a power of two", field="--samples", value=number,
-            remedy=f"say {max(_FEWEST, 1 << max(number, 1).bit_length())}",
+            remedy=f"say {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
         )  # fmt: skip
 
 
