@@ -20,7 +20,7 @@ from paraflex.mechanism import ActuationMode
 _DEGREE = 5
 # The spline's largest error, as a fraction of the peak torque of the run.
 _SPLINE_ERROR = 1e-8
-# By how much an error falls with half the interval, at least: 2^6 where the torques are smooth.
+# Least factor by which half the interval reduces the error: 2^6 for smooth torques.
 _ERROR_FALL = 32.0
 # Points of a smooth interval to begin with, at least, and seconds between them at most.
 _FEWEST_POINTS, _LONGEST_SPACING = 12, 2e-3
@@ -113,7 +113,7 @@ class TorquePlan:
             t = efforts[-1].motion.t
             between = required_effort(self.follow(0.5 * (t[1:] + t[:-1])))
             efforts.append(_interleaved(efforts[-1], between))
-        # Modes that run at the same time may find the same; either is kept whole.
+        # Modes in other threads may compute the same; either result may be kept.
         self.finer[:] = max(self.finer, efforts[1:], key=len)
         return efforts[refined]
 

@@ -154,7 +154,7 @@ def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(dimensions, scramble=True, seed=generator)  # pyright: ignore[reportCallIssue]
-    # SciPy warns of numbers that are no powers of two: the first of more are what was asked for.
+    # SciPy warns of numbers that are not powers of two: these are the first of more points.
     return sequence.random_base2(max(number - 1, 0).bit_length())[:number]
 
 

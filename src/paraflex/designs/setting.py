@@ -29,14 +29,14 @@ from paraflex.results.following import Part
 from paraflex.results.metrics import METRICS
 from paraflex.validity import doubtful_numbers
 
-# Attempted steps before a run is given up, unless the study says: a design that flails about must not hold up the rest.
+# Default limit of attempted steps: a single design with violent motion must not delay a study.
 DESIGN_MOST_STEPS = 200_000
 # A field of this table is one of the study's own [integration], and may be one of these.
 INTEGRATION = "integration"
 INTEGRATION_NUMBERS = ("tolerance", "step", "alpha", "beta")
 # Columns of every table of designs that are neither parameters nor metrics.
 FIXED_COLUMNS = ("run", "id", "design", "path", "mode", "status", "reason", "time_reached")
-# What results depend on besides the study.
+# Packages that results depend on.
 _RESULT_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
 

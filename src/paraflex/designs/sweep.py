@@ -315,7 +315,7 @@ class _Session:
                 yield Task(number, design, tuple(self.study.designs[design].tolist()), self.setting.paths[path])
 
     def _take(self, outcome: Outcome) -> None:
-        # A trajectory stands before its row does: a row without one would never be made again.
+        # A trajectory is written before its row, as a run with a row is not repeated.
         for name, data in outcome.trajectories.items():
             write_results(data, self.folder / TRAJECTORIES / f"{name}.nc", remedy=GO_ON)
         self.journal.add(outcome.rows)

@@ -34,9 +34,9 @@ from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
 from paraflex.fem.eigen import eigenpairs
 from paraflex.mechanism import GROUND, Damping, Joint, Mechanism, PointRef, RigidBody, stiffness_proportional
 
-# Conditions of which less than this part is left once the others hold follow from them.
+# Conditions with less than this fraction independent of the others are redundant.
 _DEPENDENT = 1e-9
-# An entry of the damping matrix less than this part of what its two modes lose is rounding.
+# An entry of the damping matrix below this fraction of the damping of its two modes is rounding.
 _ROUNDED_ENTRY = 1e-9
 
 

@@ -22,13 +22,13 @@ from paraflex.kernel.stage import equations
 _MAX_ITERATIONS = 50
 # Newton's iteration has converged when it moves links by less than this [sizes of the mechanism, rad] ...
 _SMALLEST_MOVE = 1e-10
-# ... and what is left of the forces is less than this fraction of the largest.
+# ... and the residual of the forces is less than this fraction of the largest.
 _BALANCED = 1e-6
 # Differences that the Jacobian is taken by; forces are linear in multipliers and nearly so in small displacements.
 _DIFFERENCE = 1e-6
 # No link is moved by more than this in one iteration [sizes of the mechanism, rad].
 _LONGEST_STEP = 0.3
-# Up to so many unknowns a dense Jacobian, whose dependent columns least squares can tell, is fast enough.
+# Up to so many unknowns a dense Jacobian, for which least squares handles dependent columns, is fast enough.
 _MOST_DENSE = 400
 _NO_EQUILIBRIUM = "no static equilibrium is found near the start"
 _HOLD = "start nearer to it, keep the angles of more joints, or make links and springs stiffer"

@@ -23,7 +23,7 @@ from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start, check_start
 
-# What joints may be open by at a start that is given [sizes of the mechanism, rad], and velocities by, as a fraction
+# Largest gap of joints at a given start [sizes of the mechanism, rad], and largest error of velocities, as a fraction
 # of them.
 _GAP = 1e-6
 _SLIP = 1e-6

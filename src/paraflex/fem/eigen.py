@@ -11,7 +11,7 @@ from paraflex.errors import InputError
 # Two eigenvalues closer than this part of them are one, whose modes have no derivatives if a parameter couples them;
 # a coupling of less than this part of the eigenvalue is rounding.
 _ONE, _COUPLED = 1e-9, 1e-9
-# Where a pair is coupled by more than this part of what lies between the two it is left as found.
+# A pair that is coupled by more than this fraction of its difference is not corrected.
 _COUPLED_BY = 0.1
 
 

@@ -18,7 +18,7 @@ from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import PAUSED, Samples
 
-# Places within a step at which events are looked for, its end last: an excursion between two of them is overlooked.
+# Places within a step at which events are checked, its end last: an excursion between two of them is missed.
 _PLACES = np.array([0.25, 0.5, 0.75, 1.0])
 # They are looked at where a value is no further inside its bounds than so many times what it changed by in this step
 # and the one before: a parabola that turns within the step changes in one of them by more than it dips.
@@ -113,7 +113,7 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     kept = slice(0, int(np.searchsorted(taken, crossing.t)))
     before = crossing.before
     first = _begun_at(problem, before.t, before.q, before.v)
-    # Where something given jumps accelerations do: the step began with those after the jump.
+    # Accelerations jump with the inputs: the step began with those after the jump.
     before = replace(before, a=first.samples.a[0])
     middle, last = (_begun_at(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
     # Simpson's rule: powers that jump do so at the ends of steps.

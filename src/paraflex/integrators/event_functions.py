@@ -23,9 +23,9 @@ from paraflex.fem import slope_square_integrals
 from paraflex.integrators.events import BeamEnd, DeflectionLimit, Event, JointLimit, beam_ends, check_events
 from paraflex.mechanism import AtEnd
 
-# Places looked at within an element, its last end among them.
+# Places within an element at which the deflection is evaluated, its last end included.
 _PLACES = 4
-# A point may stand at the very end of its beam: rounding and the closing of loops leave it this part of the length off.
+# Tolerance for a point at the end of its beam, as a fraction of the length: rounding and errors of closure.
 _AT_END = 1e-9
 # Two places are always on their chord.
 _LEAST_ON_LINE = 3

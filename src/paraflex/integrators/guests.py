@@ -96,7 +96,7 @@ class Adams(SundialsMethod):
     source = "CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"
     error_factor: ClassVar[float] = 0.5
     solver = "Adams"
-    # What steps of orders up to 12 come to on RAParM-I; the order follows the frequencies.
+    # Measured with steps of orders up to 12 on RAParM-I; the order follows the frequencies.
     stability_limit: ClassVar[float | None] = 0.75
 
     max_order: int = parameter(12, 1, 12, "highest order; up to 2 stiffness limits no step")

@@ -35,7 +35,7 @@ from paraflex.mechanism import AtEnd
 
 # Attempted steps between two looks: some milliseconds for a dozen bodies.
 _SLICE = 200
-# Attempts that tell a run's pace: of our own methods, and of those of others, whose steps take ten times as long.
+# Window of attempts for the pace: of own methods, and of external solvers, whose steps take ten times as long.
 _WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4

@@ -115,7 +115,7 @@ class NativeRun:
     def march(self, attempts: int) -> int:
         """See `Run`."""
         jumps, now = self.problem.jumps, self.state.clock[TIME]
-        # The last call may have ended there: whoever looked at the run in between saw it as it was before the jump.
+        # The last call may have ended there; until now the run had the values before the jump.
         if np.any(jumps == now):
             self._resume()
         ahead = jumps[jumps > now]

@@ -12,7 +12,7 @@ from paraflex.dynamics.singularity import SingularityMeasure
 from paraflex.integrators.run import Instant
 from paraflex.integrators.watch import Breakdown
 
-# Steps of a run where nobody says how many.
+# Default limit of the steps of a run.
 MOST_STEPS = 10_000_000
 # A run that would need this many times the steps it may take is given up early: it may be faster later on.
 _STEPS_MARGIN = 5.0
@@ -20,7 +20,7 @@ _STEPS_MARGIN = 5.0
 # library's mechanisms take 45 thousand steps at most as their files have it, 260 thousand at 1e-7 m by TR-BDF2, and
 # none becomes more than 25 times slower.
 _SLOW_STEPS, _TIMES_SLOWER = 1_000_000, 100.0
-# What the first steps tell of a run's pace is left out: they start small.
+# The first steps are left out of the pace, as they are small.
 _FIRST_STEPS = 200
 # A singular position nearer than this is named.
 _NEAR_SINGULAR = 1e-2

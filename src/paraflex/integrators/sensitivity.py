@@ -25,9 +25,9 @@ from paraflex.kernel.sensitivity import make_piece, sensitivity_steps
 from paraflex.kernel.sensitivity_samples import DIFFERENCE_STEP, PLACES, Sensitivity, make_sensitivity
 from paraflex.kernel.tangent import make_tangent
 
-# Steps that are held at once.
+# Steps in memory at a time.
 _STEPS_AT_ONCE = 256
-# Where corrections of a stage are left larger than this part of what they correct, there is no derivative.
+# Largest relative correction of a stage at the end of the iteration; beyond it there is no derivative.
 _LARGEST_RESIDUAL = 1e-6
 
 

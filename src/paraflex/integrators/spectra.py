@@ -24,7 +24,7 @@ Roots = NDArray[Any]
 
 # Of NDF, orders 0 to 5, as SciPy has them: Shampine and Reichelt (1997), Table 1.
 _KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
-# Frequencies between which the principal root moves little, as a factor, and where following it begins.
+# Ratio of frequencies between which the principal root changes little, and the first frequency.
 _DENSE, _FIRST_FREQUENCY = 1.02, 1e-3
 
 

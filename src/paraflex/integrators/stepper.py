@@ -10,7 +10,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.integrators.forms import OdeForm
 
-# Times within a step that differ by less than this fraction of it are one.
+# Times that differ by less than this fraction of the step are the same.
 _SAME_TIME = 1e-9
 
 

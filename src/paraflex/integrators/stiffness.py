@@ -27,7 +27,7 @@ def largest_rate(form: OdeForm, problem: Problem) -> float:
     initial = problem.initial
     jacobian = form.jacobian(initial.time, form.pack(initial.time, initial.q, initial.v, 0.0))
     if not np.all(np.isfinite(jacobian)):
-        # The run itself says that it comes to nothing finite.
+        # The run itself reports values that are not finite.
         return 0.0
     if jacobian.shape[0] <= _MOST_DENSE:
         return float(np.max(np.abs(np.linalg.eigvals(jacobian))))

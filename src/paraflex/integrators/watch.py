@@ -13,7 +13,7 @@ from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.integrators.methods import Treatment
 from paraflex.kernel.packed import Signals
 
-# Slopes of a beam this large are beyond any theory of small slopes [rad]: what computes them diverges.
+# With slopes this large no theory of small slopes is valid, and the run diverges [rad].
 _LARGEST_SLOPE = 2.0
 # Joints that are further apart than this part of the mechanism's size, or motions further off [rad], have come apart.
 # Where constraints depend on one another they contradict one another long before.

@@ -32,16 +32,16 @@ from paraflex.mechanism.members import TASK_COORDINATES
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
 _LONGEST_STEP = 1e-3
-# Where such a step is too long it is cut into pieces, and these again; a step shorter than this is short enough [s].
+# A step that is too long is divided into so many pieces, repeatedly, down to the shortest step [s].
 _STEP_PIECES, _SHORTEST_STEP = 16, 1e-8
-# Steps from the assembly's pose to the start of the path; more where these fail.
+# Steps from the assembly's pose to the start of the path; more if these fail.
 _APPROACHES = (25, 250, 2500)
 # Instants at which the distance of an unreachable path from what can be reached is looked at, evenly spaced besides the
 # knots of the path, and so many more about the furthest.
 _INSTANTS_LOOKED_AT, _MORE_LOOKS = 41, 9
 # A path that leaves what can be reached within this part of what is left of it does so where closure stopped.
 _SOON = 0.05
-# A path that passes within a thousandth of a link of such a position cannot be told from one through it.
+# A path within a thousandth of a link of such a position cannot be distinguished from one through it.
 _NEARLY_SINGULAR = "or comes so near to one that the assembly beyond it is not certain"
 _MOVE_PATH = "move the path or the bases, or choose another assembly"
 _OTHER = "it can be reached, but only past a Type I singularity or in another assembly"
@@ -384,7 +384,7 @@ class PathClosure:
     ) -> UnreachablePathError:
         """The error of a path that cannot be followed: time, place, and distance of its furthest point."""
         lengths, k = self.coordinates != 2, found.furthest
-        # A path that comes back to its start is as far there: said once.
+        # A closed path has the same distance at its start and end, which is reported once.
         if found.out[k] and found.beyond(k) != found.beyond(0):
             place = ", ".join(f"{x:.4g}" for x in found.desired[k, lengths])
             place = f"({place}) m" if place else f"at t = {found.t[k]:.6g} s"

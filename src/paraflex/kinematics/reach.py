@@ -21,9 +21,9 @@ REACHED = 1e-8
 # Newton's iteration on the distance: how many, the longest step [sizes of the mechanism, rad], also where loops are
 # closed, the shortest, and the difference that second derivatives are taken by.
 _MAX_ITERATIONS, _LONGEST_MOVE, _SHORTEST_MOVE, _DIFFERENCE = 60, 0.5, 1e-12, 1e-6
-# A slope of the distance, or a curvature, below this is none.
+# A gradient or a curvature of the distance below this counts as zero.
 _FLAT = 1e-10
-# Poses from bodies turned at random that are tried besides.
+# Number of further starts with bodies turned at random.
 _SCATTERED = 4
 # Singular values below this part of the largest are of redundant constraints.
 _DEPENDENT = 1e-9

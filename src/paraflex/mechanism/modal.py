@@ -16,7 +16,7 @@ from paraflex.mechanism.damping import Damping
 Row = Sequence[float]
 Matrix = Sequence[Sequence[float]]
 
-# How far a matrix may be from symmetric or skew, as a fraction of its largest entry: digits lost on the way.
+# Largest deviation of a matrix from symmetric or skew, as a fraction of its largest entry: lost digits.
 _ASYMMETRY = 1e-6
 # Smallest eigenvalue of a matrix scaled to a unit diagonal that counts as positive.
 _SMALLEST_EIGENVALUE = 1e-12

@@ -18,7 +18,7 @@ from paraflex.results.metrics import METRICS
 
 Array = NDArray[np.float64]
 
-# Not what a design is chosen for.
+# Metrics by which designs are not chosen.
 _OF_THE_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
 _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
 _FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
@@ -87,7 +87,7 @@ class DesignTable:
                 )  # fmt: skip
         if names:
             return list(names)
-        # Of motors one by one only where there is nothing else.
+        # Metrics of single motors only if there are no others.
         varying = [name for name in self.metrics if self._varies(name) and name not in _OF_THE_SOLVER]
         chosen = ([name for name in varying if "." not in name] or varying)[:most]
         if not chosen:

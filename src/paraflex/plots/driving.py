@@ -25,7 +25,7 @@ from paraflex.results.following import headline, ranked_by_motion
 @drawn
 def actuation_condition(data: xr.Dataset) -> Figure:
     """Condition number of the actuation matrix along the path in every mode: large near a Type II singularity."""
-    # Of the planned motion: it goes on where a run stopped.
+    # It belongs to the planned motion, which continues after a run has stopped.
     whole = data.assign(end_effector=data["end_effector_desired"])
     return _of_all_modes(whole, data["actuation_condition"].transpose("mode", "time").values, "condition")
 
@@ -35,7 +35,7 @@ def tracking_distance(data: xr.Dataset) -> Figure:
     """Distance of the end-effector from its desired place in time, all modes in one panel."""
     away = (data["end_effector"] - data["end_effector_desired"]).transpose("mode", "time", "axis").values
     distance = 1e3 * np.linalg.norm(away, axis=2)
-    # What rounding leaves would stretch the axis.
+    # Rounding errors would extend the logarithmic axis.
     return _of_all_modes(data, np.where(distance > 1e-5, distance, np.nan), "distance")
 
 

@@ -398,7 +398,7 @@ def _palette(film: Film) -> Image.Image:
     scenes = tuple(at_times(shown, chosen) for shown in film.scenes)
     few = Film(scenes, film.size, film.fps, film.speed, film.look)
     palette = Image.fromarray(np.concatenate(list(_frames(few)))).convert("RGB").quantize(_GIF_COLOURS)
-    # The ground is exactly what it is: nothing near it may stand in for it.
+    # The background colour is exact; no similar colour replaces it.
     colours = np.array(palette.getpalette(), dtype=np.int64).reshape(-1, 3)
     ground = np.array(list(bytes.fromhex(film.look.ground[1:])))
     colours[np.max(np.abs(colours - ground), axis=1) < _NEAR] = ground

@@ -15,11 +15,11 @@ from paraflex.plots.selection import names_of
 from paraflex.plots.style import COLOURS, DASHES, keep_flat, look_of
 from paraflex.plots.workspace import finish_workspace, workspace_panel
 
-# A point that moves less than this share of all stands still.
+# A point that moves less than this fraction of the largest motion is at rest.
 _STILL_SHARE = 1e-3
 # Coordinates that change by less rest, but for rounding.
 _NOTHING = 1e-12
-# Of modal coordinates, what they are by the last part of their names.
+# Meaning of modal coordinates by the last part of their names.
 _KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1e3)}
 
 

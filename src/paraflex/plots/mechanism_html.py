@@ -12,7 +12,7 @@ from paraflex.plots.svg import sketch
 
 # Bodies, joints or modes listed one by one.
 _MOST_LISTED = 40
-# Groups of which more is said than how many there are.
+# Groups with a table of their own; of others only the number is shown.
 _LISTED_GROUPS = ("body", "joint", "motor", "assembly", "mode")
 
 

@@ -19,7 +19,7 @@ from paraflex.plots.style import BLUE, VERMILLION, ZERO
 _FAINT = "0.6"
 # Height of a panel [mm].
 _PANEL = 50.0
-# Far above the best a design says nothing of how the search came down; it is drawn at the upper edge.
+# Designs far above the best are drawn at the upper edge, as they would hide the convergence.
 _HIGHEST = 3.0
 
 

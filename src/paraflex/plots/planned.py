@@ -39,7 +39,7 @@ class PlannedFigure:
         return f"{self.figure.name}_{self.of}" if self.of else self.figure.name
 
 
-# Of results read from JSON, what must be there for a figure.
+# Required content of results from JSON for a figure.
 _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "convergence": lambda found: any(value is not None for _, value, _ in found.get("history", ())),
     "targets_reached": lambda found: any(target["value"] != 0.0 for target in found.get("targets", ())),

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")
 # Panels beside and below one another.
 _MOST_PARAMETERS, _MOST_METRICS = 3, 3
-# So many values of a parameter are joined by lines of medians; of more, medians of as many groups.
+# Most values of a parameter with a median each; more values are divided into as many groups.
 _MEDIAN_GROUPS = 12
 
 

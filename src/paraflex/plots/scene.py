@@ -25,7 +25,7 @@ BLOCK = (0.034, 0.022)
 _MARGIN = 0.07
 # Shares of the width that a scale bar may take.
 _SCALE_BAR = 0.28
-# A point that moves by less stays where it is [m].
+# A point that moves by less is at rest [m].
 _STILL_POINT = 1e-6
 # Shares of all places in percent between which a run is that does not come apart.
 _RUN_SHARES = (0.2, 99.8)

@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable, read_designs
 
 _OURS = "name a folder or file that paraflex wrote"
-# Files of results, those that tell what a folder is first.
+# Files of results; the first one found determines the kind of a folder.
 _RESULT_FILES = ("results.nc", "verify.nc", "compare-methods.json", "sensitivity.json", "indices.json", "result.json")
 _BEGINNINGS = {b"\x89HDF": "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", b"PAR1": "parquet"}
 

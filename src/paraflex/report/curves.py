@@ -14,7 +14,7 @@ from paraflex.plots.selection import names_of
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.page import Chart, Curve, Look
 
-# What the page has, a solid line among the dashes.
+# Numbers of colours and dashes of the page, the solid line included.
 N_COLOURS, N_DASHES = 8, 5
 DOTTED = 2
 MOST_SAMPLES = 2000

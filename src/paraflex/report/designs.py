@@ -17,7 +17,7 @@ from paraflex.results.metrics import metric_label
 _MOST_REASONS = 12
 _COMPLETE = "complete"
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-# A metric that spans so much is drawn on a logarithmic axis, and a range that is logarithmic itself.
+# A metric with this ratio of values has a logarithmic axis, as has a logarithmic range.
 _WIDE, _WIDE_RANGE = 50.0, 10.0
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Of a 16-bit number: what stands for NaN, and the largest magnitude left for the others.
+# 16-bit numbers: the code of NaN, and the largest magnitude of others.
 MISSING, _LARGEST_CODE = -32768, 32767
-# Bits of a single-precision fraction that are dropped: what is left resolves 4e-6 of a value and packs better.
+# Bits of a single-precision fraction that are dropped: the rest resolves 4e-6 of a value and compresses better.
 _DROPPED = 6
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 from paraflex.files import library_names
 from paraflex.results.doubts import FINDINGS, verdict_of
 
-# What a run takes where nothing is said.
+# Defaults of a run.
 _RUN_FLAGS = ("rigid", "ked", "balanced")
 _REQUEST_FIELDS = (
     "duration",

@@ -9,7 +9,7 @@ import xarray as xr
 
 from paraflex.findings import Finding, Level, Verdict
 
-# What the places of findings about single runs begin with.
+# Prefix of the places of findings about single runs.
 MODE = "mode "
 _LEVEL_WORDS = {Level.WRONG: "wrong", Level.DOUBTFUL: "warning"}
 # Attribute of a dataset that holds its findings, as JSON.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
 _DRIFT_DEGREE = 2
-# Fewer samples after the motion do not tell a vibration from a drift.
+# Fewer samples after the motion do not distinguish a vibration from a drift.
 _FEWEST_SAMPLES = 3 * (_DRIFT_DEGREE + 1)
 
 

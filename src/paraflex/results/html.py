@@ -75,7 +75,7 @@ def _verdict(run: TrackingRun | MotionRun) -> str:
 def _ended(solution: Solution) -> str:
     if not solution.t.size:
         return solution.status
-    # A run fails after its last sample: its message says when.
+    # A run fails after its last sample; its message has the time.
     until = " at" if solution.status in ("complete", "stopped") else ", its last sample at"
     return f"{solution.status}{until} t = {solution.t[-1]:.4g} s"
 

@@ -28,7 +28,7 @@ _BEAM_PIECES, _FEWEST_PIECES = 16, 4
 _SAME = 1e-9
 # Two stations are always on their chord: a deflection takes one more.
 _LEAST_ON_LINE = 3
-# Pieces shorter than this part of a body's size say nothing of a direction.
+# Pieces shorter than this fraction of a body's size have no defined direction.
 _SHORT_PIECE = 1e-6
 
 
@@ -260,7 +260,7 @@ def _rows(system: System, body: BodyCoordinates, drawn: Outline) -> Array:
 
 def _along(length: float, points: Mapping[str, float]) -> Array:
     """Stations along a bar, its ends and points among them."""
-    # Places may have a complex step: what is real of them decides.
+    # Places may have a complex step: their real parts decide.
     knots = [0.0]
     for x in sorted([*points.values(), length], key=np.real):
         if np.real(x - knots[-1]) > _SAME * np.real(length):

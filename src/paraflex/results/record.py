@@ -31,7 +31,7 @@ RUN_FIGURES = (
     "event",
     "event_time",
 )
-# What brakes took, where there were any.
+# Energy absorbed by brakes, if there were any.
 BRAKE_ENERGY = "brake_energy"
 
 

@@ -227,7 +227,7 @@ def _measurements(
                 _warm_up(case, setting.options(method.name))
             measured = _measure(case, method.name, setting, places, options)
         except (InputError, ImportError) as error:
-            # Not this run but the method: what it takes, or a package that is not installed.
+            # The method fails, not this run: a wrong argument, or a package that is not installed.
             yield Measurement(method.name, status="unavailable", reason=str(error))
             return
         if measured.status == "too slow":
@@ -242,7 +242,7 @@ def _warm_up(case: Case, options: IntegrationOptions) -> None:
         try:
             _solve(case, options, 0.0)
         except (_TooSlowError, NumericalError):
-            # A run that cannot go on says so when it is measured.
+            # A run that fails is reported when it is measured.
             return
 
 

@@ -17,7 +17,7 @@ from paraflex.integrators import DEFAULT_METHOD, METHODS
 
 # Errors at which times are compared [m], and the one in the table.
 LEVELS, TABLE_LEVEL = (1e-3, 1e-4, 1e-5, 1e-6), 1e-5
-# Of a measurement what is no number.
+# Fields of a measurement that are not numbers.
 _TEXTS = ("method", "status", "reason")
 # Packages whose version has a part in the times.
 _TIMING_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "scikit-sundae")

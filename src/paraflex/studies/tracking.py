@@ -134,7 +134,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
             try:
                 wait(futures)
             except KeyboardInterrupt:
-                # Ctrl-C reaches the main thread only; the runs hear of it at their next report and keep what they have.
+                # Ctrl-C reaches the main thread only; runs stop at their next progress report and keep their samples.
                 stop.set()
         outcomes = {mode.name: future.result() for mode, future in zip(chosen, futures, strict=True)}
         result = self._result(outcomes, interrupted=stop.is_set())

@@ -20,7 +20,7 @@ from paraflex.errors import InputError
 
 T = TypeVar("T")
 
-# Its square is nothing beside one, and no power of it that occurs underflows.
+# Its square is negligible against one, and no power that occurs underflows.
 COMPLEX_STEP = 1e-40
 
 

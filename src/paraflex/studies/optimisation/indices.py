@@ -25,10 +25,10 @@ from paraflex.writing import GO_ON, whole_file, write_json
 
 Array = NDArray[np.float64]
 TABLE = "indices.parquet"
-# What SALib calls the shares, and a row of the table.
+# SALib's names of the shares, and columns of a row.
 _SHARES = {"first": "S1", "first_confidence": "S1_conf", "total": "ST", "total_confidence": "ST_conf"}
 _ROW_COLUMNS = ("path", "mode", "metric", "parameter", *_SHARES, "samples", "dropped")
-# Base samples unless asked otherwise, and the fewest of which anything can be said.
+# Default number of base samples, and the least number for an estimate.
 _BASE_SAMPLES, _FEWEST_BASE_SAMPLES = 128, 8
 
 

@@ -16,9 +16,9 @@ from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
 
 Array = NDArray[np.float64]
-# A limit is held that is passed by no more than this share of it.
+# Relative violation of a limit that still counts as none.
 _LIMIT_EXCESS = 1e-6
-# What a design costs that passes a limit, and one that does not run, in objectives of the start.
+# Cost of a design that violates a limit, and of one that does not run, in objectives of the start.
 _OUTSIDE, _FAILED = 1e2, 1e4
 # The same for methods with slopes, which accept nothing above the start: more would spoil what they learn of curvature.
 _REFUSED = 3.0

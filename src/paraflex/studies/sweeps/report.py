@@ -30,7 +30,7 @@ from paraflex.results.doubts import doubt_lines
 from paraflex.results.metrics import VALIDITY
 
 _SEARCH_RESULT = "result.json"
-# So much a metric may differ from its row's before the reader is warned: other machines round otherwise.
+# Relative difference of a metric from its row above which the report warns: other machines round differently.
 _ROW_DIFFERENCE = 1e-6
 
 
@@ -108,7 +108,7 @@ def _again(
         try:
             outcomes = dict(zip(rows, pool.map(again, rows), strict=True))
         except KeyboardInterrupt:
-            # Ctrl-C reaches the main thread only; the others hear of it at their next report.
+            # Ctrl-C reaches the main thread only; the others stop at their next progress report.
             stop.set()
             raise
     runs = {row: outcome[0] for row, outcome in outcomes.items() if not isinstance(outcome, str)}
