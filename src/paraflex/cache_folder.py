@@ -1,4 +1,4 @@
-"""A place for compiled kernels where Numba finds none: neither beside the sources nor in the user's cache folder.
+"""A folder for compiled kernels if Numba finds none: neither beside the sources nor in the user's cache folder.
 
 Numba tries NUMBA_CACHE_DIR, the folder of the sources, and the user's cache folder, and refuses to import kernels
 where it may write to none of them: a read-only installation, run by a user without a home.
@@ -31,20 +31,20 @@ def ensure_cache_folder(sources: Path, environment: MutableMapping[str, str] = o
 
 
 def _users(environment: MutableMapping[str, str]) -> Path:
-    """Where Numba keeps what it compiles for this user."""
+    """Folder of Numba's cache for this user."""
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "numba"
     return Path(environment.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "numba"
 
 
 def _can_write(folder: Path) -> bool:
-    """Whether files can be made in a folder, or the folder itself."""
+    """Whether files can be created in a folder, or the folder itself."""
     existing = next((place for place in (folder, *folder.parents) if place.exists()), None)
     return existing is not None and os.access(existing, os.W_OK | os.X_OK)
 
 
 def _own_folder() -> Path:
-    """One in the folder for temporary files that nobody else can write to: what is in a cache is executed."""
+    """A folder for temporary files that only this user can write to, as the content of a cache is executed."""
     import tempfile
 
     user = os.getuid()

@@ -1,4 +1,4 @@
-"""Kineto-elastodynamics (KED): the elastic response to a prescribed rigid motion, with no way back.
+"""Kineto-elastodynamics (KED): the elastic response to a prescribed rigid motion, without influence on the motion.
 
 All coordinates xi = (dr, dphi, u) of all bodies are small displacements about the motion q_r(t) of the rigid mechanism.
 At every instant the mechanism is a structure, undeformed in its nominal pose, the joints of the active motors held:
@@ -162,7 +162,7 @@ def _check(task: TrackingTask, step: float) -> None:
 
 @dataclass(frozen=True)
 class _NominalMotion:
-    """The rigid motion q, v, a (k, n) in a system's coordinates, undeformed; forces and turns that follow from it."""
+    """The rigid motion q, v, a (k, n) in a system's coordinates, undeformed, with its forces and angles."""
 
     system: System
     q: Array
@@ -174,7 +174,7 @@ class _NominalMotion:
 
     @property
     def angles(self) -> Array:
-        """Of the body frames (k, bodies)."""
+        """Angles of the body frames (k, bodies)."""
         return self.q[:, [body.angle for body in self.system.bodies]]
 
     def structure(self, held: Sequence[str]) -> tuple[Array, Array]:
@@ -272,7 +272,7 @@ def _until(stop: float, times: Array, responses: Iterable[Response]) -> Iterator
 
 
 def _fields(task: TrackingTask, torques: FeedForward, t: Array, kept: list[Response]) -> dict[str, Any]:
-    """What a Solution holds of the instants kept; violations are those of the nonlinear constraints there."""
+    """Fields of a Solution at the kept instants; violations are those of the nonlinear constraints."""
     system = task.system
     xi, dxi, ddxi, mu = (np.array(values) for values in zip(*kept, strict=True))
     q, v, a = _nominal(task, t).displaced(xi, dxi, ddxi)

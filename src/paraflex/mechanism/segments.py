@@ -58,7 +58,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
 
     A joint of two half segments bends as they do together: k = E I / (L / n), of spans of several stiffnesses the
     reciprocal of int dx / E I over the two halves. Lumped masses move with the segment they lie on. The model is
-    another discretisation of the same beam, without stretch, and knows nothing of shape functions.
+    another discretisation of the same beam, without elongation and without shape functions.
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ class Curve:
     choice : int, optional
         Which of the chart's choices shows it; every one by default.
     quiet : bool
-        Left out of what is said of where the pointer is.
+        Left out of the label at the pointer.
     """
 
     name: str
@@ -159,7 +159,7 @@ class Designs:
     columns : sequence of DesignColumn
         Parameters first.
     telling : str
-        What runs are told apart by: "mode".
+        What distinguishes runs: "mode".
     series : sequence of (str, Look)
         Its names and looks.
     member : (k,) array of int

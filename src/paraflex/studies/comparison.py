@@ -34,7 +34,7 @@ class Reference:
     tolerance, check_tolerance : float
         [m]
     uncertainty : float
-        Largest distance between the two [m]: smaller errors are not told apart from the reference's own.
+        Largest distance between the two [m]: smaller errors are not distinguishable from the reference's own.
     wall_time : float
         Of the run [s].
     """

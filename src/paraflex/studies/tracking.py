@@ -113,7 +113,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
     ) -> StudyResult:
         """Simulate every mode; one that fails is reported and the others go on. See `Study.run`.
 
-        Progress is told of each mode in seconds of its motion. Workers are threads.
+        Progress is that of each mode in seconds of its motion. Workers are threads.
 
         Raises
         ------
