@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from paraflex.campaign.journal import JOURNAL, LOCK, Journal, held, no_folder, write_journal
-from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA, UNFINISHED, read_table
+from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA_KEY, UNFINISHED, read_table
 from paraflex.errors import InputError, OutputError
 from paraflex.writing import GO_ON, read_json, write_json
 
@@ -51,7 +51,7 @@ def open_campaign(folder: Path, study: Mapping[str, Any], schema: pa.Schema) -> 
             _check_same(folder, study if noted is None else json.loads(noted), study)
             if noted is None:
                 _take_over(folder, journal)
-                journal.note(SCHEMA, schema.serialize().to_pybytes())
+                journal.note(SCHEMA_KEY, schema.serialize().to_pybytes())
                 journal.note("study", json.dumps(study, default=str).encode())
             if not (folder / STUDY).exists():
                 write_json(folder / STUDY, study, remedy=GO_ON)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from paraflex.tracking import TrackingTask
 
 # How a run ends that did what was asked.
-FINISHED = ("complete", "stopped")
+DONE_STATUSES = ("complete", "stopped")
 
 
 def plain_console(*, stderr: bool = False) -> Console:
@@ -123,7 +123,7 @@ def failures(console: Console, result: StudyResult) -> None:
     if result.data is not None:
         for mode in result.data["mode"].values:
             run = result.data.sel(mode=mode)
-            if run["status"].item() not in FINISHED:
+            if run["status"].item() not in DONE_STATUSES:
                 console.print(f'error: mode "{mode}": {run["message"].item()}', soft_wrap=True)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.campaign import OnProgress, Study, Workers
-from paraflex.designs.run import COMPLETE, run_task
+from paraflex.designs.run import STATUS_COMPLETE, run_task
 from paraflex.designs.samples import RANDOM
 from paraflex.designs.schema import SamplingTable, study_table
 from paraflex.designs.sweep import RunTask, SweepStudy, SweptResult, make_study
@@ -181,7 +181,7 @@ def _indices(study: IndicesStudy, table: Path) -> list[dict[str, Any]]:
     shape = (len(study.sweep.designs), len(setting.paths), len(setting.modes))
     read = pq.read_table(table, columns=["status", *study.columns])
     # Rows are in order of designs, then paths, then modes.
-    complete = (read["status"].to_numpy() == COMPLETE).reshape(shape)
+    complete = (read["status"].to_numpy() == STATUS_COMPLETE).reshape(shape)
     out = []
     for column in study.columns:
         values = read[column].to_numpy().astype(float).reshape(shape)
