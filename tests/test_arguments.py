@@ -486,3 +486,21 @@ def test_a_task_is_no_model(given):
         pf.plan(given["task"], given["model"].path("square"))
     with pytest.raises(InputError, match=r"^model: not a model, a mechanism or a text \(got namespace"):
         pf.plan(SimpleNamespace(mechanism=3, paths={}), "square")
+
+
+def test_equal_types_are_named_in_the_order_of_the_annotation():
+    """`float | dict` equals `dict | float`, also within a list; the message of each follows its own annotation."""
+
+    @checked_arguments()
+    def table_first(value: dict | float, values: list[dict | float] = ()):
+        return value, values
+
+    @checked_arguments()
+    def number_first(value: float | dict, values: list[float | dict] = ()):
+        return value, values
+
+    for call, wanted in [(table_first, "a dictionary or a number"), (number_first, "a number or a dictionary")]:
+        with pytest.raises(InputError, match=f"^value: not {wanted} .*; give {wanted}$"):
+            call("three")
+        with pytest.raises(InputError, match=f"^values: not {wanted} "):
+            call(3.0, ["three"])

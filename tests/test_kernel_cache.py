@@ -93,7 +93,7 @@ def test_outdated_kernels_are_removed(tmp_path):
         os.utime(folder, (k, k))
     (tmp_path / "theirs.nbi").touch()
     folder = disk_cache.make_folder(tmp_path)
-    kept = {folder, tmp_path / "theirs.nbi", *others[6 - disk_cache.KEPT :]}
+    kept = {folder, tmp_path / "theirs.nbi", *others[6 - disk_cache.STATES_KEPT :]}
     assert set(tmp_path.iterdir()) == kept
     # Made already: nothing goes.
     others[0].mkdir()

@@ -11,7 +11,7 @@ from paraflex.designs.measure import measure
 from paraflex.plots.designs import read_designs
 from paraflex.plots.labels import metric_name
 from paraflex.results import summary
-from paraflex.results.following import FOLLOWING, KEPT
+from paraflex.results.following import FOLLOWING, KEPT_METRICS
 from paraflex.results.metrics import METRICS
 from paraflex.tracking import plan_tracking
 
@@ -106,7 +106,7 @@ def test_datasets_hold_what_sweeps_measure(run):
     data = pf.tracking_dataset([run])
     figures = summary(data)["modes"]["++"]
     measured = measure(run, tuple(METRICS))
-    for name in KEPT:
+    for name in KEPT_METRICS:
         metric = METRICS[name]
         assert data[name].attrs["comment"] == metric.meaning
         for column, value in zip(metric.columns(["left", "right"]), np.ravel(data[name].values), strict=True):

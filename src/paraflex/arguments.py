@@ -1,4 +1,4 @@
-"""What is given for an argument or a field: taken where it is clear what is meant, else refused by its name.
+"""Checks and conversions of arguments and fields by their annotations, with errors that name them.
 
 Annotations say what is wanted: those of a function under `checked_arguments`, those of the fields of a dataclass that
 derives from `CheckedFields`. Whether numbers make sense, and names exist, is checked by whoever uses them.
@@ -35,7 +35,7 @@ Take = Callable[[Any, str], Any]
 
 
 def checked_arguments(**remedies: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Take the arguments of a function as their annotations say.
+    """Convert and check the arguments of a function by their annotations.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def checked_arguments(**remedies: str) -> Callable[[Callable[P, R]], Callable[P,
 
 
 class CheckedFields:
-    """Base of dataclasses whose fields are taken as their annotations say.
+    """Base of dataclasses whose fields are converted and checked by their annotations.
 
     A dataclass with a `__post_init__` of its own calls this one first. `_table` is what errors name before the fields,
     with the name of the object where it has one.
@@ -92,7 +92,7 @@ class CheckedFields:
 
 
 class _Field:
-    """The name of a field, written only where an error names it."""
+    """The name of a field, composed only if an error needs it."""
 
     __slots__ = ("name", "owner")
 
@@ -106,7 +106,7 @@ class _Field:
 
 
 def refused(value: object, field: object, what: str, remedy: str) -> InputError:
-    """The error for something else than what is wanted."""
+    """The error for a value of a wrong kind."""
     if value is None:
         return InputError("is not given", field=str(field), remedy=remedy)
     return InputError(f"not {what}", field=str(field), value=value, remedy=remedy)
@@ -144,16 +144,21 @@ def _takes(hints: Mapping[str, Any], module: str) -> dict[str, Take]:
 
 
 def _resolved(hint: Any, names: dict[str, Any]) -> Any:
-    """An annotation as a type; Any where its names are known to type checkers alone."""
+    """An annotation as a type; Any if its names exist for type checkers only."""
     try:
         return eval(hint, names) if isinstance(hint, str) else hint
     except NameError:
         return Any
 
 
-@cache
 def take_as(hint: Any) -> Take | None:
-    """How what is given is taken as a type; None where anything is."""
+    """Function that takes a value as a type; None for a type that every value has."""
+    # Unions are equal in any order of their types, but errors name the types in the order of the annotation.
+    return _take_as(hint, repr(hint))
+
+
+@cache
+def _take_as(hint: Any, _spelling: str) -> Take | None:
     if hint in _PLAIN:
         return _PLAIN[hint]
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
@@ -171,7 +176,7 @@ def take_as(hint: Any) -> Take | None:
 
 
 def _is_row(hint: Any) -> bool:
-    """Whether a type is of so many values: a place, and not a list of any length."""
+    """Whether a type has a fixed number of values, such as a place, and is not a list of any length."""
     return typing.get_origin(hint) is tuple and typing.get_args(hint)[-1:] != (Ellipsis,)
 
 
@@ -188,7 +193,7 @@ def _as_whole(value: Any, field: str) -> Any:
 
 
 def _as_text(value: Any, field: str) -> Any:
-    """A text; of what has a name, its name."""
+    """A text; for an object with a name, its name."""
     if isinstance(value, str):
         return value
     name = getattr(value, "name", None)
@@ -209,7 +214,7 @@ _PLAIN: dict[Any, Take | None] = {
 
 
 def _as_instance(kind: type) -> Take | None:
-    """An object of a class, or what its `taken_from` makes of something else."""
+    """An object of a class, or the one that its `taken_from` makes of another value."""
     if getattr(kind, "_is_protocol", False) and not getattr(kind, "_is_runtime_protocol", False):
         return None
     if issubclass(kind, Enum):
@@ -228,7 +233,7 @@ def _as_instance(kind: type) -> Take | None:
 
 
 def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
-    """One of several types: what is of one of them, else what one of them can be made from."""
+    """One of several types: a value of one of them, or convertible to one of them."""
     takes = {kind: take_as(kind) for kind in kinds if kind is not NoneType}
     if any(isinstance(kind, type) and issubclass(kind, PurePath) for kind in kinds):
         # The name of an object is no name of a file.
@@ -256,7 +261,7 @@ def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
 
 
 def _as_row(hint: Any, kinds: Sequence[Any]) -> Take:
-    """So many values, each of its type: a place in the plane."""
+    """A fixed number of values, each of its type: a place in the plane."""
     takes = [take_as(kind) for kind in kinds]
 
     def take(value: Any, field: str) -> Any:
@@ -319,18 +324,18 @@ def _length(value: Any) -> int:
 
 
 def _same(given: Any, made: Any) -> Any:
-    """What was given, where it is what was made."""
+    """The given value if the made one equals it."""
     return given if type(given) is type(made) and all(a is b for a, b in zip(given, made, strict=True)) else made
 
 
 _NOUNS = {float: "a number", int: "a whole number", str: "a text", bool: "True or False"}
-_COUNTS = {2: "two", 3: "three"}
+_NUMBER_WORDS = {2: "two", 3: "three"}
 # What objects of a class are called, and how one comes by them.
 _GIVEN_AS: dict[Any, tuple[str, str]] = {}
 
 
 def given_as(noun: str, wanted: str = "") -> Callable[[C], C]:
-    """Say what errors call objects of a class, and what they ask for: the names of the classes by default."""
+    """Register the words of errors for a class: its noun, and the value to give."""
 
     def register(kind: C) -> C:
         _GIVEN_AS[kind] = noun, wanted
@@ -340,7 +345,7 @@ def given_as(noun: str, wanted: str = "") -> Callable[[C], C]:
 
 
 def _noun(hint: Any) -> str:
-    """What a type is called in the message of an error."""
+    """Noun of a type in error messages."""
     if hint in _NOUNS:
         return _NOUNS[hint]
     if _stripped(hint) in _GIVEN_AS:
@@ -349,7 +354,7 @@ def _noun(hint: Any) -> str:
     if origin in _UNIONS:
         return _either([_noun(kind) for kind in _members(inner)])
     if _is_row(hint):
-        return f"{_COUNTS.get(len(inner), str(len(inner)))} numbers" if set(inner) == {float} else "such a row"
+        return f"{_NUMBER_WORDS.get(len(inner), str(len(inner)))} numbers" if set(inner) == {float} else "such a row"
     if origin in _LISTS:
         return "a list"
     if origin in _TABLES or hint is dict:
@@ -362,7 +367,7 @@ def _noun(hint: Any) -> str:
 
 
 def _wanted(hint: Any) -> str:
-    """What to give instead."""
+    """The value to give instead."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     wanted = _GIVEN_AS.get(_stripped(hint), ("", ""))[1]
     if wanted:
@@ -379,13 +384,13 @@ def _wanted(hint: Any) -> str:
 
 
 def _stripped(hint: Any) -> Any:
-    """A type that may be None, without that."""
+    """A type without None."""
     kinds = [kind for kind in typing.get_args(hint) if kind is not NoneType]
     return reduce(or_, kinds) if typing.get_origin(hint) in _UNIONS and kinds else hint
 
 
 def _members(kinds: Sequence[Any]) -> list[Any]:
-    """Of a union, without None; names of files and words to choose from are more than texts."""
+    """Types of a union, without None; and without str beside file names and enumerations."""
     named = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, PurePath | Enum)]
     return [kind for kind in kinds if kind is not NoneType and not (named and kind is str)]
 

@@ -1,4 +1,4 @@
-"""Arrays of numbers, as annotations name them; docstrings say their shapes."""
+"""Arrays of numbers in annotations; docstrings have their shapes."""
 
 from __future__ import annotations
 

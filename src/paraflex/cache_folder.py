@@ -1,4 +1,4 @@
-"""A place for compiled kernels where Numba finds none: neither beside the sources nor in the user's cache folder.
+"""A folder for compiled kernels if Numba finds none: neither beside the sources nor in the user's cache folder.
 
 Numba tries the folder of the sources and the user's cache folder, or NUMBA_CACHE_DIR alone where that is set, and
 refuses to import kernels where it may write to none of them: a read-only installation, run by a user without a home.
@@ -37,14 +37,14 @@ def ensure_cache_folder(sources: Path, environment: MutableMapping[str, str] = o
 
 
 def _users(environment: MutableMapping[str, str]) -> Path:
-    """Where Numba keeps what it compiles for this user."""
+    """Folder of Numba's cache for this user."""
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "numba"
     return Path(environment.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "numba"
 
 
 def _can_write(folder: Path) -> bool:
-    """Whether files can be made in a folder, or the folder itself."""
+    """Whether files can be created in a folder, or the folder itself."""
     existing = next((place for place in (folder, *folder.parents) if place.exists()), None)
     return existing is not None and existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
 
@@ -56,7 +56,7 @@ def _warn(text: str) -> None:
 
 
 def _own_folder() -> Path:
-    """One in the folder for temporary files that nobody else can write to: what is in a cache is executed."""
+    """A folder for temporary files that only this user can write to, as the content of a cache is executed."""
     import tempfile
 
     user = os.getuid()

@@ -40,14 +40,14 @@ compile_parts(sys.argv[1:])
 
 
 def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:
-    """Whether the kernels for beams of this geometry stand in the cache on disk."""
+    """Whether the kernels for beams of this geometry are in the cache on disk."""
     return _stamp(as_enum(Geometry, geometry, "geometry")).exists()
 
 
 def compile_kernels(
     geometry: Geometry | str = Geometry.SECOND_ORDER, announce: Callable[[str], None] | None = None
 ) -> None:
-    """Compile the kernels for beams of a geometry unless that has been done.
+    """Compile the kernels for beams of a geometry unless they are compiled.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def compile_kernels(
 
 
 def compile_all_kernels(announce: Callable[[str], None] | None = None) -> None:
-    """Compile the kernels for beams of every geometry, as far as that has not been done."""
+    """Compile the kernels for beams of every geometry that are not compiled."""
     _compile(list(Geometry), announce)
 
 
@@ -94,7 +94,7 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None)
 
 
 def _shares(geometries: list[Geometry]) -> list[list[str]]:
-    """What each of two processes compiles, as GEOMETRY:PART: each looks itself at what several kernels call."""
+    """Parts of the compilation for two processes, as GEOMETRY:PART; common functions are compiled in both."""
     parts = [[f"{geometry.value}:{part}" for part in _PARTS] for geometry in geometries]
     if len(parts) == 1:
         return [parts[0][:1], parts[0][1:]]
@@ -103,7 +103,7 @@ def _shares(geometries: list[Geometry]) -> list[list[str]]:
 
 
 def _stamp(geometry: Geometry) -> Path:
-    """A file among the machine code that says: made by this Python for this processor, as a folder may be shared."""
+    """A file beside the machine code that names Python and processor, as the folder may be shared."""
     processor = (binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
     here = repr((sys.version, processor, STATE, PLAIN))
     return Path(march.cache_path) / f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"

@@ -1,4 +1,4 @@
-"""How objects show themselves in notebooks: tables of plain HTML that take their colours from the page, light or dark.
+"""Views of objects in notebooks: tables of plain HTML that take their colours from the page, light or dark.
 
 What a mechanism or a run shows takes drawings and metrics, which are made from them. Views therefore stand above what
 they show: `view` knows them by class, and `Shown` asks for them when a notebook does.
@@ -20,15 +20,15 @@ _RULE = "1px solid rgba(128, 128, 128, 0.45)"
 
 @singledispatch
 def view(thing: object) -> str:
-    """The HTML of an object; `view.register(CLASS)` says how one of a class is shown."""
+    """The HTML of an object; `view.register(CLASS)` registers the view of a class."""
     raise TypeError(f"no view of {type(thing).__name__} is registered")
 
 
 class Shown:
-    """What shows itself in notebooks by the view of its class."""
+    """Base of objects with a view in notebooks."""
 
     def _repr_html_(self) -> str:
-        """In notebooks."""
+        """HTML for notebooks."""
         for module in _VIEWS:
             if view.dispatch(type(self)) is view.dispatch(object):
                 import_module(module)
@@ -36,7 +36,7 @@ class Shown:
 
 
 def page(title: str, *parts: str) -> str:
-    """A title and what stands below it, whose parts are HTML; empty ones are left out."""
+    """A title and the HTML parts below it; empty ones are left out."""
     return f"<div><div><strong>{escape(title)}</strong></div>{''.join(part for part in parts if part)}</div>"
 
 
@@ -46,7 +46,7 @@ def sentence(text: str) -> str:
 
 
 def facts(pairs: Iterable[tuple[str, Any]]) -> str:
-    """Names and values below one another; what is None or empty is left out."""
+    """Names and values below one another; None and empty values are left out."""
     rows = [(name, value) for name, value in pairs if not (value is None or value in ("", [], ()))]
     cells = "".join(
         f'<tr><th style="text-align: left; font-weight: normal; opacity: 0.75">{escape(name)}</th>'
@@ -57,7 +57,7 @@ def facts(pairs: Iterable[tuple[str, Any]]) -> str:
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> str:
-    """A table: numbers on the right, text on the left; nothing where there are no rows."""
+    """A table: numbers on the right, text on the left; empty if there are no rows."""
     body = "".join("<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows)
     if not body:
         return ""
@@ -68,7 +68,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str =
 
 
 def written(value: Any) -> str:
-    """A value as text: numbers to four digits, lists with commas, nothing for what is no number."""
+    """A value as text: numbers to four digits, lists with commas, nothing for NaN."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Kineto-elastodynamics (KED): the elastic response to a prescribed rigid motion, with no way back.
+"""Kineto-elastodynamics (KED): the elastic response to a prescribed rigid motion, without influence on the motion.
 
 All coordinates xi = (dr, dphi, u) of all bodies are small displacements about the motion q_r(t) of the rigid mechanism.
 At every instant the mechanism is a structure, undeformed in its nominal pose, the joints of the active motors held:
@@ -38,7 +38,7 @@ from paraflex.mechanism import ActuationMode, Geometry, grouped
 from paraflex.tracking import TrackingRun, TrackingTask
 
 # A sample spacing may be this much longer than a whole number of steps: rounding of the division.
-_ROUNDING = 1e-9
+_ROUNDED_SPACING = 1e-9
 
 
 @checked_arguments()
@@ -96,7 +96,7 @@ def simulate_ked(
         task = task.remodelled(task.mechanism.with_geometry(Geometry.LINEAR))
     torques, samples = task.torques(mode), task.motion.t
     condition = actuation_condition(task.effort, torques.mode)
-    substeps = max(1, math.ceil((samples[1] - samples[0]) / step * (1.0 - _ROUNDING)))
+    substeps = max(1, math.ceil((samples[1] - samples[0]) / step * (1.0 - _ROUNDED_SPACING)))
     times = np.linspace(samples[0], samples[-1], substeps * (samples.size - 1) + 1)
     nominal, rigid = _nominal(task, times), task.motion
     end = end_of_motion(rigid.system, rigid.t, rigid.q, rigid.v)
@@ -162,7 +162,7 @@ def _check(task: TrackingTask, step: float) -> None:
 
 @dataclass(frozen=True)
 class _NominalMotion:
-    """The rigid motion q, v, a (k, n) in a system's coordinates, undeformed; forces and turns that follow from it."""
+    """The rigid motion q, v, a (k, n) in a system's coordinates, undeformed, with its forces and angles."""
 
     system: System
     q: Array
@@ -174,7 +174,7 @@ class _NominalMotion:
 
     @property
     def angles(self) -> Array:
-        """Of the body frames (k, bodies)."""
+        """Angles of the body frames (k, bodies)."""
         return self.q[:, [body.angle for body in self.system.bodies]]
 
     def structure(self, held: Sequence[str]) -> tuple[Array, Array]:
@@ -272,7 +272,7 @@ def _until(stop: float, times: Array, responses: Iterable[Response]) -> Iterator
 
 
 def _fields(task: TrackingTask, torques: FeedForward, t: Array, kept: list[Response]) -> dict[str, Any]:
-    """What a Solution holds of the instants kept; violations are those of the nonlinear constraints there."""
+    """Fields of a Solution at the kept instants; violations are those of the nonlinear constraints."""
     system = task.system
     xi, dxi, ddxi, mu = (np.array(values) for values in zip(*kept, strict=True))
     q, v, a = _nominal(task, t).displaced(xi, dxi, ddxi)

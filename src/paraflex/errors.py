@@ -1,4 +1,4 @@
-"""Typed errors: what went wrong, where, and what to do about it.
+"""Typed errors with the problem, its place and the remedy.
 
 Two families. An `InputError` is the user's to mend: it names the field, the value and the remedy, and the
 command line turns it into one line and exit code 2. A `NumericalError` names time, step, cause and remedy, and
@@ -32,7 +32,7 @@ def printable(text: str) -> str:
 
 
 class ParaflexError(Exception):
-    """Root of every error that paraflex raises on purpose."""
+    """Base class of every error that paraflex raises."""
 
 
 class InputError(ParaflexError, ValueError):
@@ -67,15 +67,15 @@ class InputError(ParaflexError, ValueError):
         return printable(f"{where}: {self.problem}{value}{remedy}").replace("\n", "\\n")
 
     def in_file(self, source: str) -> InputError:
-        """The same error, naming the file it came from."""
+        """The same error with the name of its file."""
         return type(self)(self.problem, field=self.field, value=self.value, remedy=self.remedy, source=source)
 
     def at(self, field: str) -> InputError:
-        """The same error, naming the option or field that the user gave."""
+        """The same error with another option or field."""
         return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy)
 
     def within(self, table: str) -> InputError:
-        """The same error, its field named from the table it stands in."""
+        """The same error with its field inside a table."""
         field = f"{table}.{self.field}"
         return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy, source=self.source)
 
@@ -101,7 +101,7 @@ def as_enum(kind: type[E], value: E | str, field: str) -> E:
 
 
 def warn_user(warning: ParaflexWarning) -> None:
-    """Issue a warning that names the line outside of this package that led to it.
+    """Issue a warning at the line outside of this package that caused it.
 
     How many calls are between depends on decorators and short cuts, so that no constant `stacklevel` would do.
     """
@@ -112,7 +112,7 @@ def warn_user(warning: ParaflexWarning) -> None:
 
 
 def suggestion(name: object, known: Iterable[str]) -> str:
-    """A remedy for an unknown name: the nearest known one, or all of them where several are as near."""
+    """A remedy for an unknown name: the nearest known one, or all of them if several are as near."""
     known = list(known)
     near = get_close_matches(str(name), known, n=2)
     alike = [SequenceMatcher(None, str(name), each).ratio() for each in near]
@@ -128,7 +128,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _short(value: object, limit: int = 80) -> str:
-    """What was given, in one line: of an object that takes more its kind."""
+    """A value in one line; for a longer one its kind."""
     text = repr(value).replace("\n", " ")
     if len(text) <= limit:
         return text
@@ -140,7 +140,7 @@ def _short(value: object, limit: int = 80) -> str:
 
 @dataclass(frozen=True)
 class Moment:
-    """When and where a computation stopped.
+    """Time and place at which a computation stopped.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class Moment:
 
 
 class NumericalError(ParaflexError, ArithmeticError):
-    """A computation that could not go on.
+    """A computation that failed.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ class UnreachablePathError(AssemblyError):
 
     @property
     def problem(self) -> str:
-        """Cause, moment, and how far the path is out of reach."""
+        """Cause, moment, and distance of the path from the workspace."""
         return f"{super().problem}: {self.detail}" if self.detail else super().problem
 
 
@@ -252,19 +252,19 @@ class IntegrationError(NumericalError):
 
 
 class SingularPositionError(IntegrationError):
-    """A run came to a singular position, where constraints depend on one another, and did not pass it."""
+    """A run reached a singular position, where constraints depend on one another, and did not pass it."""
 
 
 class SliderOffBeamError(IntegrationError):
-    """A point that slides along a beam came to the beam's end, and the joint's `at_end` asks for an error."""
+    """A sliding point reached the end of its beam, and the joint has `at_end` "error"."""
 
 
 class ConstraintDriftError(IntegrationError):
-    """Joints came apart, or a prescribed motion was left, further than errors of integration explain."""
+    """Constraints are violated by more than errors of integration explain."""
 
 
 class ParaflexWarning(UserWarning):
-    """Root of every warning that paraflex issues: `warnings.simplefilter("error", ParaflexWarning)` stops at each.
+    """Base class of all warnings of paraflex: `warnings.simplefilter("error", ParaflexWarning)` raises them.
 
     Attributes
     ----------
@@ -276,16 +276,16 @@ class ParaflexWarning(UserWarning):
 
 
 class ModelWarning(ParaflexWarning):
-    """Something in a model or a study is doubtful, though it may be meant: see `findings`."""
+    """Something in a model or a study is doubtful, but may be intended: see `findings`."""
 
 
 class ResultWarning(ParaflexWarning):
-    """A result is far from what mass, size and speed of the mechanism make plausible: see `findings`."""
+    """A result is implausible for the mass, size and speed of the mechanism: see `findings`."""
 
 
 class StiffnessWarning(ParaflexWarning):
-    """An explicit method will take very many steps, by stability alone."""
+    """Stability requires very many steps of an explicit method."""
 
 
 class ValidityWarning(ParaflexWarning):
-    """A run has gone beyond what its model can describe: see `validity`."""
+    """The model is not valid for a run: see `validity`."""

@@ -1,4 +1,4 @@
-"""A mechanism left to itself: no path, but loads, prescribed angles and constant motor torques."""
+"""A mechanism without a path, under loads, prescribed motions and constant motor torques."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from paraflex.validity import Validity, assess, doubtful_results, warn, with_bla
 @given_as("a run without a path", "the run that simulate_motion returns")
 @dataclass(frozen=True)
 class MotionRun(Shown):
-    """A mechanism's own motion.
+    """A run of a mechanism without a path.
 
     Attributes
     ----------
@@ -51,12 +51,12 @@ class MotionRun(Shown):
 
     @cached_property
     def validity(self) -> Validity | None:
-        """How far the run is within what its model can describe; None of rigid bodies."""
+        """Validity of the model in the run; None for rigid bodies."""
         return assess(self.system, self.solution)
 
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
-        """What happened in it, and what of its results is not plausible."""
+        """Findings on events in the run, and on implausible results."""
         return (*self.solution.findings, *doubtful_results(self.system, self.solution))
 
 
@@ -72,7 +72,7 @@ def simulate_motion(
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> MotionRun:
-    """Integrate a mechanism under what acts on it.
+    """Integrate a mechanism without a path under its loads.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _run(system: System, times: Array, torques: Mapping[str, float], solution: S
 
 
 def _state(system: System, start: Start | str | None) -> State:
-    """The state that a start describes, or an assembly at rest."""
+    """The state at the given start, or an assembly at rest."""
     mechanism = system.mechanism
     if isinstance(start, Start):
         return start_state(system, start, mechanism.assemblies[0] if mechanism.assemblies else None)

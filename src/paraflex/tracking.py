@@ -1,4 +1,4 @@
-"""The paper's study (Fig. 10), joined: desired path, rigid joint motion, torques of a mode, flexible mechanism."""
+"""The paper's study (Fig. 10): desired path, rigid joint motion, torques of a mode, flexible mechanism."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _SAME_TIME = 1e-9
 
 
 class Ending(Enum):
-    """What the active motors do after the path.
+    """Action of the active motors after the path.
 
     FREE
         Their feed-forward goes on: no torque where nothing pulls at the mechanism at rest, and what then is left of
@@ -53,7 +53,7 @@ class Ending(Enum):
 @given_as("a task", "the task that plan_tracking makes")
 @dataclass(frozen=True)
 class TrackingTask:
-    """A mechanism, a path, and the rigid motion along it: what the runs of all modes share.
+    """A mechanism, a path, and the rigid motion along it: the common part of the runs of all modes.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class TrackingTask:
 
     @property
     def holds(self) -> bool:
-        """Whether brakes engage in its runs: they are asked for, and the runs go on after the path."""
+        """Whether brakes engage in its runs: they are requested, and the runs go on after the path."""
         return self.after is Ending.HOLD and self.motion.t[-1] > self.path.duration * (1.0 + _SAME_TIME)
 
     @checked_arguments()
@@ -107,7 +107,7 @@ class TrackingTask:
         return self.plan.feed_forward(self.mode(mode))
 
     def driven(self, mode: str, torques: Array, condition: Array, actual: Array | None = None) -> Driven:
-        """What torques or forces (k, motors) of a mode do, at the first samples of the task.
+        """Data of a run driven by torques or forces (k, motors) of a mode, at the first samples of the task.
 
         Parameters
         ----------
@@ -178,7 +178,7 @@ class TrackingTask:
 
     @checked_arguments()
     def balanced(self, mode: str | ActuationMode) -> TrackingTask:
-        """The same task, starting balanced: the active motors of a mode stand, or move, as where the path begins.
+        """The same task with a balanced start, at the path's initial position and velocity of a mode's motors.
 
         Under weight or loads links sag before they move; started undeformed they would ring about that. On a path that
         starts in motion inertia forces of that motion deflect them as well: see `dynamics.balanced_state`.
@@ -209,7 +209,7 @@ class TrackingTask:
 @given_as("a run along a path", "a run that simulate returns")
 @dataclass(frozen=True)
 class TrackingRun(Shown):
-    """One mode of a task, simulated.
+    """A run of one mode of a task.
 
     Attributes
     ----------
@@ -238,17 +238,17 @@ class TrackingRun(Shown):
 
     @property
     def applied(self) -> Array:
-        """Torques of all motors, at every sample time of the task, or at the k reached where they were held [N m]."""
+        """Torques of all motors at the task's sample times, or at the k reached ones if brakes held them [N m]."""
         return self.torques.evaluate(self.task.motion.t) if self.holding is None else self.holding
 
     @cached_property
     def validity(self) -> Validity | None:
-        """How far the run is within what its model can describe; None of rigid bodies and finite segments."""
+        """Validity of the model in the run; None for rigid bodies and finite segments."""
         return assess(self.task.system, self.solution, self._following())
 
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
-        """What happened in it, and what of its results is not plausible for mass, size and speed of the mechanism."""
+        """Findings on events in the run, and on results that are implausible for the mechanism."""
         whole = self.task.whole or self.task
         found = doubtful_results(self.task.system, self.solution, self.driven, whole.mechanism)
         return (*self.solution.findings, *found)
@@ -270,7 +270,7 @@ class TrackingRun(Shown):
         return None if self.driven is None else Following(self.driven.deviation, self.driven.condition)
 
     def warn(self) -> None:
-        """Issue a `ValidityWarning` or a `ResultWarning` for each reason to doubt the run."""
+        """Issue a `ValidityWarning` or a `ResultWarning` for each finding."""
         warn(self.validity, f"mode {self.mode.name}")
         warn_of(self.doubts, ResultWarning)
 
@@ -287,7 +287,7 @@ def plan_tracking(
     after: Ending | str = Ending.FREE,
     warning: bool = True,
 ) -> TrackingTask:
-    """Plan a motion of the end-effector: joint motion of the rigid mechanism and what it asks of the motors.
+    """Plan a motion of the end-effector: joint motion of the rigid mechanism, and the required effort.
 
     Parameters
     ----------
@@ -400,7 +400,7 @@ def simulate(
 
 
 def _planned(given: Mechanism | ModelWithPaths, path: Path | str) -> tuple[Mechanism, Path]:
-    """The mechanism, and the path where it is one by the name it has in a model."""
+    """The mechanism, and the path, which may be given by its name in a model."""
     mechanism = Mechanism.made_of(given)
     if not isinstance(path, str):
         return mechanism, path
@@ -435,7 +435,7 @@ def _drive_and_hold(
     options: IntegrationOptions,
     on_progress: Callable[[float], None] | None,
 ) -> TrackingRun:
-    """Along the path as ever, then with the joints of the active motors locked."""
+    """Drive along the path, then with the joints of the active motors locked."""
     times, end = task.motion.t, task.path.duration
     count = int(np.searchsorted(times, end * (1.0 + _SAME_TIME), side="right"))
     until = times[:count]
@@ -475,7 +475,7 @@ def _in_place(system: System) -> dict[str, tuple[str, float]]:
 
 
 def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str, float]]) -> State:
-    """Bodies where the planned motion has them at its start; each at its distance along its carrier."""
+    """Bodies at the start of the planned motion; each at its distance along its carrier."""
     q, v = np.zeros(system.n), np.zeros(system.n)
     for body in system.bodies:
         name, along = carriers[body.name]
@@ -489,6 +489,6 @@ def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str
 
 
 def path_knots(path: Path, end: float) -> Array:
-    """Times of a run to an end between which the motion along a path is smooth, both ends among them [s]."""
+    """Times of a run between which the motion along a path is smooth, start and end included [s]."""
     knots = np.unique(np.concatenate([[0.0, end], [knot for knot in path.knots if 0.0 < knot < end]]))
     return knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]

@@ -83,7 +83,7 @@ def actuation_condition(effort: Effort, mode: ActuationMode) -> Array:
         return np.where(values[:, -1] > 0.0, values[:, 0] / values[:, -1], np.inf)
 
 
-# What helps where a path comes too near a Type II singularity of a mode.
+# Remedy for a path too near a Type II singularity of a mode.
 PAST_SINGULAR = "move the path, or add motors to the mode"
 
 

@@ -19,11 +19,11 @@ from paraflex.mechanism import ActuationMode
 
 _DEGREE = 5
 # The spline's largest error, as a fraction of the peak torque of the run.
-_ACCURACY = 1e-8
-# By how much an error falls with half the interval, at least: 2^6 where the torques are smooth.
-_GAIN = 32.0
+_SPLINE_ERROR = 1e-8
+# Least factor by which half the interval reduces the error: 2^6 for smooth torques.
+_ERROR_FALL = 32.0
 # Points of a smooth interval to begin with, at least, and seconds between them at most.
-_FEWEST, _SPACING = 12, 2e-3
+_FEWEST_POINTS, _LONGEST_SPACING = 12, 2e-3
 _REFINEMENTS = 6
 _IN_TIME = ("t", "q", "v", "a", "basis")
 
@@ -96,7 +96,7 @@ class TorquePlan:
             t, torques = effort.motion.t, allocate(effort, mode)
             checked = FeedForward(mode, tuple(splines(t[::2], torques[::2], self.knots)), self.knots, t[::2])
             error = np.max(np.abs(checked.evaluate(t) - torques), axis=1)
-            if np.max(error) <= _GAIN * _ACCURACY * max(np.max(np.abs(torques)), np.finfo(float).tiny):
+            if np.max(error) <= _ERROR_FALL * _SPLINE_ERROR * max(np.max(np.abs(torques)), np.finfo(float).tiny):
                 return FeedForward(mode, tuple(splines(t, torques, self.knots)), self.knots, t)
             worst = int(np.argmax(error))
             time = float(t[worst])
@@ -113,7 +113,7 @@ class TorquePlan:
             t = efforts[-1].motion.t
             between = required_effort(self.follow(0.5 * (t[1:] + t[:-1])))
             efforts.append(_interleaved(efforts[-1], between))
-        # Modes that run at the same time may find the same; either is kept whole.
+        # Modes in other threads may compute the same; either result may be kept.
         self.finer[:] = max(self.finer, efforts[1:], key=len)
         return efforts[refined]
 
@@ -128,7 +128,9 @@ def plan_torques(follow: Callable[[Array], RigidMotion], knots: Array) -> Torque
     knots : (j,) array
         Times between which the motion is smooth, its start and end among them [s].
     """
-    intervals = [np.linspace(a, b, max(_FEWEST, int(np.ceil((b - a) / _SPACING)) + 1)) for a, b in pairwise(knots)]
+    intervals = [
+        np.linspace(a, b, max(_FEWEST_POINTS, int(np.ceil((b - a) / _LONGEST_SPACING)) + 1)) for a, b in pairwise(knots)
+    ]
     times = np.unique(np.concatenate(intervals))
     return TorquePlan(required_effort(follow(_with_middles(times))), np.asarray(knots), follow)
 

@@ -30,9 +30,9 @@ from paraflex.campaign.tables import (
 )
 from paraflex.campaign.workers import (
     DASK as DASK,
-    ENGINES as ENGINES,
     PROCESSES as PROCESSES,
     THREADS as THREADS,
+    WORKER_ENGINES as WORKER_ENGINES,
     Engine as Engine,
     LostCluster as LostCluster,
     LostWorker as LostWorker,

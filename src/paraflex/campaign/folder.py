@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from paraflex.campaign.journal import JOURNAL, Journal, Row, write_journal
-from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA, UNFINISHED, write_table
+from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA_KEY, UNFINISHED, write_table
 from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, check_listed, files_of, foreign_files, hold_folder
 from paraflex.results.parquet import read_parquet
@@ -95,8 +95,8 @@ def open_campaign(
             if noted is None:
                 _take_over(folder, journal, schema, belongs)
                 journal.note("study", json.dumps(study, default=str).encode())
-            if journal.noted(SCHEMA) is None:
-                journal.note(SCHEMA, schema.serialize().to_pybytes())
+            if journal.noted(SCHEMA_KEY) is None:
+                journal.note(SCHEMA_KEY, schema.serialize().to_pybytes())
             if not (folder / STUDY).exists():
                 with held.amended() as new:
                     write_json(new / STUDY, study, remedy=GO_ON)

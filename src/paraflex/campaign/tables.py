@@ -28,7 +28,7 @@ EARLIER = "parts/part-*.parquet"
 # Rows of a group in the file, and those that are held as rows at once.
 _GROUP, _HELD = 16_384, 1024
 # Under which name a journal keeps the columns of its table.
-SCHEMA = "schema"
+SCHEMA_KEY = "schema"
 # Columns that say which run a row is of, and what the metadata of columns are called in datasets.
 _KEYS = ("run", "id", "design", "path", "mode")
 _ATTRIBUTES = {"unit": "units", "meaning": "comment"}
@@ -167,7 +167,7 @@ def _write_csv(table: Path, file: Path) -> None:
 def _schema(journal: Journal) -> pa.Schema:
     import pyarrow as pa
 
-    noted = journal.noted(SCHEMA)
+    noted = journal.noted(SCHEMA_KEY)
     return pa.schema([]) if noted is None else pa.ipc.read_schema(pa.py_buffer(noted))
 
 

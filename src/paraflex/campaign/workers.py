@@ -32,7 +32,7 @@ from paraflex.interrupts import end_with_parent, starting_processes
 THREADS = "threads"
 PROCESSES = "processes"
 DASK = "dask"
-ENGINES = (THREADS, PROCESSES, DASK)
+WORKER_ENGINES = (THREADS, PROCESSES, DASK)
 # Tasks given out for each worker: one it works on and one that waits, so that memory does not grow with the sweep.
 _AHEAD = 2
 # Workers that may die of a task that has one to itself before it is given up.
@@ -217,8 +217,8 @@ def open_engine(engine: str | Engine, workers: int | None = None, cluster: str |
     """
     if isinstance(engine, Engine):
         return engine
-    if engine not in ENGINES:
-        raise InputError("unknown engine", field="--engine", value=engine, remedy=suggestion(engine, ENGINES))
+    if engine not in WORKER_ENGINES:
+        raise InputError("unknown engine", field="--engine", value=engine, remedy=suggestion(engine, WORKER_ENGINES))
     if cluster is not None and engine != DASK:
         remedy = "say --engine dask, or leave it out"
         raise InputError("only the engine dask takes a cluster", field="--cluster", value=cluster, remedy=remedy)

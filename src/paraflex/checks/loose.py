@@ -17,7 +17,7 @@ from paraflex.mechanism.joints import GROUND, PointRef
 from paraflex.validity.numbers import mechanism_size
 
 # Distance of two such points over the mechanism's size: what was to be joined closes only roughly without its joint.
-NEAR = 0.2
+NEAR_POINTS = 0.2
 
 
 def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
@@ -40,7 +40,7 @@ def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
         apart = one.body != other.body and frozenset((one.body, other.body)) not in direct
         if apart and (one.point == other.point or (other in unused and _stem(one) == _stem(other))):
             gap = float(np.linalg.norm(point_position(rigid, q, one) - point_position(rigid, q, other)))
-            if gap < size * (1.0 if {one.body, other.body} & sliding else NEAR):
+            if gap < size * (1.0 if {one.body, other.body} & sliding else NEAR_POINTS):
                 pairs.append((other not in unused, gap, one, other))
     # First those that are both unused, then the nearest.
     for _, gap, one, other in sorted(pairs, key=lambda pair: pair[:2]):

@@ -30,11 +30,11 @@ from paraflex.mechanism import Mechanism
 from paraflex.mechanism.poses import approximate_poses
 
 # A body that closing the loops turned further than this had another angle in mind, or another elbow [rad].
-FAR = 0.5
+FAR_TURN = 0.5
 # What a mechanism let go may start with and still be called balanced [m/s^2].
 BALANCED = 1e-5
 # A first natural frequency below this is that of no link [Hz].
-SLOW = 0.1
+SLOWEST_LINK = 0.1
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def _elbow(rigid: System, start: Closure) -> Iterator[Finding]:
     given = approximate_poses(rigid.mechanism, assembly)
     found = {body.name: float(start.state.q[body.angle]) for body in rigid.bodies}
     turned = {name: abs(math.remainder(found[name] - given[name].angle, 2.0 * math.pi)) for name in found}
-    far = sorted((name for name in turned if turned[name] > FAR), key=lambda name: -turned[name])
+    far = sorted((name for name in turned if turned[name] > FAR_TURN), key=lambda name: -turned[name])
     if far:
         which = ", ".join(
             f"{name} at {_both(found[name])} where {given[name].angle:.3g} rad "
@@ -172,7 +172,7 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
         return
     for body in seen.system.bodies:
         slowest = float(np.min(body.modes.omega, initial=math.inf)) / (2.0 * math.pi)
-        if slowest < SLOW:
+        if slowest < SLOWEST_LINK:
             yield Finding(
                 "frequency-low", f"body.{body.name}", f"it vibrates on its own at {slowest:.2g} Hz, as no link does",
                 f"look at Young's modulus, section and length of {body.name}: Pa and m",

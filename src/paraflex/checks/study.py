@@ -16,7 +16,7 @@ from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
 from paraflex.tracking import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
-from paraflex.validity.numbers import GRAVITY, mechanism_mass, mechanism_size
+from paraflex.validity.numbers import STANDARD_GRAVITY, mechanism_mass, mechanism_size
 from paraflex.validity.plausibility import doubtful_torques
 
 # Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
@@ -209,7 +209,7 @@ def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> I
 def _constant_torques(model: Model) -> Iterator[Finding]:
     """Constant torques beyond what turns all bodies, and friction that they do not overcome."""
     mechanism = model.mechanism
-    size, weight = mechanism_size(mechanism), GRAVITY * mechanism_mass(mechanism)
+    size, weight = mechanism_size(mechanism), STANDARD_GRAVITY * mechanism_mass(mechanism)
     for motor, unit in zip(mechanism.motors, mechanism.motor_units(), strict=True):
         torque = abs(model.study.torques.get(motor.name, 0.0))
         if torque > LOADED_AT_REST * weight * (size if unit == "N m" else 1.0) > 0.0:

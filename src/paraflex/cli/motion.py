@@ -23,7 +23,7 @@ from paraflex.cli.request import (
     at_fault,
     of_assembly,
 )
-from paraflex.cli.tables import FINISHED, plain_console, validity
+from paraflex.cli.tables import DONE_STATUSES, plain_console, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
@@ -36,9 +36,9 @@ from paraflex.motion import MotionRun, simulate_motion
 from paraflex.results import motion_dataset, motion_summary
 
 # Singular positions listed one by one.
-_NAMED = 4
+_MOST_TIMES = 4
 # Points listed where a run ends.
-_POINTS = 20
+_MOST_POINTS = 20
 
 
 def run_motion(
@@ -89,7 +89,7 @@ def _run_held(
     summary = motion_summary(data)
     write_numbers(data, summary, folder)
     tell(summary, lambda out: _report(out, summary, data), as_json=request.json)
-    finished = run.solution.status in FINISHED
+    finished = run.solution.status in DONE_STATUSES
     if not finished:
         console.print(f"error: {run.solution.message}", soft_wrap=True)
     write_drawn_run(data, folder, request, began)
@@ -167,7 +167,7 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
 def _ended(summary: dict) -> str:
     """How a run ended. When it failed its message says; the last sample is before that."""
     status, steps, time = summary["status"], f"{summary['steps']} steps", summary["final"]["time"]
-    if status in FINISHED:
+    if status in DONE_STATUSES:
         return f"{status} at t = {time:g} s, {steps}"
     return f"{status}, {steps}; " + ("no sample was reached" if time is None else f"the last sample is t = {time:g} s")
 
@@ -179,15 +179,15 @@ def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
         out.print(summary["message"], soft_wrap=True)
     # Points that segments made by the program hang together at are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
-    for point, position in list(places.items())[:_POINTS]:
+    for point, position in list(places.items())[:_MOST_POINTS]:
         out.print(f"  {point}: ({position[0]:.6g}, {position[1]:.6g}) m")
-    if len(places) > _POINTS:
-        out.print(f"  and {len(places) - _POINTS} more points in results.nc")
+    if len(places) > _MOST_POINTS:
+        out.print(f"  and {len(places) - _MOST_POINTS} more points in results.nc")
     passed = [f"{t:.6g}" for t in summary["singular_positions"]]
     if passed:
-        more = f" and {len(passed) - _NAMED} more" if len(passed) > _NAMED else ""
+        more = f" and {len(passed) - _MOST_TIMES} more" if len(passed) > _MOST_TIMES else ""
         out.print(
-            f"passed singular positions at t = {', '.join(passed[:_NAMED])} s{more}: joint forces have poles there"
+            f"passed singular positions at t = {', '.join(passed[:_MOST_TIMES])} s{more}: joint forces have poles there"
         )
     out.print(
         f"largest violation of constraints {summary['constraint_position_max']:.1e} m, "

@@ -21,7 +21,7 @@ from paraflex.studies import Sensitivities, load_sensitivities
 from paraflex.studies.sensitivities.study import FIGURES, LINES, TABLE
 
 # Parameters side by side in a table of 80 columns.
-_COLUMNS = 4
+_PARAMETERS_ABREAST = 4
 
 
 def sensitivity_command(request: SensitivityRequest) -> int:
@@ -60,8 +60,8 @@ def _print(console: Console, found: Sensitivities, row: int) -> None:
     """Elasticities and derivatives of one run, a table each for every few parameters."""
     path, mode = found.rows[row]
     where, relative = f"{found.mechanism}, {path}, mode {mode}", found.relative
-    for first in range(0, len(found.parameters), _COLUMNS):
-        some = slice(first, first + _COLUMNS)
+    for first in range(0, len(found.parameters), _PARAMETERS_ABREAST):
+        some = slice(first, first + _PARAMETERS_ABREAST)
         for title, values, form in (
             (f"{where}: change of metrics by that of parameters [% / %]", relative, "+.2f"),
             ("Derivatives, in the units of metrics and parameters", found.derivatives, ".2e"),

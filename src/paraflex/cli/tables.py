@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from paraflex.tracking import TrackingTask
 
 # How a run ends that did what was asked.
-FINISHED = ("complete", "stopped")
+DONE_STATUSES = ("complete", "stopped")
 
 
 class _PlainConsole(Console):
@@ -134,7 +134,7 @@ def failures(console: Console, result: StudyResult) -> None:
     if result.data is not None:
         for mode in result.data["mode"].values:
             run = result.data.sel(mode=mode)
-            if run["status"].item() not in FINISHED:
+            if run["status"].item() not in DONE_STATUSES:
                 console.print(f'error: mode "{mode}": {run["message"].item()}', soft_wrap=True)
 
 

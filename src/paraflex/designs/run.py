@@ -23,8 +23,8 @@ from paraflex.tracking import TrackingRun, TrackingTask, simulate
 if TYPE_CHECKING:
     import pyarrow as pa
 
-COMPLETE, FAILED, INVALID = "complete", "failed", "invalid"
-STATUSES = (COMPLETE, FAILED, INVALID)
+STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID = "complete", "failed", "invalid"
+STATUSES = (STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID)
 _ID_DIGITS = 16
 
 
@@ -89,7 +89,10 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     for row in rows:
         try:
             run = _simulate(planned, row["mode"], options, watch)
-            row |= measure(run, setting.metrics) | {"status": COMPLETE, "time_reached": float(run.solution.t[-1])}
+            row |= measure(run, setting.metrics) | {
+                "status": STATUS_COMPLETE,
+                "time_reached": float(run.solution.t[-1]),
+            }
         except Abandoned:
             raise
         # Whatever a strange design does, it is that design's row and not the end of the sweep.
@@ -137,16 +140,16 @@ def table_schema(setting: Setting, motors: Sequence[str]) -> pa.Schema:
 def trouble(error: Exception) -> Row:
     """Status, reason and time reached of a run that an error ended."""
     if isinstance(error, InputError):
-        return {"status": INVALID, "reason": str(error)}
+        return {"status": STATUS_INVALID, "reason": str(error)}
     if isinstance(error, NumericalError):
         reached = None if error.moment is None else float(error.moment.time)
-        return {"status": FAILED, "reason": str(error), "time_reached": reached}
-    return {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}
+        return {"status": STATUS_FAILED, "reason": str(error), "time_reached": reached}
+    return {"status": STATUS_FAILED, "reason": f"{type(error).__name__}: {error}"}
 
 
 def lost(setting: Setting, task: Task, reason: str) -> Outcome:
     """Rows of a task that killed its workers."""
-    rows = [_blank(setting, task, mode) | {"status": FAILED, "reason": reason} for mode in setting.modes]
+    rows = [_blank(setting, task, mode) | {"status": STATUS_FAILED, "reason": reason} for mode in setting.modes]
     return Outcome(task, rows)
 
 
@@ -174,7 +177,7 @@ def _blank(setting: Setting, task: Task, mode: str) -> Row:
         "path": task.path,
         "mode": mode,
         **dict(zip(setting.names, task.values, strict=True)),
-        "status": FAILED,
+        "status": STATUS_FAILED,
         "reason": "",
         "time_reached": None,
     }

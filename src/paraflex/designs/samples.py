@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 
 # More designs than this are a slip: their table alone would fill the memory.
-_MOST = 10_000_000
+_MOST_DESIGNS = 10_000_000
 KINDS = GRID, LIST, RANDOM, SOBOL = "grid", "list", "random", "sobol"
 
 
@@ -154,7 +154,7 @@ def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(dimensions, scramble=True, seed=generator)  # pyright: ignore[reportCallIssue]
-    # SciPy warns of numbers that are no powers of two: the first of more are what was asked for.
+    # SciPy warns of numbers that are not powers of two: these are the first of more points.
     return sequence.random_base2(max(number - 1, 0).bit_length())[:number]
 
 
@@ -206,5 +206,5 @@ def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, s
 
 
 def _check_total(total: int, field: str) -> None:
-    if total > _MOST:
-        raise InputError("too many designs", field=field, value=total, remedy=f"at most {_MOST}")
+    if total > _MOST_DESIGNS:
+        raise InputError("too many designs", field=field, value=total, remedy=f"at most {_MOST_DESIGNS}")

@@ -30,15 +30,15 @@ from paraflex.results.following import Part
 from paraflex.results.metrics import METRICS
 from paraflex.validity import doubtful_numbers
 
-# Attempted steps before a run is given up, unless the study says: a design that flails about must not hold up the rest.
-MOST_STEPS = 200_000
+# Default limit of attempted steps: a single design with violent motion must not delay a study.
+DESIGN_MOST_STEPS = 200_000
 # A field of this table is one of the study's own [integration], and may be one of these.
 INTEGRATION = "integration"
 INTEGRATION_NUMBERS = ("tolerance", "step", "alpha", "beta")
 # Columns of every table of designs that are neither parameters nor metrics.
 FIXED_COLUMNS = ("run", "id", "design", "path", "mode", "status", "reason", "time_reached")
-# What results depend on besides the study.
-_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
+# Packages that results depend on.
+_RESULT_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
 @cache
 def versions() -> Mapping[str, str]:
     """Versions of the packages that results depend on."""
-    return {name: version(name) for name in _PACKAGES}
+    return {name: version(name) for name in _RESULT_PACKAGES}
 
 
 def digest(content: Any) -> str:
@@ -253,7 +253,7 @@ def _modes(model: Model, names: list[str]) -> tuple[str, ...]:
 
 def _integration(table: SweepTable) -> dict[str, Any]:
     given = {name: getattr(table.integration, name) for name in table.integration.model_fields_set}
-    return {"max_steps": MOST_STEPS} | {name: value for name, value in given.items() if value not in (None, {})}
+    return {"max_steps": DESIGN_MOST_STEPS} | {name: value for name, value in given.items() if value not in (None, {})}
 
 
 def _check(setting: Setting, model: Model) -> None:

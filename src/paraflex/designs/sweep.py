@@ -33,7 +33,7 @@ from paraflex.campaign import (
 )
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
-from paraflex.designs.run import COMPLETE, Outcome, Task, is_row_of, lost, run_id, run_task, table_schema
+from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, is_row_of, lost, run_id, run_task, table_schema
 from paraflex.designs.samples import Varied, check_varied, designs
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
@@ -287,7 +287,7 @@ class _Session:
             return self.campaign.journal.runs()
         there = {each.stem for each in kept.iterdir()}
         rows = self.campaign.journal.rows()
-        return (row["run"] for row in rows if row["status"] != COMPLETE or row["id"] in there)
+        return (row["run"] for row in rows if row["status"] != STATUS_COMPLETE or row["id"] in there)
 
     @property
     def complete(self) -> bool:
@@ -335,7 +335,7 @@ class _Session:
                 yield self.study._task(number)
 
     def _take(self, outcome: Outcome) -> None:
-        # A trajectory stands before its row does: a row without one would never be made again.
+        # A trajectory is written before its row, as a run with a row is not repeated.
         for name, data in outcome.trajectories.items():
             write_results(data, self.campaign.folder.path / TRAJECTORIES / f"{name}.nc", remedy=GO_ON)
         self.campaign.journal.add(outcome.rows)

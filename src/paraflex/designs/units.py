@@ -13,12 +13,12 @@ from paraflex.designs.overlay import Place
 from paraflex.designs.schema import IntegrationTable, SweepTable
 from paraflex.files.schema import ModelTable
 
-_UNITS = (
+_FILE_UNITS = (
     "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad", "N s/m", "N m", "N/m", "m/s^2", "m^4", "m^2", "m/s",
     "rad/s", "rad", "Pa", "1/s", "m", "s", "N",
 )  # fmt: skip
 # Of "the length in m", "the torque in N m, or force in N": the first; the longest that fits stands first in the list.
-_UNIT = re.compile(rf"\bin ({'|'.join(map(re.escape, _UNITS))})(?=[\s,.)]|$)")
+_UNIT = re.compile(rf"\bin ({'|'.join(map(re.escape, _FILE_UNITS))})(?=[\s,.)]|$)")
 
 
 @cache

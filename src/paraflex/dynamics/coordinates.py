@@ -231,7 +231,7 @@ def transverse_pieces(body: BodyCoordinates) -> Array:
     z = np.linspace(0.0, 1.0, 6)
     pieces = []
     for a, b in pairwise(mesh.nodes):
-        # Six values settle a quintic; at a node the shape is the same from either side.
+        # Six values determine a quintic; at a node the shape is the same from either side.
         rows = np.array([mesh.shape_at(a + x * (b - a))[0][1] for x in z])
         powers = np.linalg.solve(np.vander(z, increasing=True), rows)
         pieces.append(powers / ((b - a) ** np.arange(6))[:, None] @ body.integrals.D)

@@ -34,10 +34,10 @@ from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
 from paraflex.fem.eigen import eigenpairs
 from paraflex.mechanism import GROUND, Damping, Joint, Mechanism, PointRef, RigidBody, stiffness_proportional
 
-# Conditions of which less than this part is left once the others hold follow from them.
+# Conditions with less than this fraction independent of the others are redundant.
 _DEPENDENT = 1e-9
-# An entry of the damping matrix less than this part of what its two modes lose is rounding.
-_ROUNDING = 1e-9
+# An entry of the damping matrix below this fraction of the damping of its two modes is rounding.
+_ROUNDED_ENTRY = 1e-9
 
 
 def damping_matrix(
@@ -75,7 +75,7 @@ def _by_modes(damping: Damping, squares: Numbers, omega: Numbers, modes: Numbers
 def _without_rounding(matrix: Numbers) -> Numbers:
     """The symmetric matrix, with zeros for off-diagonal entries of the size of rounding."""
     sizes = np.sqrt(np.abs(np.real(np.diag(matrix))))
-    small = np.abs(np.real(matrix)) <= _ROUNDING * np.outer(sizes, sizes)
+    small = np.abs(np.real(matrix)) <= _ROUNDED_ENTRY * np.outer(sizes, sizes)
     np.fill_diagonal(small, False)
     return np.where(small, 0.0, 0.5 * (matrix + matrix.T))
 

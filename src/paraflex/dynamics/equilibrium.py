@@ -23,21 +23,21 @@ from paraflex.limits import solvable
 _MAX_ITERATIONS = 50
 # Newton's iteration has converged when it moves links by less than this [sizes of the mechanism, rad] ...
 _SMALLEST_MOVE = 1e-10
-# ... and what is left of the forces is less than this fraction of the largest.
+# ... and the residual of the forces is less than this fraction of the largest.
 _BALANCED = 1e-6
 # Differences that the Jacobian is taken by; forces are linear in multipliers and nearly so in small displacements.
 _DIFFERENCE = 1e-6
 # No link is moved by more than this in one iteration [sizes of the mechanism, rad].
 _LONGEST_STEP = 0.3
-# Up to so many unknowns a dense Jacobian, whose dependent columns least squares can tell, is fast enough.
-_DENSE = 400
+# Up to so many unknowns a dense Jacobian, for which least squares handles dependent columns, is fast enough.
+_MOST_DENSE = 400
 _NO_EQUILIBRIUM = "no static equilibrium is found near the start"
 _HOLD = "start nearer to it, keep the angles of more joints, or make links and springs stiffer"
 _NO_MOVING_EQUILIBRIUM = (
     "no equilibrium of links with weight, loads and the inertia of the motion is found near the start: the drives are "
     "too fast for links this soft"
 )
-_SLOWER = "let the drives start more slowly, or make the links stiffer"
+_SLOWER_DRIVES = "let the drives start more slowly, or make the links stiffer"
 
 # Velocities and accelerations (n,) at coordinates (n,).
 Motion = Callable[[Array], tuple[Array, Array]]
@@ -93,13 +93,13 @@ def moving_equilibrium(system: System, start: State, motion: Motion) -> Array:
 
 
 def _find(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
-    solve = _sparse_equilibrium if system.n + system.m > _DENSE else _dense_equilibrium
+    solve = _sparse_equilibrium if system.n + system.m > _MOST_DENSE else _dense_equilibrium
     try:
         return solve(system, start, held, motion)
     except AssemblyError as error:
         if motion is None:
             raise
-        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial, _SLOWER) from None
+        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial, _SLOWER_DRIVES) from None
 
 
 def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
@@ -123,7 +123,7 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
         change = scale * np.linalg.lstsq(jacobian, -value, rcond=1e-12)[0]
         reach = _largest_move(system, change[:n])
         z += change * min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
-        if reach <= _SMALLEST_MOVE and inertia * np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_torque:
+        if reach <= _SMALLEST_MOVE and inertia * np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_effort:
             return z[:n]
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), z[:n], _HOLD)
 
@@ -187,7 +187,7 @@ class _Residual:
         self.signals = moment_signals(mechanism, start.time)
         self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
         self.v, self.a = np.zeros((2, system.n))
-        self.largest_torque = 0.0
+        self.largest_effort = 0.0
         # Rows of friction come with a scale of their own, none by default.
         self.workspace.compliance[:] = system.packed.rows["compliance"]
 
@@ -207,6 +207,6 @@ class _Residual:
         closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
         value, rows = self.joints(q)
         holding = rows.T @ torque
-        torques = (np.abs(system.row_units * lam), np.abs(system.units * holding))
-        self.largest_torque = max(np.max(part, initial=0.0) for part in torques)
+        efforts = (np.abs(system.row_units * lam), np.abs(system.units * holding))
+        self.largest_effort = max(np.max(part, initial=0.0) for part in efforts)
         return np.concatenate([ws.f + holding, closed, value - self.kept])

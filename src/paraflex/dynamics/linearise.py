@@ -28,16 +28,16 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix as Sparse
 
 
-# More coordinates than these make a dense eigenvalue problem a matter of minutes: then the lowest are sought.
+# With more coordinates a dense eigenvalue problem takes minutes, and only the lowest frequencies are computed.
 DENSE_COORDINATES, LOWEST = 600, 10
-# A square of a frequency that is smaller than this part of the typical one is that of a free motion.
+# A squared frequency below this fraction of the typical one is that of a free motion.
 _FREE = 1e-9
 # Constraint rows, scaled, with a smaller singular value than this part of the largest follow from the others.
 _DEPENDENT = 1e-10
 # So few freedoms have a basis of random displacements, Lanczos' method needs more; those that held motors take show by
 # their size, squared.
 _FEW, _INDEPENDENT = 30, 1e-12
-# How often a shift may grow tenfold until it outweighs whatever pushes the mechanism away from the pose.
+# Most tenfold increases of the shift until the shifted stiffness is positive definite.
 _SHIFTS = 15
 
 

@@ -21,20 +21,20 @@ from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
 from paraflex.kernel.stage import equations
 
 Sparse = scipy.sparse.csr_matrix
-# The smallest change that rows (m,) ask for.
+# Function from wanted rows (m,) to the smallest change.
 LeastChange = Callable[[Array], Array]
 
 _MAX_ITERATIONS = 50
 # Closure error that counts as closed [rad], and as a part of the mechanism's size: thousands of rounding errors.
 CLOSED = 1e-12
-# Projections of rates: what rounding left of the first the second takes away.
+# Projections of rates: the second removes the rounding error of the first.
 _PROJECTIONS = 2
 # Joints named in an error.
 NAMED = 6
-_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
-# What helps where constraints contradict one another.
+_GAP_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
+# Remedy for contradicting constraints.
 AGREE = "leave one of these joints, gears or prescribed motions out, or choose places and laws that agree"
-# What constraints may leave of each other's rates (sizes of the mechanism, rad; s), as a fraction of what they ask for.
+# Largest residual of rates of constraints (sizes of the mechanism, rad; s), as a fraction of the wanted rates.
 _CONFLICT = 1e-6
 
 
@@ -196,6 +196,6 @@ def contradiction(system: System, wanted: Array, found: Dependence, what: str) -
         names, size = list(gaps), max(gaps.values())
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (
-        f"the {what} of constraints contradict one another, by {size:.3g} {_UNITS[what]}: "
+        f"the {what} of constraints contradict one another, by {size:.3g} {_GAP_UNITS[what]}: "
         f"{', '.join(names[:NAMED])}{more},"
     )

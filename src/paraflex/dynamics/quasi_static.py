@@ -23,7 +23,7 @@ from paraflex.mechanism import AngleLaw, PrescribedAngle
 # Weight of stiffness against mass [s^2]: that of `dynamics.state`, links move and do not begin to bend.
 _STIFFNESS = 1e3
 # How far the mechanism moves for a central difference [m, rad].
-_MOVE = 1e-3
+_DIFFERENCE_MOVE = 1e-3
 
 
 class JointMotion(NamedTuple):
@@ -120,7 +120,7 @@ def _moving(drives: System, start: State) -> State:
 
     motion, q = _Motion(drives, start.time), at(start.time, start.q)
     v = motion.velocities(q)
-    step = _MOVE / float(np.max(np.abs(v)))
+    step = _DIFFERENCE_MOVE / float(np.max(np.abs(v)))
     before, after = (at(start.time + h, q + h * v) for h in (-step, step))
     return State(start.time, q, motion.velocities(q, (after - before) / (2.0 * step)))
 

@@ -16,7 +16,7 @@ from paraflex.dynamics.coordinates import BodyCoordinates
 from paraflex.dynamics.system import System
 from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, RigidBody, grouped, joints_named
 
-# A smaller part of a turn is not worth a word.
+# Smaller missing fractions of a rotation are not reported.
 _MISSED = 0.05
 
 

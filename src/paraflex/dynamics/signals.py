@@ -38,7 +38,7 @@ def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array) 
     """
     h = np.diff(t)
     c0, c1, c2 = value[:-1], rate[:-1], 0.5 * acceleration[:-1]
-    # What the first three terms miss at the right end, in value, rate and acceleration.
+    # Residual of the first three terms at the right end, in value, rate and acceleration.
     d0 = value[1:] - (c0 + h * (c1 + h * c2))
     d1 = (rate[1:] - (c1 + 2.0 * h * c2)) * h
     d2 = (acceleration[1:] - 2.0 * c2) * h**2

@@ -13,7 +13,7 @@ from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT
 
-# Rows with a smaller singular value than this follow from others everywhere; loops close far better.
+# Rows with a smaller singular value than this are redundant everywhere; closure errors are far smaller.
 _DEPENDENT = 1e-6
 
 

@@ -196,6 +196,6 @@ def _poses_nearby(system: System, state: State) -> Iterator[Array]:
             q = close_downhill(system, signals, state.time, state.q + sign * move)
             gap = system.gap(system.constraints(signals, state.time, q)[0])
             gone = q - state.q
-            # A pose that cannot be left: closing the loops leads back to it.
+            # An isolated pose: closing the loops leads back to it.
             if gap < _CLOSED and move @ (M @ move) < _BACK**2 * (gone @ (M @ gone)):
                 yield q

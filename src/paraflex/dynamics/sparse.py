@@ -21,8 +21,8 @@ from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import OMEGA2, PackedSystem, make_scratch
 from paraflex.mechanism import is_hinge
 
-# What stands in for zero on the diagonal of a dependent row, as a fraction of entries of size one, so that the factor
-# exists; iterative refinement takes its effect out again.
+# Diagonal element in place of zero for a dependent row, as a fraction of entries of size one, so that the factor
+# exists; iterative refinement removes its effect.
 _REGULAR = 1e-10
 _REFINEMENTS = 8
 # Refinement goes on while it shrinks the residual at least this much.

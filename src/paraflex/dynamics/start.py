@@ -24,12 +24,12 @@ from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
 from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start, check_start
 
-# What joints may be open by at a start that is given [sizes of the mechanism, rad], and velocities by, as a fraction
+# Largest gap of joints at a given start [sizes of the mechanism, rad], and largest error of velocities, as a fraction
 # of them.
 _GAP = 1e-6
 _SLIP = 1e-6
 # Given deflections of one beam may contradict each other by this fraction of them.
-_SAME = 1e-9
+_CONTRADICTION = 1e-9
 # Weight of stiffness against mass [s^2]: links move and do not begin to bend, unless they must.
 _POSITION_STIFFNESS, _VELOCITY_STIFFNESS = 1.0, 1e3
 
@@ -104,7 +104,7 @@ def static_shape(system: System, name: str, points: Mapping[str, Deflection]) ->
     u = compliant @ force
     left = C @ u - d
     worst = int(np.argmax(np.abs(left)))
-    if abs(left[worst]) > _SAME * np.max(np.abs(d), initial=0.0):
+    if abs(left[worst]) > _CONTRADICTION * np.max(np.abs(d), initial=0.0):
         raise InputError(
             f"the shapes of the body, or its other deflections, do not allow it: "
             f"{abs(left[worst]):.3g} (m or rad) is missing",

@@ -32,15 +32,15 @@ from paraflex.limits import solvable
 from paraflex.mechanism import GROUND, Assembly, PointRef
 from paraflex.mechanism.poses import approximate_poses
 
-# Where Newton's iteration fails, a damped one goes downhill to the smallest gap: how it begins and ends.
+# If Newton's iteration fails, a damped one finds the smallest gap: its first and last damping.
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
-# How far links are turned aside before that [rad].
+# Rotation of links at the start of the damped iteration [rad].
 _ASIDE = 1e-2
 # Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
 _POSITION_STIFFNESS = 1.0
 # Links that must be deflected by more than this part of their size for loops to close do not fit together.
 _LARGEST_DEFLECTION = 0.1
-# The same for a start in motion: rates of deflection are to be none beside those of links.
+# The same for velocities: rates of deflection are to be small against those of links.
 _VELOCITY_STIFFNESS = 1e3
 
 
@@ -159,7 +159,7 @@ def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
 
     All joints share the gap there; put together along the tree of joints, undeformed, those that close loops have it.
     """
-    # Links in line may be as far from closing as they get, with no way downhill.
+    # Links in line may be at a maximum of the gap, where its gradient is zero.
     aside = q.copy()
     aside[[body.angle for body in system.bodies]] += _ASIDE * np.random.default_rng(0).standard_normal(
         len(system.bodies)

@@ -16,8 +16,8 @@ from paraflex.kernel.stage import equations
 
 # Differences of fourth order: places and weights, for a step of one.
 _STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
-# The step: so many metres or radians, or as a fraction of a spring between points that is shorter than a metre.
-_STEP, _SHORTEST = 1e-3, 1e-6
+# The step [m, rad], or as a fraction of the length of a spring between points that is shorter than a metre.
+_STEP, _SHORTEST_SPRING = 1e-3, 1e-6
 
 
 class RestingForces:
@@ -133,7 +133,7 @@ def _steps(system: System, q: Array) -> Array:
     for spring in system.mechanism.linear_springs:
         if spring.length > 0.0:
             across = point_position(system, q, spring.b) - point_position(system, q, spring.a)
-            lengths.append(max(float(np.linalg.norm(across)), _SHORTEST))
+            lengths.append(max(float(np.linalg.norm(across)), _SHORTEST_SPRING))
     steps = np.full(system.n, _STEP * min(lengths))
     for body in system.bodies:
         # Modes of unit mass displace points by about one over the square root of the mass.

@@ -142,7 +142,7 @@ class RigidLink:
         """Places of the stations of the body (k, s, 2) [m]."""
         r, angle = history.states[0][:, self.columns[:2]], self.frame(history).angle
         c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        # Any joint of it tells how far the body's frame is from the centre of mass.
+        # Any of its joints gives the distance of the body's frame from the centre of mass.
         point, station = next(iter(drawn.points.items()))
         x, y = (drawn.places - drawn.places[station] + self.points[point]).T
         return r[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)

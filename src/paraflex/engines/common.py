@@ -14,8 +14,8 @@ from paraflex.mechanism import FlexibleBeam, Mechanism, given_shapes, grouped
 from paraflex.tracking import TrackingTask
 
 # Names of the engines as users and Python's packages know them, and in print.
-_PRINTED = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}
-ENGINES = tuple(_PRINTED)
+_ENGINE_NAMES = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}
+ENGINES = tuple(_ENGINE_NAMES)
 
 
 def check_dwell(name: str, task: TrackingTask) -> None:
@@ -27,7 +27,7 @@ def check_dwell(name: str, task: TrackingTask) -> None:
         They are to be held.
     """
     if task.holds:
-        refuse(_PRINTED[name], 'brakes after the path (after = "hold")', "study.after")
+        refuse(_ENGINE_NAMES[name], 'brakes after the path (after = "hold")', "study.after")
 
 
 def check_engine(name: str, mechanism: Mechanism) -> None:
@@ -52,7 +52,7 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     }
     for what, fields in beyond.items():
         if fields:
-            refuse(_PRINTED[name], what, fields[0])
+            refuse(_ENGINE_NAMES[name], what, fields[0])
     related = [(group, one) for group, members in grouped(mechanism) if group.relates for one in members]
     if name == "exudyn":
         for group, one in related:

@@ -427,7 +427,7 @@ def _record(
         chord_rate=chord_rate,
         tip=np.stack([link.tip(samples) for link in links], axis=1),
         points=np.stack(points, axis=1),
-        # Exudyn's multipliers stand on the left of the equations, with the constraint p_b - p_a.
+        # Exudyn's multipliers are on the left of the equations, with the constraint p_b - p_a.
         joint_force=-samples.multipliers[:, model.rows],
         joint_moment=np.full((len(samples.t), len(mechanism.joints)), np.nan),
         multiplier=np.full((len(samples.t), task.system.m), np.nan),

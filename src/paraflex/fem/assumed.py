@@ -18,11 +18,11 @@ from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
 from paraflex.fem.integrals import ShapeIntegrals, SpanProperties, bar_integrals
 
-# Gauss points beyond those that resolve its waves with which a product of sines is integrated to rounding.
-_MARGIN = 16
-# Functions whose smallest singular value is this fraction of the largest, each scaled to one, are made up of others.
+# Gauss points beyond those that resolve the waves, for products of sines to be integrated to rounding.
+_EXTRA_GAUSS_POINTS = 16
+# Functions, each scaled to one, with a singular value below this fraction of the largest are dependent.
 _DEPENDENT = 1e-10
-# A combination of functions this much less strained than the most strained one, at equal mass, moves rigidly.
+# A combination of functions with this fraction of the largest strain energy, at equal mass, is a rigid motion.
 _RIGID = 1e-7
 
 
@@ -97,7 +97,9 @@ class AssumedShapes:
         functions = (*self.transverse, *self.axial)
         degree = max((len(f.coefficients) for f in functions if isinstance(f, Polynomial)), default=1)
         waves = max((f.half_waves for f in functions if isinstance(f, Sine)), default=0)
-        z, w = np.polynomial.legendre.leggauss(degree + 1 + (ceil(pi / 2 * waves) + _MARGIN if waves else 0))
+        z, w = np.polynomial.legendre.leggauss(
+            degree + 1 + (ceil(pi / 2 * waves) + _EXTRA_GAUSS_POINTS if waves else 0)
+        )
         return 0.5 * self.length * (z + 1.0), 0.5 * self.length * w
 
 

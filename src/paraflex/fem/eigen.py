@@ -11,8 +11,8 @@ from paraflex.errors import InputError
 # Two eigenvalues closer than this part of them are one, whose modes have no derivatives if a parameter couples them;
 # a coupling of less than this part of the eigenvalue is rounding.
 _ONE, _COUPLED = 1e-9, 1e-9
-# Where a pair is coupled by more than this part of what lies between the two it is left as found.
-_APART = 0.1
+# A pair that is coupled by more than this fraction of its difference is not corrected.
+_COUPLED_BY = 0.1
 
 
 def eigenpairs(K: Numbers, M: Numbers) -> tuple[Numbers, Numbers]:
@@ -79,7 +79,7 @@ def _refined(K: Numbers, M: Numbers, values: Numbers, vectors: Numbers) -> tuple
     in_modes = vectors.T @ K @ vectors
     values = np.diag(in_modes) / (1.0 - np.diag(off))
     coupling, gaps = in_modes + off * values, values - values[:, None]
-    apart = np.abs(coupling) < _APART * np.abs(gaps)
+    apart = np.abs(coupling) < _COUPLED_BY * np.abs(gaps)
     mixing = np.where(apart, coupling / np.where(apart, gaps, 1.0), 0.5 * off)
     np.fill_diagonal(mixing, 0.5 * np.diag(off))
     vectors = vectors + vectors @ mixing

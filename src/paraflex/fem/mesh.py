@@ -94,7 +94,7 @@ class BeamMesh:
         start = COORDINATES_PER_NODE * element
         columns = np.arange(start, start + 2 * COORDINATES_PER_NODE)
         if element in self._split:
-            # Its first node's own curvature is that of the element before; this side's stands at the end.
+            # The curvature of its first node belongs to the element before; that of this side is at the end.
             columns[CURVATURE] = COORDINATES_PER_NODE * self.nodes.size + self._split.index(element)
         wide[:, columns] = rows
         return wide

@@ -34,7 +34,7 @@ class ModalBasis:
     def like(self, other: ModalBasis, Mff: Array) -> ModalBasis:
         """Those of these modes that are nearest to the modes of a slightly different body, in their order and signs.
 
-        Frequencies may cross as a body changes, and eigenvectors have no sign: told by overlap, modes change smoothly.
+        Frequencies may cross as a body changes, and eigenvectors have no sign; matched by overlap they change smoothly.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ from paraflex.limits import EXPRESSION_LETTERS, PARAMETER_CHAIN
 
 _CONSTANTS = {"pi": math.pi}
 # The name of time in an expression of it.
-TIME = "t"
+TIME_NAME = "t"
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -84,7 +84,7 @@ def check_in_time(text: str, parameters: Mapping[str, float]) -> None:
 
 def is_constant(text: str) -> bool:
     """Whether time does not occur in an expression."""
-    return TIME not in names_in(text)
+    return TIME_NAME not in names_in(text)
 
 
 def names_in(text: str) -> set[str]:
@@ -136,11 +136,13 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Any:
-    if TIME in parameters:
-        raise ExpressionError(f'"{TIME}" is the time in this expression', f'give the parameter "{TIME}" another name')
+    if TIME_NAME in parameters:
+        raise ExpressionError(
+            f'"{TIME_NAME}" is the time in this expression', f'give the parameter "{TIME_NAME}" another name'
+        )
 
     def value_of(name: str) -> Any:
-        return Jet.time(t) if name == TIME else _look_up(name, parameters)
+        return Jet.time(t) if name == TIME_NAME else _look_up(name, parameters)
 
     # What is not finite has no warning but is reported with its time.
     with np.errstate(all="ignore"):

@@ -38,7 +38,7 @@ _BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-
 # What all beams of a file may have in common at its top, and what they have where it says nothing.
 _SHARED = {"reference": "pinned", "curvature": "separate"}
 # Tables that bodies name, and the field of a body that has the names.
-_NAMED = {"section": "section", "material": "material", "lump": "lumps"}
+_NAMED_TABLES = {"section": "section", "material": "material", "lump": "lumps"}
 
 
 def model_tables(
@@ -69,7 +69,7 @@ def model_tables(
         A member that a file has no words for.
     """
     shared = {} if each else _agreed(mechanism)
-    names = {kind: _Names(kind, mechanism, file or {}, before) for kind in _NAMED}
+    names = {kind: _Names(kind, mechanism, file or {}, before) for kind in _NAMED_TABLES}
     said = {
         "name": mechanism.name,
         "description": mechanism.description,
@@ -178,7 +178,7 @@ class _Names:
     def __init__(self, kind: str, mechanism: Mechanism, file: Mapping[str, Any], before: Mechanism | None) -> None:
         places = _places(kind, mechanism)
         had = {} if before is None else _places(kind, before)
-        taken = {place: name for place in places if (name := _name_at(file, _NAMED[kind], *place)) is not None}
+        taken = {place: name for place in places if (name := _name_at(file, _NAMED_TABLES[kind], *place)) is not None}
         self.at: dict[tuple[str, Any], str] = {}
         self.values: dict[str, Any] = {}
         for place, name in taken.items():
@@ -198,7 +198,7 @@ def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
     """Every section, material or lump by body and place."""
     out: dict[tuple[str, Any], Any] = {}
     for body in mechanism.bodies:
-        given = getattr(body, _NAMED[kind], ())
+        given = getattr(body, _NAMED_TABLES[kind], ())
         if kind == "lump":
             for lump in given:
                 if (body.name, lump.point) in out:

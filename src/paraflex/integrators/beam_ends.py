@@ -68,7 +68,7 @@ class BeamEnds:
         return tuple(_finding(one, one.function.value(q)) for one in self._left)
 
 
-# What helps where a point comes to the end of its beam and its joint asks for an error.
+# Remedy for a point at the end of its beam if the joint has at_end "error".
 STAY_ON_BEAM = 'lengthen the beam, or let the run go on with at_end = "warn"'
 
 

@@ -18,13 +18,13 @@ from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import PAUSED, Samples
 
-# Places within a step at which events are looked for, its end last: an excursion between two of them is overlooked.
+# Places within a step at which events are checked, its end last: an excursion between two of them is missed.
 _PLACES = np.array([0.25, 0.5, 0.75, 1.0])
 # They are looked at where a value is no further inside its bounds than so many times what it changed by in this step
 # and the one before: a parabola that turns within the step changes in one of them by more than it dips.
-_NEAR = 4.0
+_NEAR_BOUND = 4.0
 # How exactly an event is found, as a fraction of the step.
-_FOUND = 1e-13
+_EVENT_ACCURACY = 1e-13
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def advance(run: Run, functions: Sequence[EventFunction], attempts: int) -> tupl
             then, last_change = inside, change
             inside = _inside(functions, after)
             change = np.abs(inside - then)
-            near = np.minimum(inside, then) <= _NEAR * (change + last_change)
+            near = np.minimum(inside, then) <= _NEAR_BOUND * (change + last_change)
             found = first_crossing([function for function, x in zip(functions, near, strict=True) if x], before, after)
             if found is not None:
                 return code, found
@@ -113,7 +113,7 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     kept = slice(0, int(np.searchsorted(taken, crossing.t)))
     before = crossing.before
     first = _begun_at(problem, before.t, before.q, before.v)
-    # Where something given jumps accelerations do: the step began with those after the jump.
+    # Accelerations jump with the inputs: the step began with those after the jump.
     before = replace(before, a=first.samples.a[0])
     middle, last = (_begun_at(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
     # Simpson's rule: powers that jump do so at the ends of steps.
@@ -160,4 +160,4 @@ def _root(function: EventFunction, before: Instant, after: Instant, first: float
     def inside(x: float) -> float:
         return float(function.inside(_poses(before, after, x))[0])
 
-    return float(scipy.optimize.root_scalar(inside, bracket=(first, last), method="brentq", xtol=_FOUND).root)
+    return float(scipy.optimize.root_scalar(inside, bracket=(first, last), method="brentq", xtol=_EVENT_ACCURACY).root)

@@ -23,12 +23,12 @@ from paraflex.fem import slope_square_integrals
 from paraflex.integrators.events import BeamEnd, DeflectionLimit, Event, JointLimit, beam_ends, check_events
 from paraflex.mechanism import AtEnd
 
-# Places looked at within an element, its last end among them.
+# Places within an element at which the deflection is evaluated, its last end included.
 _PLACES = 4
-# A point may stand at the very end of its beam: rounding and the closing of loops leave it this part of the length off.
+# Tolerance for a point at the end of its beam, as a fraction of the length: rounding and errors of closure.
 _AT_END = 1e-9
 # Two places are always on their chord.
-_LINE = 3
+_LEAST_ON_LINE = 3
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def _deflection(system: System, name: str) -> Callable[[Array], Array]:
     """Largest deflection along a body from its chord."""
     body = system.body(name)
     rest, rows, shortening = deflection_rows(body)
-    if len(rest) < _LINE or np.all(rest[0] == rest[-1]):
+    if len(rest) < _LEAST_ON_LINE or np.all(rest[0] == rest[-1]):
         raise InputError(
             "a deflection is from the line between first and last point, which takes three points", field="events",
             value=name, remedy="give the body a point between, or leave the limit out",

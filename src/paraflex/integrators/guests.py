@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from paraflex.integrators.method import INDEX_1, ODE, Family, Method, Treatment, parameter
+from paraflex.integrators.method import EQUATIONS_INDEX_1, EQUATIONS_ODE, Family, Method, Treatment, parameter
 
 
 class Guest(Method):
@@ -21,7 +21,7 @@ class Guest(Method):
         What its package calls it.
     """
 
-    form = ODE
+    form = EQUATIONS_ODE
     treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.BAUMGARTE,)
     error_factor: ClassVar[float] = 0.1
     solver: ClassVar[str]
@@ -96,7 +96,7 @@ class Adams(SundialsMethod):
     source = "CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"
     error_factor: ClassVar[float] = 0.5
     solver = "Adams"
-    # What steps of orders up to 12 come to on RAParM-I; the order follows the frequencies.
+    # Measured with steps of orders up to 12 on RAParM-I; the order follows the frequencies.
     stability_limit: ClassVar[float | None] = 0.75
 
     max_order: int = parameter(12, 1, 12, "highest order; up to 2 stiffness limits no step")
@@ -127,6 +127,6 @@ class IDA(BDF):
 
     name = "ida"
     title = "IDA"
-    form = INDEX_1
+    form = EQUATIONS_INDEX_1
     treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.BAUMGARTE, Treatment.GGL)
     source = "IDA, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"

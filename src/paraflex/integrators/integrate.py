@@ -35,27 +35,27 @@ from paraflex.mechanism import AtEnd
 
 # Attempted steps between two looks: some milliseconds for a dozen bodies.
 _SLICE = 200
-# Attempts that tell a run's pace: of our own methods, and of those of others, whose steps take ten times as long.
+# Window of attempts for the pace: of own methods, and of external solvers, whose steps take ten times as long.
 _WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
-_PASSES = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
+_PASSING_METHODS = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
 _SHORTER = "take a shorter step, or leave it out and choose a tolerance"
 _NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
-_UNITS = "look for masses, stiffnesses, loads and laws in a wrong unit"
+_UNITS_REMEDY = "look for masses, stiffnesses, loads and laws in a wrong unit"
 # By the code with which the kernel ends a run.
 CAUSES = {
     NO_CONVERGENCE: Breakdown(
         "Newton's iteration does not converge, however small the step,",
-        f"{_UNITS}, or choose another method or a coarser tolerance",
+        f"{_UNITS_REMEDY}, or choose another method or a coarser tolerance",
     ),
     NOT_FINITE: Breakdown(
         "positions, velocities or accelerations are no longer finite numbers",
-        f"{_UNITS}, or choose an implicit method or a shorter step",
+        f"{_UNITS_REMEDY}, or choose an implicit method or a shorter step",
     ),
     ERROR_TEST: Breakdown(
         "the error test asks for steps below the smallest one",
-        f"{_UNITS}, for loads and laws that jump, or choose a coarser tolerance",
+        f"{_UNITS_REMEDY}, for loads and laws that jump, or choose a coarser tolerance",
     ),
 }
 
@@ -159,10 +159,10 @@ def integrate(
     error = ConstraintDriftError if drift and not bent else IntegrationError
     if len(lost) > run.dependent_rows:
         error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)}),"
-        remedy = f"prescribe motions within the mechanism's reach, or {_PASSES}"
+        remedy = f"prescribe motions within the mechanism's reach, or {_PASSING_METHODS}"
     elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
         error, cause = SingularPositionError, _before_singular(options.method.name, run.singular_ahead)
-        remedy = _PASSES
+        remedy = _PASSING_METHODS
     moment = Moment(now.t, solution.steps + (0 if begun is None else begun.steps))
     raise _failed(error(cause, moment, solution, remedy))
 

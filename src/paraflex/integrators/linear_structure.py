@@ -19,7 +19,7 @@ from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators.newmark import NewmarkNumbers
 
 # Instants whose linear algebra is done at once: some megabytes for a dozen bodies.
-_CHUNK = 128
+_INSTANTS_AT_ONCE = 128
 # Eigenvalues of the scaled Schur complement below this fraction of the largest are those of dependent rows.
 _DEPENDENT = 1e-12
 
@@ -83,8 +83,8 @@ def march(
     ddx = start.load[0] - start.react[0] @ mu
     x, dx, a = np.zeros_like(ddx), np.zeros_like(ddx), ddx
     yield Response(x, dx, ddx, mu)
-    for chunk in range(1, times.size, _CHUNK):
-        here = _condense(blocks, inverses, *outside(slice(chunk, chunk + _CHUNK)))
+    for chunk in range(1, times.size, _INSTANTS_AT_ONCE):
+        here = _condense(blocks, inverses, *outside(slice(chunk, chunk + _INSTANTS_AT_ONCE)))
         for k in range(len(here.rank)):
             if here.rank[k] != rank:
                 cause = f"{abs(rank - here.rank[k])} of the constraints depend on others at a singular position,"

@@ -31,7 +31,11 @@ class Treatment(Enum):
     POSITION = "position"
 
 
-INDEX_1, ODE, INDEX_3 = "index 1 (Eqs. 56-57)", "ODE (Eqs. 59-60)", "index 3 (Eq. 54)"
+EQUATIONS_INDEX_1, EQUATIONS_ODE, EQUATIONS_INDEX_3 = (
+    "index 1 (Eqs. 56-57)",
+    "ODE (Eqs. 59-60)",
+    "index 3 (Eq. 54)",
+)
 
 
 @dataclass(frozen=True)

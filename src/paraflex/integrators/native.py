@@ -31,8 +31,8 @@ from paraflex.kernel.run_state import (
     PROJECTION,
     REJECTED,
     ROOT,
+    ROOT_RATE,
     SAMPLE,
-    SLOPE,
     STEP,
     STEPS,
     TIME,
@@ -58,12 +58,12 @@ NEAR_ERROR = 0.01
 # It is not below what rounding makes of multipliers that have a pole, as a part of the mechanism's size.
 LEAST_NEAR_ERROR = 8e-11
 # A singular position is near that could be reached in this fraction of the time since the start.
-_AHEAD = 0.2
+_NEAR_AHEAD = 0.2
 # The smallest step, as a fraction of the run, and in units of the clock's last digit: by so little a step may differ
 # from what the clock moves by.
 _LEAST, _DIGITS = 1e-12, 64.0
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
-_GAIN = 0.1
+_BAUMGARTE_GAIN = 0.1
 _TREATMENTS = {
     Treatment.BAUMGARTE: BAUMGARTE,
     Treatment.PROJECTION: PROJECTION,
@@ -91,9 +91,9 @@ class NativeRun:
     @property
     def singular_ahead(self) -> float | None:
         """See `Run`."""
-        root, slope = self.state.clock[ROOT], self.state.clock[SLOPE]
+        root, slope = self.state.clock[ROOT], self.state.clock[ROOT_RATE]
         elapsed = self.state.clock[TIME] - self.problem.initial.time
-        if self.controls.treatment != POSITION or not slope < 0.0 or root > _AHEAD * elapsed * -slope:
+        if self.controls.treatment != POSITION or not slope < 0.0 or root > _NEAR_AHEAD * elapsed * -slope:
             return None
         return float(self.state.clock[TIME] - root / slope)
 
@@ -115,7 +115,7 @@ class NativeRun:
     def march(self, attempts: int) -> int:
         """See `Run`."""
         jumps, now = self.problem.jumps, self.state.clock[TIME]
-        # The last call may have ended there: whoever looked at the run in between saw it as it was before the jump.
+        # The last call may have ended there; until now the run had the values before the jump.
         if np.any(jumps == now):
             self._resume()
         ahead = jumps[jumps > now]
@@ -195,7 +195,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         memory=MEMORY * span,
         alpha=options.alpha,
         beta=options.beta,
-        gain=_GAIN if options.automatic_gains else 0.0,
+        gain=_BAUMGARTE_GAIN if options.automatic_gains else 0.0,
         treatment=treatment,
         fixed_step=options.step or 0.0,
         least_step=_least_step(problem),

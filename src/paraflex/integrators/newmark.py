@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from paraflex.errors import InputError
-from paraflex.integrators.method import INDEX_3, Family, NativeMethod, Treatment, parameter
+from paraflex.integrators.method import EQUATIONS_INDEX_3, Family, NativeMethod, Treatment, parameter
 from paraflex.kernel.run_state import Tableau
 
 
@@ -56,7 +56,7 @@ class NewmarkMethod(NativeMethod):
     """A member of the family, given by its coefficients."""
 
     family = Family.NEWMARK
-    form = INDEX_3
+    form = EQUATIONS_INDEX_3
     order = 2
     treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.POSITION,)
 

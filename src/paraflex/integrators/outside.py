@@ -26,7 +26,7 @@ from paraflex.kernel.run_state import FINISHED, PAUSED, Samples
 # one, and to a power (p + 1) / p of it elsewhere [m].
 _REFERENCE = 1e-4
 # How long a slice of steps may take before someone looks [s].
-_PATIENCE = 0.1
+_SLICE_TIME = 0.1
 
 
 class OutsideRun:
@@ -68,7 +68,7 @@ class OutsideRun:
     def march(self, attempts: int) -> int:
         """See `Run`; fewer steps if they take long."""
         until, began = self.attempts + attempts, time.perf_counter()
-        while self.attempts < until and time.perf_counter() - began < _PATIENCE:
+        while self.attempts < until and time.perf_counter() - began < _SLICE_TIME:
             code = self._advance()
             if code != PAUSED:
                 return code

@@ -12,18 +12,18 @@ from paraflex.dynamics.singularity import SingularityMeasure
 from paraflex.integrators.run import Instant
 from paraflex.integrators.watch import Breakdown
 
-# Steps of a run where nobody says how many.
+# Default limit of the steps of a run.
 MOST_STEPS = 10_000_000
 # A run that would need this many times the steps it may take is given up early: it may be faster later on.
-_MARGIN = 5.0
+_STEPS_MARGIN = 5.0
 # Where nobody says how many, so is one that would need this many and has become so many times slower than it was. The
 # library's mechanisms take 45 thousand steps at most as their files have it, 260 thousand at 1e-7 m by TR-BDF2, and
 # none becomes more than 25 times slower.
-_MANY, _SLOWER = 1_000_000, 100.0
-# What the first steps tell of a run's pace is left out: they start small.
-_FIRST = 200
+_SLOW_STEPS, _TIMES_SLOWER = 1_000_000, 100.0
+# The first steps are left out of the pace, as they are small.
+_FIRST_STEPS = 200
 # A singular position nearer than this is named.
-_NEAR = 1e-2
+_NEAR_SINGULAR = 1e-2
 
 
 class Pace:
@@ -66,13 +66,13 @@ class Pace:
         self._looks.append((attempts, now))
         while attempts - self._looks[1][0] >= self._window:
             self._looks.popleft()
-        if attempts >= _FIRST and now > self._start:
+        if attempts >= _FIRST_STEPS and now > self._start:
             self._usual = min(self._usual, attempts / (now - self._start))
         if attempts - self._looks[0][0] < self._window:
             return False
-        if self.expected > _MARGIN * self.most:
+        if self.expected > _STEPS_MARGIN * self.most:
             return True
-        return self._most is None and self.expected > _MANY and self.step * self._usual * _SLOWER < 1.0
+        return self._most is None and self.expected > _SLOW_STEPS and self.step * self._usual * _TIMES_SLOWER < 1.0
 
 
 def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace) -> Breakdown:
@@ -101,4 +101,4 @@ def _fastest(system: System, now: Instant) -> str:
 def _singular(system: System, now: Instant, start: np.ndarray) -> str:
     """Remark on the distance from a singular position of the constraints, if one is near."""
     measure = float(SingularityMeasure(system, start)(now.q[None])[0])
-    return f", {measure:.1g} from a singular position of the constraints" if measure < _NEAR else ""
+    return f", {measure:.1g} from a singular position of the constraints" if measure < _NEAR_SINGULAR else ""

@@ -52,7 +52,7 @@ class ScipyStepper:
                 warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
                 solver.step()
         except (ValueError, np.linalg.LinAlgError):
-            # What factors the matrices refuses numbers that are not finite.
+            # The factorisation refuses numbers that are not finite.
             return NOT_FINITE
         tried = attempts(self._seen, before, self._places)
         if solver.status == "failed":

@@ -22,12 +22,12 @@ from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
 from paraflex.kernel.rounding import History, make_history, sample_energies, solve_steps_to_rounding
 from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
 from paraflex.kernel.sensitivity import make_piece, sensitivity_steps
-from paraflex.kernel.sensitivity_samples import PLACES, STEP, Sensitivity, make_sensitivity
+from paraflex.kernel.sensitivity_samples import DIFFERENCE_STEP, PLACES, Sensitivity, make_sensitivity
 from paraflex.kernel.tangent import make_tangent
 
-# Steps that are held at once.
-_CHUNK = 256
-# Where corrections of a stage are left larger than this part of what they correct, there is no derivative.
+# Steps in memory at a time.
+_STEPS_AT_ONCE = 256
+# Largest relative correction of a stage at the end of the iteration; beyond it there is no derivative.
 _LARGEST_RESIDUAL = 1e-6
 
 
@@ -196,7 +196,7 @@ class _Chunk:
 def _chunks(run: NativeRun) -> Iterator[_Chunk]:
     """The accepted steps of a run as it is marched, in one history that is refilled."""
     problem, state, jumps = run.problem, run.state, run.problem.jumps
-    history = make_history(_CHUNK, run.scheme.c.size, problem.system.n, problem.system.m)
+    history = make_history(_STEPS_AT_ONCE, run.scheme.c.size, problem.system.n, problem.system.m)
     run.start()
     count, restart, code = 0, True, PAUSED
     signals = problem.signals_from(state.clock[TIME])
@@ -215,7 +215,7 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
         history.t[count], history.h[count], history.restart[count] = before, state.clock[LAST_STEP], restart
         history.a[count], history.lam[count] = state.stage_a[0], state.stage_lam
         count, restart = count + 1, bool(np.any(jumps == state.clock[TIME]))
-        if count == _CHUNK or restart:
+        if count == _STEPS_AT_ONCE or restart:
             yield _Chunk(history, count, signals)
             count, signals = 0, problem.signals_from(state.clock[TIME])
     if count:
@@ -239,13 +239,15 @@ class _Varied:
         ]
         self.pieces = tuple(make_piece(problem.signals) for _ in PLACES)
         self.variations = [
-            make_sensitivity(_CHUNK, stages, system.n, system.m, problem.times, np.ascontiguousarray(direction.times))
+            make_sensitivity(
+                _STEPS_AT_ONCE, stages, system.n, system.m, problem.times, np.ascontiguousarray(direction.times)
+            )
             for direction in directions
         ]
         gains = np.array([run.controls.alpha, run.controls.beta])
         for y, direction in zip(self.variations, directions, strict=True):
             y.q[0], y.v[0] = direction.q, direction.v
-            y.gains[:] = gains + STEP * np.outer(PLACES, direction.gains)
+            y.gains[:] = gains + DIFFERENCE_STEP * np.outer(PLACES, direction.gains)
 
     @property
     def motion(self) -> Motion:
@@ -301,7 +303,7 @@ class _Varied:
 def _moved(record, change: Array) -> tuple:
     """A packed system or signals at the points of the kernel's differences."""
     numbers = numbers_of(record)
-    return tuple(with_numbers(record, numbers + place * STEP * change) for place in PLACES)
+    return tuple(with_numbers(record, numbers + place * DIFFERENCE_STEP * change) for place in PLACES)
 
 
 def _motion(y: Sensitivity) -> Motion:

@@ -24,8 +24,8 @@ Roots = NDArray[Any]
 
 # Of NDF, orders 0 to 5, as SciPy has them: Shampine and Reichelt (1997), Table 1.
 _KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
-# Frequencies between which the principal root moves little, as a factor, and where following it begins.
-_DENSE, _START = 1.02, 1e-3
+# Ratio of frequencies between which the principal root changes little, and the first frequency.
+_DENSE, _FIRST_FREQUENCY = 1.02, 1e-3
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def spectrum(method: Method | str, frequency: ArrayLike, *, order: int | None = 
             "frequencies must be positive and ascend", field="frequency", remedy="say numpy.geomspace(0.01, 100, 200)"
         )
     roots = _roots(find_method(method), order)
-    first = min(_START, wanted[0])
+    first = min(_FIRST_FREQUENCY, wanted[0])
     steps = int(np.log(wanted[-1] / first) / np.log(_DENSE)) + 2
     grid = np.union1d(np.geomspace(first, wanted[-1], steps), wanted)
     every = [roots(x) for x in grid]

@@ -10,8 +10,8 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.integrators.forms import OdeForm
 
-# Times within a step that differ by less than this fraction of it are one.
-_SAME = 1e-9
+# Times that differ by less than this fraction of the step are the same.
+_SAME_TIME = 1e-9
 
 
 class SolverCounts(NamedTuple):
@@ -83,5 +83,5 @@ def attempts(times: Sequence[float], start: float, places: int) -> int:
     later = later[later > 0.0]
     if later.size == 0:
         return 0
-    distinct = np.unique(np.round(later / later.min() / _SAME) * _SAME).size
+    distinct = np.unique(np.round(later / later.min() / _SAME_TIME) * _SAME_TIME).size
     return -(-distinct // places)

@@ -16,7 +16,7 @@ from paraflex.integrators.run import Problem
 # Steps that are worth a warning.
 MANY_STEPS = 20_000
 # Unknowns up to which all eigenvalues are found; beyond, the largest by Arnoldi's method.
-_DENSE = 600
+_MOST_DENSE = 600
 
 
 def largest_rate(form: OdeForm, problem: Problem) -> float:
@@ -27,9 +27,9 @@ def largest_rate(form: OdeForm, problem: Problem) -> float:
     initial = problem.initial
     jacobian = form.jacobian(initial.time, form.pack(initial.time, initial.q, initial.v, 0.0))
     if not np.all(np.isfinite(jacobian)):
-        # The run itself says that it comes to nothing finite.
+        # The run itself reports values that are not finite.
         return 0.0
-    if jacobian.shape[0] <= _DENSE:
+    if jacobian.shape[0] <= _MOST_DENSE:
         return float(np.max(np.abs(np.linalg.eigvals(jacobian))))
     start = np.ones(jacobian.shape[0])
     values = scipy.sparse.linalg.eigs(jacobian, k=1, which="LM", v0=start, return_eigenvectors=False)

@@ -21,7 +21,7 @@ from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PA
 # The least relative tolerance that SUNDIALS recommends.
 _RELATIVE = 1e-15
 # Return codes of both solvers: too much accuracy is asked for, error tests fail. Others are of Newton's iteration.
-_ACCURACY, _ERROR_TESTS = -2, -3
+_TOO_ACCURATE, _ERROR_TESTS = -2, -3
 # Unknowns from which on LAPACK's factorisation is faster than SUNDIALS' own.
 _LAPACK = 60
 
@@ -88,7 +88,7 @@ class SundialsStepper:
         if not (np.all(np.isfinite(result.y)) and np.all(np.isfinite(self._last))):
             return NOT_FINITE
         if result.status < 0:
-            return ERROR_TEST if result.status in (_ACCURACY, _ERROR_TESTS) else NO_CONVERGENCE
+            return ERROR_TEST if result.status in (_TOO_ACCURATE, _ERROR_TESTS) else NO_CONVERGENCE
         self.t, self.y = float(result.t), result.y
         return PAUSED
 

@@ -13,11 +13,11 @@ from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.integrators.methods import Treatment
 from paraflex.kernel.packed import Signals
 
-# Slopes of a beam this large are beyond any theory of small slopes [rad]: what computes them diverges.
+# With slopes this large no theory of small slopes is valid, and the run diverges [rad].
 _LARGEST_SLOPE = 2.0
 # Joints that are further apart than this part of the mechanism's size, or motions further off [rad], have come apart.
 # Where constraints depend on one another they contradict one another long before.
-_APART, _CONTRADICTION = 7e-3, 7e-4
+_GAPS, _CONTRADICTION = 7e-3, 7e-4
 # Multipliers that exert the same forces but for this fraction are the same.
 _SAME_FORCES = 1e-9
 
@@ -68,7 +68,7 @@ def come_apart(
         What keeps the constraints in the run.
     """
     phi, _ = system.constraints(signals, t, q)
-    if not system.gap(phi) > max(_CONTRADICTION if dependent else _APART, tolerance / system.size):
+    if not system.gap(phi) > max(_CONTRADICTION if dependent else _GAPS, tolerance / system.size):
         return None
     if dependent:
         return Breakdown(contradiction(system, phi, dependence(system, q, count=dependent), "positions"), AGREE)

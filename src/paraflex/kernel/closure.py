@@ -32,7 +32,7 @@ SMALLEST_MOVE = 1e-13
 LARGEST_TURN, LARGEST_SHIFT = 0.3, 1.2
 # A pivot below this fraction of the largest entry of the Jacobian without dimension is a singular position.
 SINGULAR_PIVOT = 1e-11
-CLOSED, NO_CONVERGENCE, TOO_COARSE, SINGULAR = range(4)
+LOOPS_CLOSED, LOOPS_OPEN, TOO_COARSE, LOOPS_SINGULAR = range(4)
 
 
 @by_reference
@@ -207,14 +207,14 @@ def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
         else:
             scaled_jacobian(system, marker, coordinates, q, work.fresh)
             if factor_dense(work.fresh, work.fresh_order) < SINGULAR_PIVOT:
-                return SINGULAR, gap
+                return LOOPS_SINGULAR, gap
             solve_scaled(system, coordinates, work.fresh, work.fresh_order, work.single)
         for j in range(q.size):
             q[j] -= work.single[j, 0]
         move = max(largest_shift(system, work.single[:, 0]), largest_turn(system, work.single[:, 0]))
         if move < SMALLEST_MOVE * (1.0 + max(largest_shift(system, q), largest_turn(system, q))):
-            return CLOSED, gap
-    return NO_CONVERGENCE, gap
+            return LOOPS_CLOSED, gap
+    return LOOPS_OPEN, gap
 
 
 @routine
@@ -266,8 +266,8 @@ def close_path(system, signals, marker_index, coordinates, times, target, q, v, 
     Returns
     -------
     status, index, residual
-        Where it stopped and the residual left there, for a status other than CLOSED: NO_CONVERGENCE, SINGULAR, or
-        TOO_COARSE where a singular position may lie between this instant and the one before.
+        Index of the last instant and its residual, for a status other than LOOPS_CLOSED: LOOPS_OPEN, LOOPS_SINGULAR,
+        or TOO_COARSE if a singular position may lie between this instant and the one before.
     """
     marker = system.markers[marker_index]
     for k in range(times.size):
@@ -277,7 +277,7 @@ def close_path(system, signals, marker_index, coordinates, times, target, q, v, 
                 q[k, j] = q[k - 1, j] + dt * (v[k - 1, j] + 0.5 * dt * a[k - 1, j])
         copy(q[k], work.unused)
         status, gap = close_loops(system, signals, marker, coordinates, times[k], target[k, 0], k > 0, q[k], work)
-        if status != CLOSED:
+        if status != LOOPS_CLOSED:
             return status, k, gap
         for j in range(q.shape[1]):
             work.unused[j] -= q[k, j]
@@ -292,6 +292,6 @@ def close_path(system, signals, marker_index, coordinates, times, target, q, v, 
             copy(work.jacobian[j], work.before[j])
             copy(work.jacobian[j], work.factors[j])
         if factor_dense(work.factors, work.order) < SINGULAR_PIVOT:
-            return SINGULAR, k, gap
+            return LOOPS_SINGULAR, k, gap
         move_loops(system, signals, marker, coordinates, times[k], target[k], q[k], v[k], a[k], basis[k], work)
-    return CLOSED, times.size, 0.0
+    return LOOPS_CLOSED, times.size, 0.0

@@ -22,7 +22,7 @@ from paraflex.kernel.notice import announce_damage, announce_no_room
 from paraflex.kernel.plain import STATE
 
 # States kept in one place: a checkout may be used by several environments, a cache in a home by several machines.
-KEPT = 3
+STATES_KEPT = 3
 
 _PREFIX = "paraflex-kernels-"
 
@@ -98,6 +98,6 @@ def make_folder(place: Path) -> Path:
     # Another process may be doing the same.
     with suppress(OSError):
         others = [each for each in place.glob(_PREFIX + "*") if each != folder]
-        for outdated in sorted(others, key=lambda each: -each.stat().st_mtime)[KEPT - 1 :]:
+        for outdated in sorted(others, key=lambda each: -each.stat().st_mtime)[STATES_KEPT - 1 :]:
             shutil.rmtree(outdated, ignore_errors=True)
     return folder

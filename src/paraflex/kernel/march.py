@@ -38,9 +38,9 @@ from paraflex.kernel.run_state import (
     PREPARED,
     PROJECTION,
     REJECTED,
+    ROOT_RATE,
     ROOT_STEP,
     SAMPLE,
-    SLOPE,
     STEP,
     STEPS,
     STOP,
@@ -190,7 +190,7 @@ def start(system, signals, tableau, controls, march, work, out):
     copy(a, march.algorithmic[0])
     march.clock[LAST_STEP], march.clock[LAST_ERROR] = 0.0, 1.0
     march.clock[PART_END] = t
-    march.clock[SLOPE], march.counts[ROOT_STEP] = 0.0, -1
+    march.clock[ROOT_RATE], march.counts[ROOT_STEP] = 0.0, -1
     march.power[0] = input_power(system, signals, t, march.q, march.v, lam, march.torques, work)
     kinetic, strain = system_energy(system, march.q, march.v, work.scratch)
     strain += spring_energy(system, lam) + line_energy(system, march.q, march.v)[0]
@@ -297,7 +297,7 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
                 continue
             # Near a singular position steps are of one length, and not so short that rounding tells.
             if march.counts[NEAR] > 0:
-                pace = abs(march.clock[SLOPE]) * h
+                pace = abs(march.clock[ROOT_RATE]) * h
                 if pace < LEAST_PACE * sqrt(march.clock[WIDEST]) and error < GROWING and not after_failure:
                     march.clock[STEP] = MAX_FACTOR * h
                 continue

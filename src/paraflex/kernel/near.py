@@ -17,7 +17,7 @@ from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.linear import solve_system
 from paraflex.kernel.metric import mass_norm
-from paraflex.kernel.projection import CLOSED, largest_violation, least_change
+from paraflex.kernel.projection import NO_VIOLATION, largest_violation, least_change
 from paraflex.kernel.run_state import (
     DRIFTED,
     HELD_END,
@@ -25,8 +25,8 @@ from paraflex.kernel.run_state import (
     NEAR,
     PASSAGES,
     ROOT,
+    ROOT_RATE,
     ROOT_STEP,
-    SLOPE,
     STEPS,
     WIDEST,
 )
@@ -59,21 +59,21 @@ def note_root(march, work):
     root, change = sqrt(max(work.least[0], 0.0)), 0.0
     if march.counts[ROOT_STEP] >= 0:
         change = (root - march.clock[ROOT]) / march.clock[LAST_STEP]
-    size = max(abs(change), FORGETTING * abs(march.clock[SLOPE]))
-    march.clock[SLOPE] = size if change > 0.0 else -size
+    size = max(abs(change), FORGETTING * abs(march.clock[ROOT_RATE]))
+    march.clock[ROOT_RATE] = size if change > 0.0 else -size
     march.clock[ROOT], march.counts[ROOT_STEP] = root, march.counts[STEPS]
 
 
 @routine
 def comes_near(h, march):
     """Whether a step begins near a singular position."""
-    return march.clock[ROOT] < max(NEAR_STEPS * abs(march.clock[SLOPE]) * h, NEAR_ROOT * sqrt(march.clock[WIDEST]))
+    return march.clock[ROOT] < max(NEAR_STEPS * abs(march.clock[ROOT_RATE]) * h, NEAR_ROOT * sqrt(march.clock[WIDEST]))
 
 
 @routine
 def share_of_passage(h, march):
     """The fraction of the passage of a singular position that a step covers."""
-    return min(1.0, abs(march.clock[SLOPE]) * h / (NEAR_ROOT * sqrt(march.clock[WIDEST])))
+    return min(1.0, abs(march.clock[ROOT_RATE]) * h / (NEAR_ROOT * sqrt(march.clock[WIDEST])))
 
 
 @routine
@@ -85,9 +85,9 @@ def trust(weights, g, b, ahead, march):
     the first only, and before a singular position both cancel. The stage is so long `ahead` of the start of the step.
     """
     lag = (2.0 * weights[0] * g + weights[1] * b) / (weights[0] + weights[1] * g + weights[2] * b)
-    speed = abs(march.clock[SLOPE])
+    speed = abs(march.clock[ROOT_RATE])
     held = min(max(HELD * lag, LEAST_HELD * g) * speed, MOST_HELD)
-    before = march.clock[SLOPE] < 0.0 and march.clock[ROOT] > speed * ahead
+    before = march.clock[ROOT_RATE] < 0.0 and march.clock[ROOT] > speed * ahead
     return held, -lag * speed if before else lag * speed
 
 
@@ -148,19 +148,19 @@ def return_to_constraints(system, signals, t, held, march, work):
     q, v = march.stage_q[last], march.stage_v[last]
     constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
     distance = damped_distance(system, work.rows, held, work)
-    if march.clock[SLOPE] != 0.0:
+    if march.clock[ROOT_RATE] != 0.0:
         constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
-        distance = max(distance, held / abs(march.clock[SLOPE]) * damped_distance(system, work.rows, held, work))
+        distance = max(distance, held / abs(march.clock[ROOT_RATE]) * damped_distance(system, work.rows, held, work))
     march.counts[HELD_END] = 1 if work.least[0] < held * held else 0
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
-        if largest_violation(system, work.rows) > CLOSED:
+        if largest_violation(system, work.rows) > NO_VIOLATION:
             hold_rows(system, work, held, 0.0, work.rows, work.mu)
             least_change(system, work.rows, work)
             add(work.x, q)
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
-        if largest_violation(system, work.rows) > CLOSED:
+        if largest_violation(system, work.rows) > NO_VIOLATION:
             hold_rows(system, work, held, 0.0, work.rows, work.mu)
             least_change(system, work.rows, work)
             add(work.x, v)
@@ -170,7 +170,7 @@ def return_to_constraints(system, signals, t, held, march, work):
 @routine
 def damped_distance(system, rows, held, work):
     """Distance from the constraints with these values [m], with nearly dependent rows reduced."""
-    if largest_violation(system, rows) <= CLOSED:
+    if largest_violation(system, rows) <= NO_VIOLATION:
         return 0.0
     damp_rows(system, work, held, rows, work.mu)
     least_change(system, rows, work)

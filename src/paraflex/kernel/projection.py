@@ -13,7 +13,7 @@ from paraflex.kernel.linear import solve_system
 
 # Violations this small count as none, in units of their rows; the factor is of the step's start, so each pass leaves a
 # small part.
-CLOSED, PASSES = 4e-14, 4
+NO_VIOLATION, PASSES = 4e-14, 4
 
 
 @routine
@@ -21,13 +21,13 @@ def project(system, signals, t, q, v, work):
     """Change q until Phi = 0, then v until Phi' = 0."""
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
-        if largest_violation(system, work.rows) <= CLOSED:
+        if largest_violation(system, work.rows) <= NO_VIOLATION:
             break
         least_change(system, work.rows, work)
         add(work.x, q)
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
-        if largest_violation(system, work.rows) <= CLOSED:
+        if largest_violation(system, work.rows) <= NO_VIOLATION:
             break
         least_change(system, work.rows, work)
         add(work.x, v)

@@ -25,11 +25,11 @@ from paraflex.kernel.tangent import note_slopes
 
 # Corrections end where the next is to be expected below this part of what they correct, or where, below the second
 # bound, they fall no more.
-ROUNDING, NEARLY, FALLING = 2e-16, 1e-9, 0.5
+LAST_CORRECTION, NEARLY, FALLING = 2e-16, 1e-9, 0.5
 # With the matrix of a run; after these, with the exact one.
 MOST_CORRECTIONS, MOST_EXACT = 60, 20
 # What is no more than this part of the largest accelerations of a run, or forces, is solved no more closely than that.
-NOTHING = 1e-6
+NEGLIGIBLE = 1e-6
 
 
 @by_reference
@@ -72,8 +72,8 @@ def baumgarte_weights(controls, alpha, beta, h):
 def ended(change, previous, iteration):
     """Whether corrections are down to rounding, from the last two relative ones."""
     if iteration == 0:
-        return change <= ROUNDING
-    return change * change <= ROUNDING * previous or (change < NEARLY and change > FALLING * previous)
+        return change <= LAST_CORRECTION
+    return change * change <= LAST_CORRECTION * previous or (change < NEARLY and change > FALLING * previous)
 
 
 @inlined
@@ -149,8 +149,8 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
     last = tableau.c.size - 1
     for k in range(count):
         for i in range(1, last + 1):
-            history.least[0] = max(history.least[0], NOTHING * largest(history.a[k, i]))
-            history.least[1] = max(history.least[1], NOTHING * largest(history.lam[k, i]))
+            history.least[0] = max(history.least[0], NEGLIGIBLE * largest(history.a[k, i]))
+            history.least[1] = max(history.least[1], NEGLIGIBLE * largest(history.lam[k, i]))
     for k in range(count):
         t, h = history.t[k], history.h[k]
         history.left[k] = 0.0

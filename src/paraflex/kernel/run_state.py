@@ -23,7 +23,7 @@ WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(6, 12)
 PART_END, PART = range(15, 17)
 # and of the row nearest to dependence: the root of the part of its square left, how fast that changes [1/s], and the
 # largest part so far.
-ROOT, SLOPE, WIDEST = range(12, 15)
+ROOT, ROOT_RATE, WIDEST = range(12, 15)
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
 # and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a

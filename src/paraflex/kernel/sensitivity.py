@@ -31,7 +31,13 @@ from paraflex.kernel.rounding import (
     prepare_matrix,
     relative,
 )
-from paraflex.kernel.sensitivity_samples import PLACES, STEP, WEIGHTS, sensitivity_at_samples, work_sensitivity
+from paraflex.kernel.sensitivity_samples import (
+    DIFFERENCE_STEP,
+    PLACES,
+    WEIGHTS,
+    sensitivity_at_samples,
+    work_sensitivity,
+)
 from paraflex.kernel.signals import piece_at
 from paraflex.kernel.stage import equations, note_torques
 from paraflex.kernel.step import input_power
@@ -72,10 +78,18 @@ def find_parametric(moved, signals, times, weights, q, v, a, lam, torques, sensi
     p0, p1, p2, p3 = moved
     s0, s1, s2, s3 = signals
     # From the outside in: what is small first.
-    gather_residual(p0, s0, times[0], weights[0], q, v, a, lam, torques, WEIGHTS[0] / STEP, sensitivity, work)
-    gather_residual(p3, s3, times[3], weights[3], q, v, a, lam, torques, WEIGHTS[3] / STEP, sensitivity, work)
-    gather_residual(p1, s1, times[1], weights[1], q, v, a, lam, torques, WEIGHTS[1] / STEP, sensitivity, work)
-    gather_residual(p2, s2, times[2], weights[2], q, v, a, lam, torques, WEIGHTS[2] / STEP, sensitivity, work)
+    gather_residual(
+        p0, s0, times[0], weights[0], q, v, a, lam, torques, WEIGHTS[0] / DIFFERENCE_STEP, sensitivity, work
+    )
+    gather_residual(
+        p3, s3, times[3], weights[3], q, v, a, lam, torques, WEIGHTS[3] / DIFFERENCE_STEP, sensitivity, work
+    )
+    gather_residual(
+        p1, s1, times[1], weights[1], q, v, a, lam, torques, WEIGHTS[1] / DIFFERENCE_STEP, sensitivity, work
+    )
+    gather_residual(
+        p2, s2, times[2], weights[2], q, v, a, lam, torques, WEIGHTS[2] / DIFFERENCE_STEP, sensitivity, work
+    )
 
 
 @routine
@@ -127,10 +141,10 @@ def respond_to_parameter(
 def moved_power(system, signals, t, place, i, q, v, lam, torques, sensitivity, work):
     """Power of the motors and all other forces at one point of the difference."""
     for j in range(q.size):
-        sensitivity.moved_q[j] = q[j] + place * STEP * sensitivity.q[i, j]
-        sensitivity.moved_v[j] = v[j] + place * STEP * sensitivity.v[i, j]
+        sensitivity.moved_q[j] = q[j] + place * DIFFERENCE_STEP * sensitivity.q[i, j]
+        sensitivity.moved_v[j] = v[j] + place * DIFFERENCE_STEP * sensitivity.v[i, j]
     for r in range(lam.size):
-        sensitivity.moved_lam[r] = lam[r] + place * STEP * sensitivity.lam[i, r]
+        sensitivity.moved_lam[r] = lam[r] + place * DIFFERENCE_STEP * sensitivity.lam[i, r]
     note_torques(signals, t, torques)
     return input_power(
         system, signals, t, sensitivity.moved_q, sensitivity.moved_v, sensitivity.moved_lam, torques, work
@@ -146,7 +160,7 @@ def power_sensitivity(moved, signals, times, i, q, v, lam, torques, sensitivity,
     total += WEIGHTS[3] * moved_power(p3, s3, times[3], PLACES[3], i, q, v, lam, torques, sensitivity, work)
     total += WEIGHTS[1] * moved_power(p1, s1, times[1], PLACES[1], i, q, v, lam, torques, sensitivity, work)
     total += WEIGHTS[2] * moved_power(p2, s2, times[2], PLACES[2], i, q, v, lam, torques, sensitivity, work)
-    sensitivity.power[i] = total / STEP
+    sensitivity.power[i] = total / DIFFERENCE_STEP
 
 
 @releases_lock
@@ -171,7 +185,7 @@ def sensitivity_steps(
     Parameters
     ----------
     moved, moved_signals : tuples of 4
-        The packed system and the signals at the PLACES times STEP of the parameter.
+        The packed system and the signals at the PLACES times DIFFERENCE_STEP of the parameter.
     pieces : tuple of 4 Signals
         Scratch, from `make_piece`.
     history : History
@@ -195,22 +209,34 @@ def sensitivity_steps(
                 copy(sensitivity.a[i - 1], sensitivity.a[i])
                 copy(sensitivity.lam[i - 1], sensitivity.lam[i])
             times = (
-                t + PLACES[0] * STEP * d_t, t + PLACES[1] * STEP * d_t,
-                t + PLACES[2] * STEP * d_t, t + PLACES[3] * STEP * d_t,
+                t + PLACES[0] * DIFFERENCE_STEP * d_t, t + PLACES[1] * DIFFERENCE_STEP * d_t,
+                t + PLACES[2] * DIFFERENCE_STEP * d_t, t + PLACES[3] * DIFFERENCE_STEP * d_t,
             )  # fmt: skip
             d_length = dh if i > 0 else 0.0
             weights = (
                 baumgarte_weights(
-                    controls, sensitivity.gains[0, 0], sensitivity.gains[0, 1], length + PLACES[0] * STEP * d_length
+                    controls,
+                    sensitivity.gains[0, 0],
+                    sensitivity.gains[0, 1],
+                    length + PLACES[0] * DIFFERENCE_STEP * d_length,
                 ),
                 baumgarte_weights(
-                    controls, sensitivity.gains[1, 0], sensitivity.gains[1, 1], length + PLACES[1] * STEP * d_length
+                    controls,
+                    sensitivity.gains[1, 0],
+                    sensitivity.gains[1, 1],
+                    length + PLACES[1] * DIFFERENCE_STEP * d_length,
                 ),
                 baumgarte_weights(
-                    controls, sensitivity.gains[2, 0], sensitivity.gains[2, 1], length + PLACES[2] * STEP * d_length
+                    controls,
+                    sensitivity.gains[2, 0],
+                    sensitivity.gains[2, 1],
+                    length + PLACES[2] * DIFFERENCE_STEP * d_length,
                 ),
                 baumgarte_weights(
-                    controls, sensitivity.gains[3, 0], sensitivity.gains[3, 1], length + PLACES[3] * STEP * d_length
+                    controls,
+                    sensitivity.gains[3, 0],
+                    sensitivity.gains[3, 1],
+                    length + PLACES[3] * DIFFERENCE_STEP * d_length,
                 ),
             )
             q, v, a, lam = history.q[k, i], history.v[k, i], history.a[k, i], history.lam[k, i]

@@ -12,7 +12,7 @@ from paraflex.kernel.compiling import by_reference, routine
 from paraflex.kernel.march import interpolate
 
 # Central differences of fourth order over this part of a parameter's size, and their places and weights.
-STEP = 1e-3
+DIFFERENCE_STEP = 1e-3
 PLACES, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 
 
@@ -138,11 +138,11 @@ def sensitivity_at_samples(tableau, k, history, sensitivity):
                     q, v, a = interpolate(
                         history.q[k, s0, j], history.v[k, s0, j], history.a[k, s0, j],
                         history.q[k, s1, j], history.v[k, s1, j], history.a[k, s1, j],
-                        width + PLACES[e] * STEP * d_width, z + PLACES[e] * STEP * d_z,
+                        width + PLACES[e] * DIFFERENCE_STEP * d_width, z + PLACES[e] * DIFFERENCE_STEP * d_z,
                     )  # fmt: skip
-                    sensitivity.sample_q[i, j] += WEIGHTS[e] * q / STEP
-                    sensitivity.sample_v[i, j] += WEIGHTS[e] * v / STEP
-                    sensitivity.sample_a[i, j] += WEIGHTS[e] * a / STEP
+                    sensitivity.sample_q[i, j] += WEIGHTS[e] * q / DIFFERENCE_STEP
+                    sensitivity.sample_v[i, j] += WEIGHTS[e] * v / DIFFERENCE_STEP
+                    sensitivity.sample_a[i, j] += WEIGHTS[e] * a / DIFFERENCE_STEP
         multiplier_sensitivity(
             tableau,
             k,

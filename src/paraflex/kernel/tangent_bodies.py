@@ -9,7 +9,7 @@ from paraflex.kernel.packed import DAMPING, GJ, I1, NX, NY, OMEGA2, S2X, S2Y, SL
 
 # Rows of Tangent.points: slopes at the Gauss points, their two derivatives, the axial force carried there; and changes
 # of these.
-W0, W1, W2, AXIAL, DW0, DW1, DW2, DAXIAL = range(8)
+W0, W1, W2, AXIAL_FORCE, DW0, DW1, DW2, DAXIAL_FORCE = range(8)
 
 
 @inlined
@@ -168,8 +168,8 @@ def second_order_tangent(system, i, q, v, a, direction, points):
             direction.f[e + l] += system.mass_shape[NX, h + l] * d_mx + system.mass_shape[NY, h + l] * d_my
         for j in range(point.reach):
             weight = system.mass_weights[point.weights + j]
-            points[AXIAL, j] += weight * mx
-            points[DAXIAL, j] += weight * d_mx
+            points[AXIAL_FORCE, j] += weight * mx
+            points[DAXIAL_FORCE, j] += weight * d_mx
         fx += mx
         fy += my
         d_fx += d_mx
@@ -177,7 +177,7 @@ def second_order_tangent(system, i, q, v, a, direction, points):
         d_torque += d_sx * my + sx * d_my - d_sy * mx - sy * d_mx + turn
     for j in range(body.slopes):
         h = system.masses[body.mass + j].shape
-        force = points[DW0, j] * points[AXIAL, j] + points[W0, j] * points[DAXIAL, j]
+        force = points[DW0, j] * points[AXIAL_FORCE, j] + points[W0, j] * points[DAXIAL_FORCE, j]
         for l in range(n):
             direction.f[e + l] -= system.mass_shape[SLOPE, h + l] * force
     direction.f[o] = c * d_fx - s * d_fy - d_phi * (s * fx + c * fy)

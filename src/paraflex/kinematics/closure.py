@@ -23,7 +23,7 @@ from paraflex.dynamics import (
 from paraflex.dynamics.points import point_motion
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
 from paraflex.kernel.arrays import apart
-from paraflex.kernel.closure import CLOSED, SINGULAR, close_path, make_closure_scratch, task_values
+from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.kinematics.reach import PoseSearch, Shortfall
@@ -33,18 +33,18 @@ from paraflex.mechanism.members import TASK_COORDINATES
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
 _LONGEST_STEP = 1e-3
-# Where such a step is too long it is cut into pieces, and these again; a step shorter than this is short enough [s].
-_PIECES, _SHORTEST_STEP = 16, 1e-8
-# Steps from the assembly's pose to the start of the path; more where these fail.
+# A step that is too long is divided into so many pieces, repeatedly, down to the shortest step [s].
+_STEP_PIECES, _SHORTEST_STEP = 16, 1e-8
+# Steps from the assembly's pose to the start of the path; more if these fail.
 _APPROACHES = (25, 250, 2500)
 # Instants at which the distance of an unreachable path from what can be reached is looked at, evenly spaced besides the
 # knots of the path, and so many more about the furthest.
-_LOOKS, _MORE_LOOKS = 41, 9
+_INSTANTS_LOOKED_AT, _MORE_LOOKS = 41, 9
 # A path that leaves what can be reached within this part of what is left of it does so where closure stopped.
 _SOON = 0.05
-# A path that passes within a thousandth of a link of such a position cannot be told from one through it.
-_ALMOST = "or comes so near to one that the assembly beyond it is not certain"
-_MOVE = "move the path or the bases, or choose another assembly"
+# A path within a thousandth of a link of such a position cannot be distinguished from one through it.
+_NEARLY_SINGULAR = "or comes so near to one that the assembly beyond it is not certain"
+_MOVE_PATH = "move the path or the bases, or choose another assembly"
 _OTHER = "it can be reached, but only past a Type I singularity or in another assembly"
 
 
@@ -319,7 +319,7 @@ class PathClosure:
             target = np.zeros((steps + 1, 3, goal.size))
             target[:, 0] = here + fractions[:, None] * (goal - here)
             status, index, _, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
-            if status == CLOSED:
+            if status == LOOPS_CLOSED:
                 return q[-1]
             reached = q[index - 1] if index else reached
         found = self.shortfall(path, start, end, reached)
@@ -335,24 +335,24 @@ class PathClosure:
             target = self.target(path, grid)
             status, index, _, found = self.run(grid, target, pose)
             last = index - 1
-            if status in (CLOSED, SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
+            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
                 break
             # From the last instant reached, in shorter steps.
             intervals.append([x[:last][keep[:last]] for x in (grid, *found)])
             pose = found[0][last]
-            between = np.linspace(grid[last], grid[index], _PIECES + 1)[1:-1]
+            between = np.linspace(grid[last], grid[index], _STEP_PIECES + 1)[1:-1]
             grid = np.concatenate([grid[last:index], between, grid[index:]])
             keep = np.concatenate([keep[last:index], np.zeros(between.size, bool), keep[index:]])
         intervals.append([x[:index][keep[:index]] for x in (grid, *found)])
         motion = RigidMotion(
             self.mechanism, self.system, path, *(np.concatenate(parts) for parts in zip(*intervals, strict=True))
         )
-        if status == CLOSED:
+        if status == LOOPS_CLOSED:
             return motion
         at = float(grid[index])
         # Where the path leaves the workspace the Jacobian is singular as well, but beyond nothing closes.
         found = self.shortfall(path, at, float(grid[-1]), pose if last < 0 else found[0][last])
-        cause, detail = "the path passes a Type I singularity", _ALMOST
+        cause, detail = "the path passes a Type I singularity", _NEARLY_SINGULAR
         if np.any(found.out[found.t <= at + _SOON * (found.t[-1] - at)]):
             cause, detail = "the path goes out of reach", ""
         elif np.any(found.elsewhere):
@@ -363,7 +363,7 @@ class PathClosure:
         """Distance of a path from the workspace, from a pose near its start onwards."""
         end = max(start, min(end, path.duration))
         knots = [knot for knot in path.knots if start < knot < end]
-        times = np.unique([*np.linspace(start, end, _LOOKS), *knots])
+        times = np.unique([*np.linspace(start, end, _INSTANTS_LOOKED_AT), *knots])
         others = self.other_poses()
         found = self.reach.shortfall(times, self.target(path, times)[:, 0], pose, others)
         k = found.furthest
@@ -386,7 +386,7 @@ class PathClosure:
     ) -> UnreachablePathError:
         """The error of a path that cannot be followed: time, place, and distance of its furthest point."""
         lengths, k = self.coordinates != 2, found.furthest
-        # A path that comes back to its start is as far there: said once.
+        # A closed path has the same distance at its start and end, which is reported once.
         if found.out[k] and found.beyond(k) != found.beyond(0):
             place = ", ".join(f"{x:.4g}" for x in found.desired[k, lengths])
             place = f"({place}) m" if place else f"at t = {found.t[k]:.6g} s"
@@ -394,7 +394,7 @@ class PathClosure:
             detail = f"{detail}; {furthest}" if detail else furthest
         place = tuple(found.desired[0, lengths].tolist()) or None
         return UnreachablePathError(
-            cause, Moment(at, step, place), partial, _MOVE, detail=detail,
+            cause, Moment(at, step, place), partial, _MOVE_PATH, detail=detail,
             shortfall=float(np.max(found.distance)), shortfall_angle=float(np.max(found.turn)),
         )  # fmt: skip
 

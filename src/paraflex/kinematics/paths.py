@@ -16,7 +16,7 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.kinematics.laws import TrapezoidalLaw
 
-# Of Gauss's rule for the length between two knots of a path.
+# Points of Gauss's rule for the length between two knots of a path.
 _LENGTH_POINTS = 40
 
 

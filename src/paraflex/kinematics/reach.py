@@ -20,10 +20,10 @@ from paraflex.mechanism import PointRef
 REACHED = 1e-8
 # Newton's iteration on the distance: how many, the longest step [sizes of the mechanism, rad], also where loops are
 # closed, the shortest, and the difference that second derivatives are taken by.
-_MAX_ITERATIONS, _LONGEST, _SHORTEST, _DIFFERENCE = 60, 0.5, 1e-12, 1e-6
-# A slope of the distance, or a curvature, below this is none.
+_MAX_ITERATIONS, _LONGEST_MOVE, _SHORTEST_MOVE, _DIFFERENCE = 60, 0.5, 1e-12, 1e-6
+# A gradient or a curvature of the distance below this counts as zero.
 _FLAT = 1e-10
-# Poses from bodies turned at random that are tried besides.
+# Number of further starts with bodies turned at random.
 _SCATTERED = 4
 # Singular values below this part of the largest are of redundant constraints.
 _DEPENDENT = 1e-9
@@ -130,22 +130,22 @@ class PoseSearch:
         Newton's method on half the square of the distance within the poses that the constraints allow, along the null
         space of Phi_q; second derivatives are those of the Lagrangian, by differences.
         """
-        square, longest = self._square(q, goal), _LONGEST
+        square, longest = self._square(q, goal), _LONGEST_MOVE
         for _ in range(_MAX_ITERATIONS):
             if square <= (1e-3 * REACHED) ** 2:
                 break
             step = self._step(goal, q, longest)
             length = float(np.max(np.abs(step)))
-            if length <= _SHORTEST:
+            if length <= _SHORTEST_MOVE:
                 break
             trial = self.closed(t, q + self.system.units * step)
             found = np.inf if trial is None else self._square(trial, goal)
             if trial is None or found >= square:
                 longest = 0.25 * length
-                if longest < _SHORTEST:
+                if longest < _SHORTEST_MOVE:
                     break
                 continue
-            q, square, longest = trial, found, min(_LONGEST, 2.0 * longest)
+            q, square, longest = trial, found, min(_LONGEST_MOVE, 2.0 * longest)
         off = np.abs(self._task(q)[0] - goal)
         angle = self.coordinates == 2
         part = float(np.linalg.norm(off / self._units))
@@ -156,7 +156,7 @@ class PoseSearch:
     def closed(self, t: float, q: Array) -> Array | None:
         """The pose with loops closed by least changes; None if they do not close."""
         system = self.system
-        pose, phi = assemble(system, self.signals, t, q, self._change_at, longest=_LONGEST)
+        pose, phi = assemble(system, self.signals, t, q, self._change_at, longest=_LONGEST_MOVE)
         return pose if closed(system, pose, phi) else None
 
     def tracked(self, times: Sequence[float] | Array, goals: Array, q: Array) -> list[Nearest]:

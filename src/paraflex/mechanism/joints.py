@@ -72,7 +72,7 @@ class AtEnd(Enum):
     STOP
         It ends there, as at a limit of the joint, and has not failed.
     WARN
-        It goes on, beyond what the beam is: deflections are extrapolated. The result says so.
+        The run continues with extrapolated deflections, and the result has a finding.
     IGNORE
         It goes on and says nothing.
     """

@@ -19,7 +19,7 @@ Values = tuple[Array, Array, Array]
 # What a law and its rate may jump by at a knot, as a fraction of their size: rounding of its expressions.
 _SMOOTH = 1e-9
 # A run may end this far beyond a table, as a fraction of it: rounding of times.
-_SAME_TIME = 1e-9
+_BEYOND_TABLE = 1e-9
 _DEGREE = 5
 
 
@@ -158,7 +158,7 @@ class TabulatedLaw(CheckedFields):
             A time that the table does not cover.
         """
         first, last = self.times[0], self.times[-1]
-        slack = _SAME_TIME * (last - first)
+        slack = _BEYOND_TABLE * (last - first)
         for time, beyond in ((np.min(t), np.min(t) < first - slack), (np.max(t), np.max(t) > last + slack)):
             if beyond:
                 raise InputError(

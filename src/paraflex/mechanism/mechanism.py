@@ -68,7 +68,7 @@ class Mechanism(Members, Shown):
 
     def save(self, path: str | Path) -> None:
         """Write the model file of this mechanism, from which `load` reads an equal one; see `Model.save`."""
-        # Files stand above what they hold; they are imported when one is written.
+        # `files` is above `mechanism`, so it is imported when a file is written.
         import_module("paraflex.files").Model(self).save(path)
 
     @classmethod

@@ -16,10 +16,10 @@ from paraflex.mechanism.damping import Damping
 Row = Sequence[float]
 Matrix = Sequence[Sequence[float]]
 
-# How far a matrix may be from symmetric or skew, as a fraction of its largest entry: digits lost on the way.
+# Largest deviation of a matrix from symmetric or skew, as a fraction of its largest entry: lost digits.
 _ASYMMETRY = 1e-6
 # Smallest eigenvalue of a matrix scaled to a unit diagonal that counts as positive.
-_SMALLEST = 1e-12
+_SMALLEST_EIGENVALUE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def _definite(matrix: np.ndarray, field: str, remedy: str) -> None:
     diagonal = np.diag(matrix)
     if np.all(diagonal > 0.0):
         sizes = np.sqrt(diagonal)
-        if np.linalg.eigvalsh(matrix / np.outer(sizes, sizes))[0] > _SMALLEST:
+        if np.linalg.eigvalsh(matrix / np.outer(sizes, sizes))[0] > _SMALLEST_EIGENVALUE:
             return
     raise InputError("is not positive definite", field=field, remedy=remedy)
 

@@ -43,7 +43,7 @@ def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
     first, second = (_coordinate(mechanism, mechanism.joint(name), poses) for name in relation.joints)
     if first is None or second is None:
         raise InputError(
-            f"a {group.word}'s phase is not given, and assembly {assembly.name} does not place its joints",
+            f"a {group.word}'s phase is not given, and assembly {assembly.name} does not determine its joints",
             field=field, remedy="give it, or places of points in the assembly",
         )  # fmt: skip
     return replace(relation, phase=second - relation.transmission * first)

@@ -14,8 +14,8 @@ from paraflex.mechanism.members import Assembly, Members
 from paraflex.mechanism.modal import ModalBody
 
 Place = tuple[float, float]
-# Points of a body nearer one another than this part of its size do not tell its angle.
-_APART = 1e-9
+# Points of a body closer than this fraction of its size do not determine its angle.
+_SAME_PLACE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def _from_points(
     poses: dict[str, Pose] = {}
     known: dict[PointRef, Place] = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()}
     known |= points
-    # Others do not tell where a point is.
+    # Other joints do not determine the place of a point.
     for telling in ({"points"}, {"points", "axis"})[: 1 + sliding]:
         before = -1
         while before < len(known) + len(poses):
@@ -94,7 +94,7 @@ def _from_points(
                     local = local_points(body)
                     found = {name: known[ref] for name in local if (ref := PointRef(body.name, name)) in known}
                     if sliding:
-                        # What angles do not close is open at one joint.
+                        # A gap that the angles leave is at one joint.
                         found = dict([*found.items()][:1])
                     pose = _fit(local, found, angles.get(body.name))
                     if pose is not None:
@@ -123,7 +123,7 @@ def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | 
     if angle is None:
         arms = [(local[name][0] - cx, local[name][1] - cy, x - gx, y - gy) for name, (x, y) in found.items()]
         size = max(hypot(x - cx, y - cy) for x, y in local.values())
-        if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) <= _APART * size:
+        if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) <= _SAME_PLACE * size:
             return None
         # Best fit in the sense of least squares.
         angle = atan2(

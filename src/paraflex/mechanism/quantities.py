@@ -11,7 +11,7 @@ from typing import Any, Literal, cast
 from paraflex.errors import InputError, suggestion
 from paraflex.limits import LARGEST, SMALLEST, of_size
 
-# What a joint that a member names does: it has an angle, a travel, or either.
+# Motions of joints that members name: an angle, a travel, or either.
 JointThat = Literal["moves", "turns", "slides"]
 
 

@@ -20,7 +20,7 @@ from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import Assembly
 from paraflex.mechanism.poses import approximate_poses
 
-# Points at which segments hang together.
+# Points at which segments are joined.
 FIRST_END = "_first"
 LAST_END = "_last"
 
@@ -47,7 +47,7 @@ def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, i
     Eight make the paper's 56 segments of RAParM-I.
     """
     lengths = {body.name: body.length for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.flexible}
-    # Rounding of a length's share must not make one segment more.
+    # Rounding of the ratio of lengths must not add a segment.
     most = max(lengths.values(), default=0.0)
     return {name: ceil(longest * length / most - 1e-9) for name, length in lengths.items()}
 
@@ -58,7 +58,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
 
     A joint of two half segments bends as they do together: k = E I / (L / n), of spans of several stiffnesses the
     reciprocal of int dx / E I over the two halves. Lumped masses move with the segment they lie on. The model is
-    another discretisation of the same beam, without stretch, and knows nothing of shape functions.
+    another discretisation of the same beam, without elongation and without shape functions.
 
     Parameters
     ----------

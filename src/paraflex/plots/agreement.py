@@ -19,7 +19,7 @@ from paraflex.plots.style import BLUE, VERMILLION, keep_flat, look_of
 from paraflex.plots.time_series import most_deflected
 from paraflex.plots.workspace import deviated_paths
 
-_PRINTED = {
+_MODEL_NAMES = {
     "rigid": "rigid",
     "ked": "KED",
     "linear": "linear geometry",
@@ -30,14 +30,14 @@ _PRINTED = {
 }
 _PAIR: tuple[dict[str, Any], ...] = ({"color": BLUE, "linestyle": "-"}, {"color": VERMILLION, "linestyle": (0, (4, 2))})
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
-_SHORTEST = 1e-8
+_SMALLEST_DISTANCE = 1e-8
 # Links that a page holds in one column.
 _MOST_NARROW = 6
 
 
 def printed(model: str) -> str:
     """Label of a model in legends."""
-    return _PRINTED.get(model, model)
+    return _MODEL_NAMES.get(model, model)
 
 
 @drawn
@@ -109,7 +109,7 @@ def model_distances(data: xr.Dataset) -> Figure:
             look = look_of(k)
             for panel, other in zip(column, (run["end_effector_desired"].values, datum), strict=True):
                 distance = np.linalg.norm(place - other, axis=1)
-                shown = np.where(distance > _SHORTEST, distance, np.nan)
+                shown = np.where(distance > _SMALLEST_DISTANCE, distance, np.nan)
                 draw_actual(panel, run, time, 1e3 * shown, label=printed(name), **look)
         for panel, title in zip(column, ("from the desired place", f"from {printed(reference)}"), strict=True):
             panel.set_title(f"{mode_label(mode)}: distance {title}")

@@ -15,7 +15,7 @@ from paraflex.plots.layout import MM, is_narrow, lay_out, panels
 from paraflex.plots.style import COLOURS, STYLE, ZERO
 
 # Height of a metric's group of bars, and of one bar in it, [mm]; width of a letter of a metric's name, [em].
-_GROUP, _BAR, _LETTER = 2.4, 1.9, 0.2
+_GROUP_HEIGHT, _BAR, _LETTER = 2.4, 1.9, 0.2
 _EM = STYLE["font.size"] / 72.0 * 25.4
 
 
@@ -29,7 +29,7 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
     figure, axes = panels(1, 1)
     panel = axes[0, 0]
     # Groups from the top down, in them the parameters in order.
-    pitch = len(parameters) * _BAR + _GROUP
+    pitch = len(parameters) * _BAR + _GROUP_HEIGHT
     places = -pitch * np.arange(len(metrics))
     for k, parameter in enumerate(parameters):
         values = [shown["metrics"][metric]["relative"][parameter] for metric in metrics]

@@ -18,12 +18,12 @@ from paraflex.results.metrics import METRICS
 
 Array = NDArray[np.float64]
 
-# Not what a design is chosen for.
+# Metrics by which designs are not chosen.
 _OF_THE_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
 _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
-_FIRST, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
+_FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
 # A metric that changes by less, as a share of its size, is the same for all designs.
-_SAME = 1e-9
+_NOT_VARIED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class DesignTable:
                 )  # fmt: skip
         if names:
             return list(names)
-        # Of motors one by one only where there is nothing else.
+        # Metrics of single motors only if there are no others.
         varying = [name for name in self.metrics if self._varies(name) and name not in _OF_THE_SOLVER]
         chosen = ([name for name in varying if "." not in name] or varying)[:most]
         if not chosen:
@@ -130,14 +130,14 @@ class DesignTable:
     def _varies(self, name: str) -> bool:
         values = self.metrics[name][self.complete]
         values = values[np.isfinite(values)]
-        return values.size > 1 and float(np.ptp(values)) > _SAME * float(np.max(np.abs(values)))
+        return values.size > 1 and float(np.ptp(values)) > _NOT_VARIED * float(np.max(np.abs(values)))
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
     """The table of a study in order of its runs, from the files of its folder that `tables_of` finds."""
     table = read_tables(files)
     names = table.column_names
-    if not {*_FIRST, *_LAST} <= set(names):
+    if not {*_FIRST_COLUMNS, *_LAST} <= set(names):
         raise InputError(
             "not a table of designs", field=str(files[0]), remedy="name a results.parquet that paraflex wrote"
         )

@@ -25,7 +25,7 @@ from paraflex.plots.themes import Theme, theme
 Array = NDArray[np.float64]
 
 # Bodies named under a picture; of more there is no room.
-_NAMED = 9
+_MOST_NAMED = 9
 _MM = 1.0 / 25.4
 # Room above and below a drawing [mm].
 _HEAD, _FOOT = 5.0, 5.5
@@ -34,7 +34,7 @@ _HEAD, _FOOT = 5.0, 5.5
 # Width of links [pt], and diameters of a body at a single place, a pin and the end-effector.
 _LINK, _DOT, _PIN, _TIP = 3.4, 7.0, 5.4, 4.2
 # Share of the picture; Agg draws nothing of a line without length, nor of one that it snaps to a single pixel.
-_SHORT = 2e-3
+_SHORTEST_LINE = 2e-3
 
 
 class Sketch:
@@ -78,7 +78,7 @@ class Sketch:
         """Update all parts to the scene's time of a number."""
         bodies = {name: figure_of(places[i]) for name, places in self.scene.bodies.items()}
         # A body at a single place is a dot: a line so short that its round ends are all that is seen.
-        dot = [[0.0, 0.0], [_SHORT * self.limits.size, 0.0]]
+        dot = [[0.0, 0.0], [_SHORTEST_LINE * self.limits.size, 0.0]]
         self.links.set_segments([places if len(places) > 1 else places + dot for places in bodies.values()])
         self.links.set_linewidth([self._width * (_LINK if len(one) > 1 else _DOT) for one in bodies.values()])
         self.links.set_color(list(self._colours.values()))
@@ -206,7 +206,7 @@ def mechanism_drawing(
 def name_links(figure: Figure, shown: Scene, look: Theme, size: float, y: float) -> None:
     """Names of the bodies in their colours, in a row."""
     names = list(shown.bodies)
-    if len(names) > _NAMED:
+    if len(names) > _MOST_NAMED:
         return
     # Letters are two thirds of their size wide, as shares of the figure's width; three between names.
     letter = size / 72.0 * 0.68 / figure.get_figwidth()

@@ -16,7 +16,7 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label
 from paraflex.plots.layout import ONE_COLUMN, lay_out, panels
 from paraflex.plots.runs import draw_curves, finish_over_time
-from paraflex.plots.scales import LINE, list_lines, mark_powers
+from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
 from paraflex.plots.selection import names_of, select_run
 from paraflex.plots.style import BLUE, GREEN, VERMILLION
 from paraflex.results.following import headline, ranked_by_motion
@@ -25,7 +25,7 @@ from paraflex.results.following import headline, ranked_by_motion
 @drawn
 def actuation_condition(data: xr.Dataset) -> Figure:
     """Condition number of the actuation matrix along the path in every mode: large near a Type II singularity."""
-    # Of the planned motion: it goes on where a run stopped.
+    # It belongs to the planned motion, which continues after a run has stopped.
     whole = data.assign(end_effector=data["end_effector_desired"])
     return _of_all_modes(whole, data["actuation_condition"].transpose("mode", "time").values, "condition")
 
@@ -35,7 +35,7 @@ def tracking_distance(data: xr.Dataset) -> Figure:
     """Distance of the end-effector from its desired place in time, all modes in one panel."""
     away = (data["end_effector"] - data["end_effector_desired"]).transpose("mode", "time", "axis").values
     distance = 1e3 * np.linalg.norm(away, axis=2)
-    # What rounding leaves would stretch the axis.
+    # Rounding errors would extend the logarithmic axis.
     return _of_all_modes(data, np.where(distance > 1e-5, distance, np.nan), "distance")
 
 
@@ -74,7 +74,7 @@ def mode_comparison(data: xr.Dataset) -> Figure:
     _bars(axes[0, 2], names, peaks, VERMILLION)
     axes[0, 2].set_title(f"largest {label.partition(' [')[0]}")
     axes[0, 2].set_xlabel(label)
-    return lay_out(figure, axes, panel_height=LINE * len(names) + 2.0)
+    return lay_out(figure, axes, panel_height=LIST_LINE * len(names) + 2.0)
 
 
 @drawn
@@ -100,7 +100,7 @@ def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
     mark_powers(panel, "x")
     panel.set_xlim(1.0, None)
     panel.set_xlabel(axis_label("condition") + ", worst along the path")
-    return lay_out(figure, axes, panel_height=LINE * len(names) + 2.0)
+    return lay_out(figure, axes, panel_height=LIST_LINE * len(names) + 2.0)
 
 
 def _bars(panel: Axes, names: list[str], values: Any, colour: str, **look: Any) -> None:

@@ -16,14 +16,14 @@ from paraflex.plots.scene import Scene, common_limits, run_times, scene, select
 from paraflex.plots.themes import theme
 from paraflex.writing import whole_file, whole_folder
 
-FORMATS = (".mp4", ".gif", ".svg", ".png")
+FILM_FORMATS = (".mp4", ".gif", ".svg", ".png")
 # A film of less is not worth looking at, one of more tires; speeds to choose from [s].
-_SHORTEST = 5.0
+_SHORTEST_FILM = 5.0
 _SPEEDS = tuple(step * 10.0**power for power in range(1, -7, -1) for step in (5.0, 2.0, 1.0))
 _MOST_FRAMES = 20_000
 # Places on the trail of a single picture.
 _TRAIL = 400
-_SMALLEST, _LARGEST = 64, 7680
+_SMALLEST_PICTURE, _LARGEST_PICTURE = 64, 7680
 _ELSEWHERE = "choose another place"
 
 
@@ -86,7 +86,7 @@ def plan_film(
     speed = options.speed
     if speed is None:
         # The highest round speed at which a run is not over too soon.
-        speed = next((one for one in _SPEEDS if duration / one >= _SHORTEST), _SPEEDS[-1])
+        speed = next((one for one in _SPEEDS if duration / one >= _SHORTEST_FILM), _SPEEDS[-1])
     fps = 100.0 / max(1, round(100.0 / options.fps)) if kind == ".gif" else options.fps
     if kind == ".png":
         at = 0.5 * (first + last) if options.at is None else options.at
@@ -150,7 +150,7 @@ def animate(
 def film_kind(file: Path) -> str:
     """The kind of film by the suffix of a name; a name without a suffix is a folder of pictures."""
     kind = file.suffix.lower()
-    if kind in FORMATS or kind == "":
+    if kind in FILM_FORMATS or kind == "":
         return kind
     raise InputError(
         "unknown kind of film", field="output", value=str(file),
@@ -167,9 +167,12 @@ def _check(options: FilmOptions) -> None:
             "more pictures a second than a screen shows", field="fps", value=options.fps, remedy="30 is smooth"
         )
     for side in options.size or ():
-        if not _SMALLEST <= side <= _LARGEST:
+        if not _SMALLEST_PICTURE <= side <= _LARGEST_PICTURE:
             raise InputError(
-                f"not between {_SMALLEST} and {_LARGEST} pixels", field="size", value=side, remedy="say 1280x720"
+                f"not between {_SMALLEST_PICTURE} and {_LARGEST_PICTURE} pixels",
+                field="size",
+                value=side,
+                remedy="say 1280x720",
             )
 
 

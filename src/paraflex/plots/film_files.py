@@ -34,7 +34,7 @@ _GIF_COLOURS, _NEAR = 128, 12
 # What a GIF ends with.
 _TRAILER = b";"
 # Key frames a second of an SVG; browsers go on evenly between them.
-_KEYS, _MOST_KEYS = 25.0, 400
+_KEY_FRAMES, _MOST_KEYS = 25.0, 400
 
 
 def write_film(film: Film, kind: str, file: Path, report: Report) -> None:
@@ -78,7 +78,7 @@ def _animated_svg(film: Film) -> str:
     """One file that plays by itself in browsers: what stays from Matplotlib, what moves as values in time (SMIL)."""
     (width, height), time = film.size, film.time
     seconds = max(float(time[-1] - time[0]) / film.speed, 1e-3)
-    count = min(time.size, _MOST_KEYS, round(seconds * _KEYS) + 1)
+    count = min(time.size, _MOST_KEYS, round(seconds * _KEY_FRAMES) + 1)
     keys = np.unique(np.linspace(0, time.size - 1, count).round()).astype(int)
     with journal_style(), rc_context({"svg.fonttype": "none", "font.family": ["DejaVu Sans", "sans-serif"]}):
         figure, sketches, texts = stage(film)

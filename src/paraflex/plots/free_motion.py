@@ -15,11 +15,11 @@ from paraflex.plots.selection import names_of
 from paraflex.plots.style import COLOURS, DASHES, keep_flat, look_of
 from paraflex.plots.workspace import finish_workspace, workspace_panel
 
-# A point that moves less than this share of all stands still.
-_STILL = 1e-3
+# A point that moves less than this fraction of the largest motion is at rest.
+_STILL_SHARE = 1e-3
 # Coordinates that change by less rest, but for rounding.
 _NOTHING = 1e-12
-# Of modal coordinates, what they are by the last part of their names.
+# Meaning of modal coordinates by the last part of their names.
 _KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1e3)}
 
 
@@ -83,8 +83,8 @@ def point_paths(data: xr.Dataset) -> Figure:
     # Points at one place share a line; those that a program made have names of their own.
     shown: list[int] = []
     for k in np.argsort(-travel, kind="stable"):
-        apart = all(peak(places[:, k] - places[:, other]) > _STILL * travel.max() for other in shown)
-        if travel[k] > _STILL * travel.max() and apart and "._" not in names[k]:
+        apart = all(peak(places[:, k] - places[:, other]) > _STILL_SHARE * travel.max() for other in shown)
+        if travel[k] > _STILL_SHARE * travel.max() and apart and "._" not in names[k]:
             shown.append(int(k))
     figure, panel = workspace_panel()
     for look, k in enumerate(sorted(shown[:MOST_LINES])):

@@ -27,7 +27,7 @@ class Quantity(NamedTuple):
     unit: str
 
 
-# The one list of what axes are called; {} is a direction.
+# Labels of all axes; {} is a direction.
 QUANTITIES = {
     "time": Quantity("time", "$t$", "s"),
     "angle": Quantity("angle", r"$\varphi$", "rad"),

@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 # Sizes as parts of the picture's larger side.
 PIN, TRIANGLE, RAIL = 0.008, 0.028, 0.02
 _TEETH = 14
-# A joint that moves by less than this part of the picture stays where it is.
-_STILL = 1e-3
+# A joint that moves by less than this fraction of the picture is drawn at rest.
+_STILL_SHARE = 1e-3
 
 
 class MarkLook(NamedTuple):
@@ -50,7 +50,7 @@ class Mark(NamedTuple):
 
 def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of the ground, at one time."""
-    # What neither slides nor holds a point stands on nothing.
+    # A joint that neither slides nor holds a point has no support.
     held = [joint for joint in shown.joints if joint.slides or {"pin", "weld"} & SYMBOLS.get(joint.kind, {}).keys()]
     found = [(joint.name, ground_of(joint, limits)) for joint in held if joint.grounded]
     found += [("", support(place, limits)) for place in shown.anchors]
@@ -84,7 +84,7 @@ def _joined(pieces: Sequence[Array] | Array) -> Array:
 
 def is_guide(joint: DrawnJoint, limits: Limits) -> bool:
     """Whether a slider moves through a fixed block, instead of a block along a rail."""
-    return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL * limits.size)
+    return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL_SHARE * limits.size)
 
 
 def triangle(place: Array, limits: Limits) -> Array:

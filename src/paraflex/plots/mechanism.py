@@ -22,7 +22,7 @@ from paraflex.results.outlines import figure_order
 
 Points = NDArray[np.float64]
 
-POINT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
+POINT_STYLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
 _IN_LEGEND: dict[str, Any] = {"linestyle": "none", "marker": "^", "markerfacecolor": "none", "markeredgecolor": BLACK}
 _LOOK = replace(theme("light"), ink=BLACK, earth=BLACK, links=("#737373",))
 # Of lines, beside those of a film.
@@ -66,7 +66,7 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
         axes.plot([], [], label="ground", **_IN_LEGEND)
     others = [group[0] for group in groups if group[0] not in joined]
     if others:
-        axes.plot(*start[others].T, label="other points", **POINT)
+        axes.plot(*start[others].T, label="other points", **POINT_STYLE)
     taken = np.vstack([*map(_sampled, shown.bodies.values()), *grounds, clear_of])
     taken = taken[np.isfinite(taken).all(axis=1)]
     axes.update_datalim(np.vstack([start, taken]))

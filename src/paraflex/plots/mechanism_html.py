@@ -11,9 +11,9 @@ from paraflex.mechanism import Body, Mechanism, grouped, loops
 from paraflex.plots.svg import sketch
 
 # Bodies, joints or modes listed one by one.
-_MOST = 40
-# Groups of which more is said than how many there are.
-_LISTED = ("body", "joint", "motor", "assembly", "mode")
+_MOST_LISTED = 40
+# Groups with a table of their own; of others only the number is shown.
+_LISTED_GROUPS = ("body", "joint", "motor", "assembly", "mode")
 
 
 @view.register(Mechanism)
@@ -48,13 +48,13 @@ def _counts(mechanism: Mechanism) -> list[tuple[str, Any]]:
         ("degrees of freedom (Grübler)", freedoms(mechanism)),
         ("motors", motors),
         ("end-effector", None if effector is None else f"{effector.point}: {', '.join(effector.coordinates)}"),
-        ("actuation modes", [mode.name for mode in mechanism.modes[:_MOST]]),
+        ("actuation modes", [mode.name for mode in mechanism.modes[:_MOST_LISTED]]),
         ("assemblies", [assembly.name for assembly in mechanism.assemblies]),
         ("geometry of flexible bodies", mechanism.geometry.value),
         *(
             (group.words, len(members))
             for group, members in grouped(mechanism)
-            if members and group.table not in _LISTED
+            if members and group.table not in _LISTED_GROUPS
         ),
     ]
 
@@ -66,8 +66,8 @@ def _counted(mechanism: Mechanism) -> str:
 
 def _few(what: str, headings: tuple[str, ...], rows: list[tuple]) -> str:
     """A table of the first rows, and the number of the others."""
-    more = len(rows) - _MOST
-    return table(headings, rows[:_MOST]) + (sentence(f"and {more} more {what}") if more > 0 else "")
+    more = len(rows) - _MOST_LISTED
+    return table(headings, rows[:_MOST_LISTED]) + (sentence(f"and {more} more {what}") if more > 0 else "")
 
 
 def _words(body: Body) -> str:

@@ -13,13 +13,13 @@ from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import metric_name, mode_label
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panels
-from paraflex.plots.scales import LINE, list_lines
+from paraflex.plots.scales import LIST_LINE, list_lines
 from paraflex.plots.style import BLUE, VERMILLION, ZERO
 
 _FAINT = "0.6"
 # Height of a panel [mm].
 _PANEL = 50.0
-# Far above the best a design says nothing of how the search came down; it is drawn at the upper edge.
+# Designs far above the best are drawn at the upper edge, as they would hide the convergence.
 _HIGHEST = 3.0
 
 
@@ -73,7 +73,7 @@ def targets_reached(figures: Mapping[str, Any]) -> Figure:
     list_lines(panel, [_target_name(each, targets) for each in targets])
     panel.margins(x=0.08)
     panel.set_xlabel("reached / target")
-    return lay_out(figure, axes, panel_height=LINE * len(targets) + 2.0)
+    return lay_out(figure, axes, panel_height=LIST_LINE * len(targets) + 2.0)
 
 
 @drawn
@@ -96,7 +96,7 @@ def sobol_bars(figures: Mapping[str, Any]) -> Figure:
     for panel in axes.flat:
         panel.set_xlabel("share of the variance" if panel.get_visible() else "")
     most = max(len(parameters) for parameters in panels_of.values())
-    return lay_out(figure, axes, panel_height=1.6 * LINE * most + 2.0)
+    return lay_out(figure, axes, panel_height=1.6 * LIST_LINE * most + 2.0)
 
 
 def _draw_best(panel: Axes, ran: list, last: int) -> None:

@@ -21,7 +21,7 @@ from paraflex.plots.style import VERMILLION
 Array = NDArray[np.float64]
 
 # Metrics shown unless asked for, axes and lines at most, and the height of an axis [mm].
-_METRICS, _AXES, _LINES, _ROW = 3, 10, 2000, 10.0
+_METRICS, _AXES, _LINES, _AXIS_HEIGHT = 3, 10, 2000, 10.0
 _LIGHTEST = 0.85  # Of the colour map, whose light end is too light on paper.
 
 
@@ -55,7 +55,7 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
     axes[0, 0].set_title(
         " ".join([f"{len(values)} designs,", *([] if is_narrow() else [f"{plain(pair[0])},"]), mode_label(pair[1])])
     )
-    return lay_out(figure, axes, panel_height=_ROW * len(labels))
+    return lay_out(figure, axes, panel_height=_AXIS_HEIGHT * len(labels))
 
 
 def _draw_designs(panel: Axes, places: Array, judged: Array, judge: str) -> None:

@@ -13,7 +13,7 @@ from paraflex.plots.selection import names_of, one_run, select_run
 from paraflex.plots.style import BLUE, keep_flat
 
 # Bodies that have a panel.
-_MOST = 8
+_MOST_PANELS = 8
 
 
 @drawn
@@ -45,7 +45,7 @@ def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
 def link_phases(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Angular velocity over angle of every body, at most eight."""
     run = one_run(data, mode)
-    bodies = names_of(run, "body")[:_MOST]
+    bodies = names_of(run, "body")[:_MOST_PANELS]
     columns = 2 if is_narrow() or len(bodies) in (2, 3, 4) else min(len(bodies), 4)
     columns = min(columns, len(bodies))
     figure, axes = panels(-(-len(bodies) // columns), columns)

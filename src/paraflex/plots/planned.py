@@ -39,7 +39,7 @@ class PlannedFigure:
         return f"{self.figure.name}_{self.of}" if self.of else self.figure.name
 
 
-# What must be there for a figure besides its variables.
+# Required content of results for a figure, besides its variables.
 _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "convergence": lambda found: any(value is not None for _, value, _ in found.get("history", ())),
     "targets_reached": lambda found: any(target["value"] != 0.0 for target in found.get("targets", ())),

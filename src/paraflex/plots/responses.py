@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")
 # Panels beside and below one another.
 _MOST_PARAMETERS, _MOST_METRICS = 3, 3
-# So many values of a parameter are joined by lines of medians; of more, medians of as many groups.
-_GROUPS = 12
+# Most values of a parameter with a median each; more values are divided into as many groups.
+_MEDIAN_GROUPS = 12
 
 
 @drawn
@@ -79,9 +79,9 @@ def _scale(values: Array) -> float:
 def _medians(x: Array, y: Array) -> tuple[Array, Array]:
     """Medians of values in order of x: at each x, or in groups of equal size."""
     values = np.unique(x)
-    groups = [x == value for value in values] if values.size <= _GROUPS else None
+    groups = [x == value for value in values] if values.size <= _MEDIAN_GROUPS else None
     if groups is None:
-        split = np.array_split(np.arange(x.size), _GROUPS)
+        split = np.array_split(np.arange(x.size), _MEDIAN_GROUPS)
         return tuple(np.array([np.nanmedian(each[part]) for part in split]) for each in (x, y))  # pyright: ignore[reportReturnType]
     return values, np.array([np.nanmedian(y[part]) for part in groups])
 

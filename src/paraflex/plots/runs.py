@@ -22,7 +22,7 @@ DESIRED: dict[str, Any] = {
 _MARK: dict[str, Any] = {"color": BLACK, "linestyle": "none", "markersize": 4.5}
 STOPPED: dict[str, Any] = _MARK | {"marker": "x", "markeredgewidth": 1.2, "zorder": 3.0, "label": "the run stopped"}
 START: dict[str, Any] = _MARK | {"marker": "s", "zorder": 4.0, "label": "start"}
-# Lines that can still be told apart in one panel.
+# Most lines that are distinguishable in one panel.
 MOST_LINES = 7
 # Variables of the end-effector's motion, what they are, and what their values are multiplied by.
 END_EFFECTOR = (

@@ -21,7 +21,7 @@ from paraflex.writing import portable_name, whole_file
 
 # Files that do not depend on when they were written.
 _METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
-FORMATS = tuple(_METADATA)
+FIGURE_FORMATS = tuple(_METADATA)
 
 
 @checked_arguments()
@@ -88,7 +88,7 @@ def write_figures(
     folder : Path
         Made if it is not there.
     formats : sequence of str
-        From FORMATS.
+        From FIGURE_FORMATS.
     style : str, optional
         "single" or "double": the width of one or two columns; by default what suits each figure.
     dpi : float
@@ -101,8 +101,8 @@ def write_figures(
     list of Path
     """
     for name in formats or ("",):
-        if name not in FORMATS:
-            raise InputError("unknown format", field="--format", value=name, remedy=suggestion(name, FORMATS))
+        if name not in FIGURE_FORMATS:
+            raise InputError("unknown format", field="--format", value=name, remedy=suggestion(name, FIGURE_FORMATS))
     files = {drawing.stem: [folder / f"{portable_name(drawing.stem)}.{name}" for name in formats] for drawing in drawn}
     there = [file for each in files.values() for file in each if file.exists()]
     if there and not force:

@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from paraflex.plots.labels import logarithmic_number, plain, power_of_ten
 
 # Height of a line of a list of names [mm].
-LINE = 5.5
+LIST_LINE = 5.5
 
 
 def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y") -> None:

@@ -24,11 +24,11 @@ _CIRCLE = 61
 BLOCK = (0.034, 0.022)
 _MARGIN = 0.07
 # Shares of the width that a scale bar may take.
-_BAR = 0.28
-# A point that moves by less stays where it is [m].
-_HELD = 1e-6
+_SCALE_BAR = 0.28
+# A point that moves by less is at rest [m].
+_STILL_POINT = 1e-6
 # Shares of all places in percent between which a run is that does not come apart.
-_MOST = (0.2, 99.8)
+_RUN_SHARES = (0.2, 99.8)
 
 
 class Limits(NamedTuple):
@@ -243,10 +243,10 @@ def followed_station(run: xr.Dataset) -> int | None:
     for station in stations.tolist():
         place = shape[:, station]
         apart = np.linalg.norm(joints - place[:, None], axis=-1)
-        if not (joints.size and np.min(np.max(apart, axis=0)) < _HELD):
+        if not (joints.size and np.min(np.max(apart, axis=0)) < _STILL_POINT):
             travelled[station] = float(np.sum(np.linalg.norm(np.diff(place, axis=0), axis=-1)))
     farthest = max(travelled, key=lambda station: travelled[station], default=None)
-    return farthest if farthest is not None and travelled[farthest] >= _HELD else None
+    return farthest if farthest is not None and travelled[farthest] >= _STILL_POINT else None
 
 
 def _anchors(run: xr.Dataset) -> tuple[Array, ...]:
@@ -320,7 +320,7 @@ def limits_of(places: Array) -> Limits:
     """Limits that contain all of these places, with a margin."""
     places = places[np.isfinite(places).all(axis=1)]
     # A run that comes apart does not rule the picture.
-    usual = np.percentile(places, _MOST, axis=0)
+    usual = np.percentile(places, _RUN_SHARES, axis=0)
     far = np.max(np.ptp(usual, axis=0))
     low, high = np.maximum(places.min(axis=0), usual[0] - far), np.minimum(places.max(axis=0), usual[1] + far)
     size = float(np.max(high - low)) or 1.0
@@ -370,7 +370,7 @@ def is_plate(places: Array) -> bool:
 
 def scale_bar(limits: Limits) -> tuple[float, str]:
     """A round length that fits into the picture [m], and its name."""
-    most = _BAR * (limits.right - limits.left)
+    most = _SCALE_BAR * (limits.right - limits.left)
     power = 10.0 ** np.floor(np.log10(most))
     length = float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= most))
     if length >= 1.0:

@@ -15,8 +15,8 @@ from paraflex.seals import NETCDF, PARQUET
 from paraflex.writing import read_values
 
 _OURS = "name a folder or file that paraflex wrote"
-# Files of results, those that tell what a folder is first.
-_FILES = ("results.nc", "verify.nc", "compare-methods.json", "sensitivity.json", "indices.json", "result.json")
+# Files of results; the first one found determines the kind of a folder.
+_RESULT_FILES = ("results.nc", "verify.nc", "compare-methods.json", "sensitivity.json", "indices.json", "result.json")
 _BEGINNINGS = {NETCDF: "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", PARQUET: "parquet"}
 
 
@@ -63,7 +63,7 @@ def open_source(path: str | Path) -> Source:
 
 
 def _folder(folder: Path) -> Source:
-    found = [folder / name for name in _FILES if (folder / name).is_file()]
+    found = [folder / name for name in _RESULT_FILES if (folder / name).is_file()]
     if len(found) > 1:
         names = ", ".join(each.name for each in found)
         raise InputError(f"holds several results ({names})", field=str(folder), remedy="name one of the files")
@@ -94,7 +94,7 @@ def _json(file: Path) -> Source:
     if kind:
         searched = kind in ("optimisation", "identification", "indices")
         return Source(kind, found, file.parent, _designs(file.parent) if searched else None)
-    beside = [name for name in _FILES if (file.parent / name).is_file() and name != file.name]
+    beside = [name for name in _RESULT_FILES if (file.parent / name).is_file() and name != file.name]
     remedy = f"name {beside[0]} beside it" if beside else _OURS
     raise InputError("no figures are drawn from this file", field=str(file), remedy=remedy)
 

@@ -22,9 +22,9 @@ _ORDERS = {"adams": (4,), "bdf": (2, 5), "ndf": (2,)}
 CURVES: tuple[tuple[str, int | None], ...] = tuple(
     (name, order) for name in METHODS if name != "ida" for order in _ORDERS.get(name, (None,))
 )
-# Frequencies at which a step still describes a vibration; and up to where modes are only to vanish.
+# Frequencies that a step resolves; and the highest one shown, where modes need only be damped.
 _RESOLVED, _HIGH = np.geomspace(0.1, 3.0, 120), np.geomspace(0.1, 1e4, 240)
-# Fractions shown, and a radius beyond which all that is to be said is said.
+# Range of fractions shown, and the largest spectral radius shown.
 _SHOWN, _GROWN = (1e-6, 1.0), 1.5
 
 

@@ -67,7 +67,7 @@ STYLE: dict[str, Any] = {
     "ps.fonttype": 42,
 }
 
-# What varies by less, in the unit of its axis, is zero but for rounding.
+# Data that differ by less, in the unit of their axis, differ by rounding only.
 _NOTHING = 1e-9
 
 

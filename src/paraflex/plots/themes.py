@@ -35,7 +35,7 @@ THEMES = {
         ("#4aa8e0", "#f0b93a", "#2ec49a", "#e39cc4", "#9ad4f5", "#c99565", "#a59df0", "#c6cb4a"),
     ),
 }  # fmt: skip
-# On a page of unknown ground, as of a notebook: what is neither too light nor too dark for one of the two kinds.
+# For a page of unknown background, such as a notebook: colours for both light and dark.
 PAGE = Theme(
     "rgba(128, 128, 128, 0.6)", "currentColor", "currentColor", "currentColor", "currentColor", "currentColor",
     ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"),

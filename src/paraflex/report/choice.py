@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from paraflex.plots.designs import DesignTable, in_conflict, undominated
 from paraflex.report.designs import metric_name
 
-# Rows drawn at most, runs looked at closely, the best of the first metric and of the front among them.
+# Most rows drawn; most runs in motion, the best of the first metric and of the front included.
 MOST_ROWS, MOST_RUNS, _BEST, _FRONT = 5000, 8, 3, 2
 # Metrics whose fronts are kept whatever is left out.
 _FRONTS = 8
@@ -69,7 +69,7 @@ def drawn_rows(designs: DesignTable, kept: Sequence[int], most: int = MOST_ROWS)
     for two in [tuple(pair), *combinations(names, 2)]:
         if len(two) == 2 and len(chosen) < most:
             chosen |= dict.fromkeys(int(row) for rows in fronts(designs, *two) for row in rows)
-    # The default front stands first among those kept.
+    # The default front is the first of those kept.
     held = np.array(list(chosen)[:most], dtype=np.intp)
     others = np.setdiff1d(complete, held)
     lot = np.random.default_rng(0).choice(others, size=most - held.size, replace=False)

@@ -14,8 +14,8 @@ from paraflex.plots.selection import names_of
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.page import Chart, Curve, Look
 
-# What the page has, a solid line among the dashes.
-COLOURS, DASHES = 8, 5
+# Numbers of colours and dashes of the page, the solid line included.
+N_COLOURS, N_DASHES = 8, 5
 DOTTED = 2
 MOST_SAMPLES = 2000
 # Charts without their curves. A deflection is from a link's chord, which displacements of ends are not.
@@ -31,7 +31,7 @@ TIPS = Chart(
 
 def look(k: int) -> Look:
     """Colour and dash of the k-th of many curves, all different; few differ in colour."""
-    return Look(k % COLOURS, (k % COLOURS + k // COLOURS) % DASHES)
+    return Look(k % N_COLOURS, (k % N_COLOURS + k // N_COLOURS) % N_DASHES)
 
 
 def labelled(label: str, unit: str) -> str:

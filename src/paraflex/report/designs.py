@@ -14,10 +14,10 @@ from paraflex.report.page import DesignColumn
 from paraflex.results.metrics import metric_label
 
 # Reasons of failures that are listed.
-_REASONS = 12
+_MOST_REASONS = 12
 _COMPLETE = "complete"
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-# A metric that spans so much is drawn on a logarithmic axis, and a range that is logarithmic itself.
+# A metric with this ratio of values has a logarithmic axis, as has a logarithmic range.
 _WIDE, _WIDE_RANGE = 50.0, 10.0
 
 
@@ -76,8 +76,8 @@ def reasons(designs: DesignTable) -> list[tuple[str, str, int]]:
         if status != _COMPLETE:
             groups.setdefault((status, _NUMBER.sub("#", reason)), []).append(reason)
     most = sorted(groups.items(), key=lambda group: -len(group[1]))
-    found = [(status, texts[0], len(texts)) for (status, _), texts in most[:_REASONS]]
-    left = sum(len(texts) for _, texts in most[_REASONS:])
+    found = [(status, texts[0], len(texts)) for (status, _), texts in most[:_MOST_REASONS]]
+    left = sum(len(texts) for _, texts in most[_MOST_REASONS:])
     return [*found, *([("", "other reasons; the table has them", left)] if left else [])]
 
 

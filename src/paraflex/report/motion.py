@@ -21,7 +21,7 @@ from paraflex.results.validity import validity_line, validity_summary
 
 _ALONE = ("",)
 # Charts choose among so many points and joints; results.nc has them all.
-_MOST = 60
+_MOST_CHOICES = 60
 
 
 @checked_arguments()
@@ -105,7 +105,7 @@ def _points(data: xr.Dataset) -> Chart | None:
     moving = [
         k for k, name in enumerate(names)
         if "._" not in name and np.isfinite(places[k, :, 0]).any() and np.nanmax(np.nanstd(places[k], axis=0)) > 1e-9
-    ][:_MOST]  # fmt: skip
+    ][:_MOST_CHOICES]  # fmt: skip
     if not moving:
         return None
     unit = DisplayUnit("mm", 1e3) if largest(places[moving]) < 10.0 else DisplayUnit("m", 1.0)
@@ -120,7 +120,7 @@ def _points(data: xr.Dataset) -> Chart | None:
 
 def _joint_forces(data: xr.Dataset) -> Chart:
     force = data["joint_force"].transpose("joint", "time", "axis").values
-    names = names_of(data, "joint")[:_MOST]
+    names = names_of(data, "joint")[:_MOST_CHOICES]
     curves = []
     for j in range(len(names)):
         magnitude = np.linalg.norm(force[j], axis=-1)
@@ -137,7 +137,7 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
     names = names_of(data, "coordinate")
     values = data["coordinate_value"].transpose("coordinate", "time").values
     curves, choices = [], []
-    for body in bodies[:_MOST]:
+    for body in bodies[:_MOST_CHOICES]:
         own = [k for k, name in enumerate(names) if name.startswith(f"{body}.")]
         kinds = (
             (f"{text_symbol(body)}: x, y [m], φ [rad]", own[:3]),

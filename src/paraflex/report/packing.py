@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Of a 16-bit number: what stands for NaN, and the largest magnitude left for the others.
-MISSING, _LARGEST = -32768, 32767
-# Bits of a single-precision fraction that are dropped: what is left resolves 4e-6 of a value and packs better.
+# 16-bit numbers: the code of NaN, and the largest magnitude of others.
+MISSING, _LARGEST_CODE = -32768, 32767
+# Bits of a single-precision fraction that are dropped: the rest resolves 4e-6 of a value and compresses better.
 _DROPPED = 6
 
 
@@ -55,7 +55,7 @@ def packed(values: ArrayLike) -> dict[str, Any]:
     finite = np.isfinite(flat).all(axis=1)
     low, high = (flat[finite].min(axis=0), flat[finite].max(axis=0)) if finite.any() else (np.zeros(2), np.zeros(2))
     offset = 0.5 * (low + high)
-    scale = float(0.5 * np.max(high - low) / _LARGEST) or 1.0
+    scale = float(0.5 * np.max(high - low) / _LARGEST_CODE) or 1.0
     whole = np.full(array.shape, MISSING, dtype="<i2")
     known = np.isfinite(array).all(axis=-1)
     whole[known] = np.rint((array[known] - offset) / scale)

@@ -37,7 +37,7 @@ class Look(NamedTuple):
     dash: int = 0
 
 
-PLAIN = Look()
+PLAIN_LOOK = Look()
 
 
 @dataclass(frozen=True)
@@ -59,13 +59,13 @@ class Curve:
     choice : int, optional
         Which of the chart's choices shows it; every one by default.
     quiet : bool
-        Left out of what is said of where the pointer is.
+        Left out of the label at the pointer.
     """
 
     name: str
     y: ArrayLike
     x: ArrayLike | None = None
-    look: Look = PLAIN
+    look: Look = PLAIN_LOOK
     run: int | None = None
     shown: tuple[int, ...] | None = None
     choice: int | None = None
@@ -160,7 +160,7 @@ class Designs:
     columns : sequence of DesignColumn
         Parameters first.
     telling : str
-        What runs are told apart by: "mode".
+        What distinguishes runs: "mode".
     series : sequence of (str, Look)
         Its names and looks.
     member : (k,) array of int

@@ -12,9 +12,9 @@ import xarray as xr
 from paraflex.files import library_names
 from paraflex.results.doubts import FINDINGS, verdict_of
 
-# What a run takes where nothing is said.
-_FLAGS = ("rigid", "ked", "balanced")
-_NAMED = (
+# Defaults of a run.
+_RUN_FLAGS = ("rigid", "ked", "balanced")
+_REQUEST_FIELDS = (
     "duration",
     "samples",
     "tolerance",
@@ -26,7 +26,7 @@ _NAMED = (
     "curvature",
     "after",
 )
-_GIVEN = {name: f"--{name}" for name in _NAMED} | {"tolerance": "--tol"}
+_GIVEN = {name: f"--{name}" for name in _REQUEST_FIELDS} | {"tolerance": "--tol"}
 
 
 def asked(data: xr.Dataset) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def run_command_line(run: dict[str, Any]) -> str:
         words += [f"--{name}={run[name]}" for name in ("alpha", "beta") if name in run]
     if run.get("automatic_gains"):
         words.append("--automatic-gains")
-    words += [f"--{name}" for name in _FLAGS if run.get(name)]
+    words += [f"--{name}" for name in _RUN_FLAGS if run.get(name)]
     if run.get("geometry") and not any(run.get(name) for name in ("rigid", "ked", "segments")):
         words += ["--geometry", run["geometry"]]
     for event in run.get("stop_at") or []:

@@ -29,12 +29,12 @@ from paraflex.report.designs import columns, metric_name, reasons, shown_unit
 from paraflex.report.film import animation
 from paraflex.report.page import Page, Panel
 from paraflex.report.survey import LOWER, Step, drawn_designs, survey
-from paraflex.report.text import NOTHING, count, number, table
+from paraflex.report.text import NO_VALUE, count, number, table
 
 _NO_RUN = "None of the best designs was simulated again, so there is no animation."
 # Of the table of best designs; others are in the study's table.
 _MOST_COLUMNS = 12
-_KEPT = (
+_SHOWN_VARIABLES = (
     "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
     "joint_position", "joint_direction", "spring_position", "point_station", "spring_station", "gear_radius",
 )  # fmt: skip
@@ -137,7 +137,7 @@ def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Datase
     longest = max((one["time"].values for one in runs), key=lambda time: time[-1])
     parts = []
     for one in _with_as_many_stations(runs):
-        kept = one[[name for name in _KEPT if name in one]].isel(mode=0)
+        kept = one[[name for name in _SHOWN_VARIABLES if name in one]].isel(mode=0)
         kept = kept.drop_vars([name for name in kept.coords if name not in _COORDINATES])
         same = np.array_equal(one["time"].values, longest)
         parts.append(kept if same else kept.interp(time=longest))
@@ -250,8 +250,8 @@ def _parameter_table(account: StudyAccount) -> str:
     for name, one in account.parameters.items():
         unit, factor = shown_unit(one.unit, np.array([one.low, one.high]))
         spread = {"log": "in their logarithm", "values": "as listed", "linear": "evenly"}.get(one.spread, one.spread)
-        rows.append((name, ["\n".join([one.fields[0], ", ".join(one.fields[1:])]) if one.fields else NOTHING,
-                            number(one.low, factor), number(one.high, factor), unit or NOTHING, spread]))  # fmt: skip
+        rows.append((name, ["\n".join([one.fields[0], ", ".join(one.fields[1:])]) if one.fields else NO_VALUE,
+                            number(one.low, factor), number(one.high, factor), unit or NO_VALUE, spread]))  # fmt: skip
     heads = [("parameter", ""), ("field", ""), ("from", ""), ("to", ""), ("unit", ""), ("spread", "")]
     return table(heads, rows, caption="What was varied")
 
@@ -261,7 +261,7 @@ def _trouble(designs: DesignTable) -> list[tuple[str, str]]:
     found = reasons(designs)
     if not found:
         return []
-    rows = [(status or NOTHING, [count(number), reason]) for status, reason, number in found]
+    rows = [(status or NO_VALUE, [count(number), reason]) for status, reason, number in found]
     heads = [("status", ""), ("runs", ""), ("reason", "one of those alike")]
     return [("Runs that are not complete", f'<div class="long">{table(heads, rows, caption="Reasons")}</div>')]
 

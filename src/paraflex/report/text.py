@@ -11,19 +11,19 @@ from html import escape
 from paraflex.plots.labels import display_unit, raised
 
 # Magnitudes written out; others as powers of ten.
-_SMALLEST, _LARGEST = 1e-3, 1e5
-NOTHING = "–"
-_WORDS, _SORTABLE = ' class="words"', ' class="sortable"'
+_SMALLEST_PLAIN, _LARGEST_PLAIN = 1e-3, 1e5
+NO_VALUE = "–"
+_WORD_CLASS, _SORTABLE = ' class="words"', ' class="sortable"'
 
 
 def number(value: float | None, factor: float = 1.0) -> str:
     """A value to three digits, times a factor: "0.377", "1.2 × 10⁻⁵"; a dash if there is none."""
     if value is None or not math.isfinite(value):
-        return NOTHING
+        return NO_VALUE
     value = factor * value
     if value == 0.0:
         return "0"
-    if not _SMALLEST <= abs(value) < _LARGEST:
+    if not _SMALLEST_PLAIN <= abs(value) < _LARGEST_PLAIN:
         digits, power = f"{value:.2e}".split("e")
         return f"{digits} × 10{raised(int(power))}".replace("-", "−")
     # Whole numbers of four or five digits are kept.
@@ -39,7 +39,7 @@ def quantity(value: float, unit: str) -> str:
 
 def count(value: float | None) -> str:
     """A whole number with thousands separated: "43 708"."""
-    return NOTHING if value is None or not math.isfinite(value) else f"{int(value):,}".replace(",", "\u2009")
+    return NO_VALUE if value is None or not math.isfinite(value) else f"{int(value):,}".replace(",", "\u2009")
 
 
 def table(
@@ -72,7 +72,7 @@ def table(
     runs = runs or {}
     wordy = [k > 0 and any(_is_words(cells[k - 1]) for _, cells in rows) for k in range(len(heads))]
     head = "".join(
-        f'<th scope="col"{_WORDS if words else ""}>{escape(name)}{_small(unit)}</th>'
+        f'<th scope="col"{_WORD_CLASS if words else ""}>{escape(name)}{_small(unit)}</th>'
         for (name, unit), words in zip(heads, wordy, strict=True)
     )
     body = "".join(_row(name, cells, runs.get(name), keys[name] if keys else None) for name, cells in rows)
@@ -107,7 +107,7 @@ def _row(name: str, cells: Sequence[str], run: int | None, keys: Sequence[float 
 
 def _cell(text: str) -> str:
     first, _, second = text.partition("\n")
-    return f"<td{_WORDS if _is_words(text) else ''}>{escape(first)}{_small(second)}</td>"
+    return f"<td{_WORD_CLASS if _is_words(text) else ''}>{escape(first)}{_small(second)}</td>"
 
 
 def _is_words(text: str) -> bool:

@@ -32,7 +32,7 @@ from paraflex.report.curves import (
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
-from paraflex.report.text import NOTHING, count, number, quantity, table
+from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
 from paraflex.results.formulas import during_motion
@@ -110,7 +110,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
             f"{count(one['newton_iterations'].item())}\n{count(one['factorisations'].item())}",
             number(one["wall_time"].item()),
         ]))  # fmt: skip
-    rows += [(name, ["failed", *[NOTHING] * (len(heads) - 2)]) for name in failed]
+    rows += [(name, ["failed", *[NO_VALUE] * (len(heads) - 2)]) for name in failed]
     kind = "Forces" if torque_unit(data) == "N" else "Torques"
     note = f"Error and largest: {words}. "
     if after:
@@ -267,6 +267,6 @@ def _model(run: Mapping[str, object]) -> str:
 def _deflection(values: NDArray[np.float64], bodies: NDArray[np.str_], factor: float) -> str:
     """The largest deflection (samples, bodies), and its body."""
     if not np.isfinite(values).any() or np.nanmax(values) == 0.0:
-        return NOTHING
+        return NO_VALUE
     where = int(np.nanargmax(np.nanmax(np.where(np.isfinite(values), values, -1.0), axis=0)))
     return f"{number(largest(values), factor)}\n{text_symbol(str(bodies[where]))}"

@@ -20,14 +20,14 @@ from paraflex.report.curves import TIPS, errors, labelled, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, verify_command_line
-from paraflex.report.text import NOTHING, count, number, quantity, table
+from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.kinds import check_kind
 
 _ENGINES = ("exudyn", "mujoco")
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
-_SHORTEST = 1e-9
+_SMALLEST_DISTANCE = 1e-9
 
 
 class _Runs:
@@ -149,7 +149,7 @@ def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str) -> 
 def _distances(mode: Mapping[str, Any]) -> str:
     names = list(mode["distances"])
     rows = [
-        (printed(a), [NOTHING if a == b else number(mode["distances"][a][b]) for b in names])
+        (printed(a), [NO_VALUE if a == b else number(mode["distances"][a][b]) for b in names])
         for a in names
     ]  # fmt: skip
     return table([("[m]", ""), *((printed(name), "") for name in names)], rows, caption="Distances between models")
@@ -198,7 +198,7 @@ def _panels(data: xr.Dataset, runs: _Runs, reference: str) -> list[Panel]:
     places = runs.array(data["end_effector"])
     far = errors(data.transpose("mode", "model", "time", ...)).values
     apart = np.linalg.norm(places - places[:, datum : datum + 1], axis=-1)
-    far, apart = (np.where(one > _SHORTEST, one, np.nan) for one in (far, apart))
+    far, apart = (np.where(one > _SMALLEST_DISTANCE, one, np.nan) for one in (far, apart))
     far_chart = Chart("errors", "Tracking error: distance from the desired place", "distance", log=True)
     apart_chart = Chart("apart", f"Distance from {name}", "distance", log=True)
     return [

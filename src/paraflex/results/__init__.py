@@ -5,7 +5,7 @@ Names are imported when they are first used: files are read without what compute
 
 import lazy_loader
 
-# A module called like what it holds: imported later it would stand in for that.
+# The module has the name of its function, and would replace it if imported later.
 from paraflex.results.summary import summary as summary
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -14,9 +14,9 @@ from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.results.doubts import MODE, keep_findings
-from paraflex.results.following import KEPT, ErrorSpan, Part, metric_variables, too_short
+from paraflex.results.following import KEPT_METRICS, ErrorSpan, Part, metric_variables, too_short
 from paraflex.results.labelled import Variables, label, link_coordinates, link_variables, padded, provenance
-from paraflex.results.record import BRAKE_ENERGY, FIGURES, Record, record
+from paraflex.results.record import BRAKE_ENERGY, RUN_FIGURES, Record, record
 from paraflex.results.validity import validity_variables
 from paraflex.tracking import TrackingRun
 from paraflex.validity import doubtful_numbers
@@ -76,7 +76,7 @@ def tracking_dataset(
     }
     for name, (dim, values) in twins.items():
         data[f"{name}_desired"] = (("mode", "time", dim), np.broadcast_to(values, (len(runs), *values.shape)).copy())
-    for name in FIGURES:
+    for name in RUN_FIGURES:
         data[name] = (("mode",), np.array([one.figures[name] for one in records]))
     data[BRAKE_ENERGY] = (("mode",), np.array([one.figures.get(BRAKE_ENERGY, 0.0) for one in records]))
     for name, values in validity_variables([one.validity for one in records]).items():
@@ -84,7 +84,7 @@ def tracking_dataset(
     coordinates = {"mode": [one.mode for one in records], "time": motion.t, **link_coordinates(task.system)}
     out = xr.Dataset(data, coords=coordinates)
     out["motor_power"] = out["torque"] * out["motor_speed"]
-    out = out.assign(metric_variables(out, KEPT, task.path.duration))
+    out = out.assign(metric_variables(out, KEPT_METRICS, task.path.duration))
     label(out, mechanism)
     out.attrs = provenance(mechanism, records[0].method, options or IntegrationOptions(), parameters) | {
         "motion_end": task.path.duration,

@@ -9,9 +9,9 @@ import xarray as xr
 
 from paraflex.findings import Finding, Level, Verdict
 
-# What the places of findings about single runs begin with.
+# Prefix of the places of findings about single runs.
 MODE = "mode "
-_WORDS = {Level.WRONG: "wrong", Level.DOUBTFUL: "warning"}
+_LEVEL_WORDS = {Level.WRONG: "wrong", Level.DOUBTFUL: "warning"}
 # Attribute of a dataset that holds its findings, as JSON.
 FINDINGS = "findings"
 
@@ -36,5 +36,5 @@ def doubt_lines(verdict: Iterable[Finding]) -> list[str]:
             continue
         if whose:
             further[one.code] = []
-        lines.append(f"{_WORDS[one.level]}: {one}")
+        lines.append(f"{_LEVEL_WORDS[one.level]}: {one}")
     return lines + [f"warning: so is mode {', '.join(names)} [{code}]" for code, names in further.items() if names]

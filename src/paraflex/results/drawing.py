@@ -18,7 +18,7 @@ from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, s
 
 Array = NDArray[np.float64]
 
-# What joints of wheels and of racks do: whether they slide, and what they hold.
+# Joints of wheels and of racks: whether they slide, and what they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
 
 
@@ -202,7 +202,7 @@ def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
     if len(carriers) != 1 or any(kind not in (_WHEEL, _RACK) for kind in kinds):
         return unknown
     (carrier,) = carriers
-    # Of their turns and travels against what carries both.
+    # Ratio of their rotations and travels relative to the carrier.
     sides = [1.0 if joint.a.body == carrier else -1.0 for joint in joints]
     ratio = one.transmission * sides[0] * sides[1]
     if kinds == [_WHEEL, _RACK]:

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-FORMATS = ("csv", "parquet", "mat", "netcdf")
+EXPORT_FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
-TIME_SERIES, FIGURES, SHAPES = "time_series", "figures", "shapes"
+TIME_SERIES, FIGURES_TABLE, SHAPES = "time_series", "figures", "shapes"
 # Dimensions that rows of tables are of, outermost first.
-_ROWS = ("model", "mode", "time")
+_ROW_DIMENSIONS = ("model", "mode", "time")
 # MATLAB takes longer names apart.
 _LONGEST_NAME = 63
 
@@ -54,10 +54,13 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     drawn = [name for name in data.data_vars if "station" in data[name].dims]
     over_time = [name for name in data.data_vars if "time" in data[name].dims and name not in drawn]
     single = [name for name in data.data_vars if name not in drawn and name not in over_time]
-    tables = {TIME_SERIES: _table(data, over_time, _ROWS), FIGURES: _table(data, single, _ROWS[:2])}
+    tables = {
+        TIME_SERIES: _table(data, over_time, _ROW_DIMENSIONS),
+        FIGURES_TABLE: _table(data, single, _ROW_DIMENSIONS[:2]),
+    }
     if shapes and drawn:
         stations = data.assign_coords(station=np.arange(data.sizes["station"]))
-        tables[SHAPES] = _table(stations, ["station_body", *drawn], (*_ROWS, "station"))
+        tables[SHAPES] = _table(stations, ["station_body", *drawn], (*_ROW_DIMENSIONS, "station"))
     return tables
 
 
@@ -119,8 +122,8 @@ def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = Fals
     OutputError
         It cannot be written.
     """
-    if to not in FORMATS:
-        raise InputError("no such format", field="to", value=to, remedy=suggestion(to, FORMATS))
+    if to not in EXPORT_FORMATS:
+        raise InputError("no such format", field="to", value=to, remedy=suggestion(to, EXPORT_FORMATS))
     output, ending = Path(output), ENDINGS[to]
     single = output.suffix.lower() == ending
     if not single and output.suffix.lower() in ENDINGS.values():

@@ -16,7 +16,7 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.metrics import METRICS
 from paraflex.results.traces import data_traces
 
-# What metrics of a dataset are made of.
+# Variables of a dataset from which metrics are computed.
 _TRACES = ["end_effector", "end_effector_desired", "torque"]
 
 
@@ -33,7 +33,7 @@ class ErrorSpan(Enum):
     WHOLE = "whole"
 
 
-# The metric that ranks runs, and what it is called.
+# The metric that ranks runs, and its label.
 HEADLINE = {ErrorSpan.MOTION: "tracking_rms_motion", ErrorSpan.WHOLE: "tracking_rms"}
 SPAN_WORDS = {ErrorSpan.MOTION: "during the motion", ErrorSpan.WHOLE: "over the whole run, dwell included"}
 
@@ -53,9 +53,9 @@ def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
     return metric_variables(data, motion_end=motion_end)["residual_vibration"]
 
 
-# Metrics that are variables of datasets; and those that tell how a run follows its path.
-KEPT = tuple(metric.name for metric in METRICS.values() if metric.kept)
-FOLLOWING = tuple(name for name in KEPT if not METRICS[name].per_motor)
+# Metrics that are variables of datasets; and those of tracking.
+KEPT_METRICS = tuple(metric.name for metric in METRICS.values() if metric.kept)
+FOLLOWING = tuple(name for name in KEPT_METRICS if not METRICS[name].per_motor)
 
 
 def metric_variables(

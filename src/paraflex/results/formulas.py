@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
 _DRIFT_DEGREE = 2
-# Fewer samples after the motion do not tell a vibration from a drift.
-_FEWEST = 3 * (_DRIFT_DEGREE + 1)
+# Fewer samples after the motion do not distinguish a vibration from a drift.
+_FEWEST_SAMPLES = 3 * (_DRIFT_DEGREE + 1)
 
 
 def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
@@ -43,7 +43,7 @@ def drift_speed(t: NDArray[Any], position: NDArray[Any]) -> Any:
 
     The slope of the straight line of least squares. NaN where there are too few samples.
     """
-    if len(t) < _FEWEST:
+    if len(t) < _FEWEST_SAMPLES:
         return np.nan
     coefficients, half = _drift(t, position)[1:]
     # The constant and the quadratic part are the same at both ends.
@@ -57,7 +57,7 @@ def vibration(t: NDArray[Any], position: NDArray[Any]) -> Any:
     slowly. Of a steady sinusoid of amplitude A along a line A / sqrt(2), if the samples are of a few periods. NaN where
     there are too few.
     """
-    if len(t) < _FEWEST:
+    if len(t) < _FEWEST_SAMPLES:
         return np.nan
     basis, coefficients, _ = _drift(t, position)
     return np.sqrt(np.mean(np.sum((position - basis @ coefficients) ** 2, axis=1)))

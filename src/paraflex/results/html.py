@@ -17,7 +17,7 @@ from paraflex.results.run_traces import run_traces
 from paraflex.tracking import TrackingRun
 
 # Points listed one by one.
-_MOST = 20
+_MOST_LISTED = 20
 
 
 @view.register(TrackingRun)
@@ -75,7 +75,7 @@ def _verdict(run: TrackingRun | MotionRun) -> str:
 def _ended(solution: Solution) -> str:
     if not solution.t.size:
         return solution.status
-    # A run fails after its last sample: its message says when.
+    # A run fails after its last sample; its message has the time.
     until = " at" if solution.status in ("complete", "stopped") else ", its last sample at"
     return f"{solution.status}{until} t = {solution.t[-1]:.4g} s"
 
@@ -113,7 +113,7 @@ def _last_places(run: MotionRun) -> list[tuple]:
     solution = run.solution
     q, v, a = (values[-1:] for values in (solution.q, solution.v, solution.a))
     names = [PointRef(body.name, point) for body in run.system.mechanism.bodies for point in body.points]
-    shown = [ref for ref in names if "._" not in str(ref)][:_MOST]
+    shown = [ref for ref in names if "._" not in str(ref)][:_MOST_LISTED]
     return [(str(ref), *map(float, point_motion(run.system, ref, q, v, a).position[0])) for ref in shown]
 
 

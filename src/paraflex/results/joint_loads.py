@@ -86,7 +86,7 @@ def _direction(system: System, term: Term, q: Array) -> Array:
     along = axis_angle(system, joint, q)
     direction = _unit(along + term.direction - joint.direction)
     if term.carrier == "track":
-        # Square to the beam where the point stands, bent as it is.
+        # Normal to the deformed beam at the place of the point.
         direction -= _track_slope(system, joint, q)[:, None] * _unit(along)
     return direction
 

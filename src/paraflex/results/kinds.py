@@ -13,7 +13,7 @@ given_as("a dataset of results", "a dataset: what tracking_dataset or open_resul
     xr.Dataset
 )
 
-# What makes a dataset of each kind.
+# Functions that make the datasets of each kind.
 _MADE_BY = {
     "tracking": "tracking_dataset or run_study",
     "motion": "motion_dataset",

@@ -76,7 +76,7 @@ UNITS = {
     "applied_torque": ("constant motor torque", "N m"),
 } | VALIDITY_UNITS
 
-# What units do not say: on which body, in which frame, positive which way.
+# Conventions of variables: body, frame, sign.
 _COMMENTS = {
     "motor_power": "torque or force times the rate of the joint: positive drives the mechanism, negative brakes it",
     "joint_force": (

@@ -20,7 +20,7 @@ from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import Variables, label, link_coordinates, link_variables, padded, provenance
 from paraflex.results.links import system_links
-from paraflex.results.record import FIGURES
+from paraflex.results.record import RUN_FIGURES
 from paraflex.results.summary import finite_or_none
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
@@ -71,7 +71,7 @@ def motion_dataset(
     data: dict[str, Any] = {
         name: (("time", *dims), padded(each, run.times.size)) for name, (dims, each) in values.items()
     }
-    data |= {name: getattr(solution, name) for name in FIGURES}
+    data |= {name: getattr(solution, name) for name in RUN_FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
     data["applied_torque"] = (("motor",), torques)
     coordinates = {"time": run.times, "coordinate": _coordinate_names(run), **link_coordinates(system)}
@@ -93,7 +93,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     check_kind(data, "motion")
     reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
     last = data.isel(time=reached[-1] if reached.size else 0)
-    numbers: dict[str, Any] = {name: data[name].item() for name in FIGURES}
+    numbers: dict[str, Any] = {name: data[name].item() for name in RUN_FIGURES}
     numbers = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in numbers.items()}
     return {
         "mechanism": data.attrs["mechanism"],

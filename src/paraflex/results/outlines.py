@@ -23,13 +23,13 @@ from paraflex.mechanism import (
 Array = NDArray[np.float64]
 
 # Pieces a beam is drawn in, and the fewest between two of its points.
-_PIECES, _FEWEST = 16, 4
+_BEAM_PIECES, _FEWEST_PIECES = 16, 4
 # Points closer than this part of a body's size are drawn as one.
 _SAME = 1e-9
 # Two stations are always on their chord: a deflection takes one more.
-_LINE = 3
-# Pieces shorter than this part of a body's size say nothing of a direction.
-_SHORT = 1e-6
+_LEAST_ON_LINE = 3
+# Pieces shorter than this fraction of a body's size have no defined direction.
+_SHORT_PIECE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def chord_deflections(mechanism: Mechanism, shape: Array) -> Array:
         last = first + len(one.places)
         if isinstance(body, RigidBody) or not body.flexible:
             found.append(np.zeros(len(shape)))
-        elif len(one.places) < _LINE:
+        elif len(one.places) < _LEAST_ON_LINE:
             found.append(np.full(len(shape), np.nan))
         else:
             found.append(np.max(np.abs(across_chord(shape[:, first:last], one.places)), axis=1))
@@ -118,7 +118,7 @@ def deflections(system: System, q: Array) -> Array:
     for body, one in zip(system.mechanism.bodies, outlines(system.mechanism), strict=True):
         if system.body(body.name).nf:
             bent = across_chord(outline_motion(system, one, q), one.places)
-            parts.append(bent if len(one.places) >= _LINE else np.full_like(bent, np.nan))
+            parts.append(bent if len(one.places) >= _LEAST_ON_LINE else np.full_like(bent, np.nan))
     return np.concatenate(parts, axis=1)
 
 
@@ -178,7 +178,7 @@ def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
     else:
         axis = _axis(np.append(z, rest[0]), drawn.size)
         out = _fitted(z, rest, place) if axis is None and len(holds) > 2 else _pieces(
-            z, rest, place, turn, 1.0 if axis is None else axis, _SHORT * drawn.size
+            z, rest, place, turn, 1.0 if axis is None else axis, _SHORT_PIECE * drawn.size
         )  # fmt: skip
     return np.stack([out.real, out.imag], axis=-1)
 
@@ -260,13 +260,13 @@ def _rows(system: System, body: BodyCoordinates, drawn: Outline) -> Array:
 
 def _along(length: float, points: Mapping[str, float]) -> Array:
     """Stations along a bar, its ends and points among them."""
-    # Places may have a complex step: what is real of them decides.
+    # Places may have a complex step: their real parts decide.
     knots = [0.0]
     for x in sorted([*points.values(), length], key=np.real):
         if np.real(x - knots[-1]) > _SAME * np.real(length):
             knots.append(min(x, length, key=np.real))
     knots[-1] = length
-    pieces = [max(_FEWEST, round(float(np.real(_PIECES * (b - a) / length)))) for a, b in pairwise(knots)]
+    pieces = [max(_FEWEST_PIECES, round(float(np.real(_BEAM_PIECES * (b - a) / length)))) for a, b in pairwise(knots)]
     spans = [np.linspace(a, b, number + 1)[1:] for (a, b), number in zip(pairwise(knots), pieces, strict=True)]
     return np.concatenate([[0.0], *spans])
 

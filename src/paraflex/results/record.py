@@ -17,7 +17,7 @@ from paraflex.tracking import TrackingRun, TrackingTask
 from paraflex.validity import Validity
 
 # How a run went: names of the figures every record has.
-FIGURES = (
+RUN_FIGURES = (
     "status",
     "message",
     "steps",
@@ -31,7 +31,7 @@ FIGURES = (
     "event",
     "event_time",
 )
-# What brakes took, where there were any.
+# Energy absorbed by brakes, if there were any.
 BRAKE_ENERGY = "brake_energy"
 
 
@@ -54,7 +54,7 @@ class Record(Links):
     end_effector : PointMotion
         Three (k, 2) arrays.
     figures : mapping
-        The numbers and words named in FIGURES.
+        The numbers and words named in RUN_FIGURES.
     validity : Validity, optional
         How far it is within what its model can describe.
     doubts : tuple of Finding
@@ -89,7 +89,7 @@ def record(run: TrackingRun) -> Record:
         torque=torque,
         condition=run.condition,
         end_effector=point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]),
-        figures={name: getattr(solution, name) for name in (*FIGURES, BRAKE_ENERGY)},
+        figures={name: getattr(solution, name) for name in (*RUN_FIGURES, BRAKE_ENERGY)},
         validity=run.validity,
         doubts=run.doubts,
     )

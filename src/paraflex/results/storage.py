@@ -23,7 +23,7 @@ _FOLLOWING = 3
 # What commands call the file in their folder, and where a sweep keeps its runs.
 FILES = ("results.nc", "verify.nc")
 _TRAJECTORIES = "trajectories"
-_NAMED = 3
+_MOST_NAMED = 3
 # Smaller arrays are written as they are: what describes the compression takes more than it gains [bytes].
 _LARGE = 16384
 # Written at once where the reason is looked for why a file cannot be [bytes].
@@ -118,11 +118,11 @@ def results_file(path: str | Path) -> Path:
             return path / name
     if (path / "results.parquet").exists() or (path / "study.json").exists():
         runs = sorted(path.glob(f"{_TRAJECTORIES}/*.nc"))
-        more = ", ..." if len(runs) > _NAMED else ""
+        more = ", ..." if len(runs) > _MOST_NAMED else ""
         raise InputError(
             "the folder of a study of many runs, whose figures are in results.parquet",
             field=str(path),
-            remedy=f"name one of its runs: {', '.join(str(run.relative_to(path)) for run in runs[:_NAMED])}{more}"
+            remedy=f"name one of its runs: {', '.join(str(run.relative_to(path)) for run in runs[:_MOST_NAMED])}{more}"
             if runs
             else "it kept no runs: set trajectories = true in the study, or run the design you want with paraflex run",
         )

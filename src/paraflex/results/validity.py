@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 if TYPE_CHECKING:
-    # Files are read without what computes them.
+    # Files can be read without the modules that compute validity.
     from paraflex.validity import Validity
 
 _INDICATORS = {

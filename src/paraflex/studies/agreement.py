@@ -42,7 +42,7 @@ class ModelRuns:
     Attributes
     ----------
     records : mapping of Refinement to Record
-        Runs that were begun; one that failed says so in its figures.
+        Runs that were started; the figures of a failed one have its status.
     failure : str
         Why one of them failed; empty where none did.
     """

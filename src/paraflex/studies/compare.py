@@ -24,10 +24,10 @@ from paraflex.studies.comparison import Measurement, MethodComparison, Reference
 
 # The reference is asked for this part of the tightest tolerance, its check for twice that; both may take this
 # many times the limit of a run.
-_FINER, _PATIENCE = 10.0, 20.0
+_FINER, _REFERENCE_PATIENCE = 10.0, 20.0
 # Repetitions are for short runs: none is begun after so long [s].
 _LONG_ENOUGH = 3.0
-_FIGURES = (
+_RUN_COUNTS = (
     "wall_time",
     "steps",
     "rejected",
@@ -232,7 +232,7 @@ def _measurements(
                 _warm_up(case, setting.options(method.name))
             measured = _measure(case, method.name, setting, places, options)
         except (InputError, ImportError) as error:
-            # Not this run but the method: what it takes, or a package that is not installed.
+            # The method fails, not this run: a wrong argument, or a package that is not installed.
             yield Measurement(method.name, status="unavailable", reason=str(error))
             return
         if measured.status == "too slow":
@@ -247,7 +247,7 @@ def _warm_up(case: Case, options: IntegrationOptions) -> None:
         try:
             _solve(case, options, 0.0)
         except (_TooSlowError, NumericalError):
-            # A run that cannot go on says so when it is measured.
+            # A run that fails is reported when it is measured.
             return
 
 
@@ -275,7 +275,7 @@ def _measure(
         error=_distance(case.places(best), places),
         repetitions=len(solutions),
         warnings=_texts(caught),
-        **{name: getattr(best, name) for name in _FIGURES},
+        **{name: getattr(best, name) for name in _RUN_COUNTS},
     )
 
 
@@ -313,9 +313,11 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
     for method, times in [(x, y) for y in (1.0, 4.0) for x in ours]:
         asked = tolerance * (2.0 if runs and times == 1.0 else times)
         try:
-            solved = _solve(case, IntegrationOptions(method=method.name, tolerance=asked), _PATIENCE * options.limit)
+            solved = _solve(
+                case, IntegrationOptions(method=method.name, tolerance=asked), _REFERENCE_PATIENCE * options.limit
+            )
         except _TooSlowError:
-            reasons.append(f"{method.title} takes longer than {_PATIENCE * options.limit:g} s at {asked:g} m")
+            reasons.append(f"{method.title} takes longer than {_REFERENCE_PATIENCE * options.limit:g} s at {asked:g} m")
             continue
         except NumericalError as error:
             reasons.append(f"{method.title} at {asked:g} m: {error}")

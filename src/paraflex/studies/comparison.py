@@ -18,10 +18,10 @@ from paraflex.integrators import DEFAULT_METHOD, METHODS
 
 # Errors at which times are compared [m], and the one in the table.
 LEVELS, TABLE_LEVEL = (1e-3, 1e-4, 1e-5, 1e-6), 1e-5
-# Of a measurement what is no number.
+# Fields of a measurement that are not numbers.
 _TEXTS = ("method", "status", "reason")
 # Packages whose version has a part in the times.
-_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "scikit-sundae")
+_TIMING_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "scikit-sundae")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Reference:
     tolerance, check_tolerance : float
         [m]
     uncertainty : float
-        Largest distance between the two [m]: smaller errors are not told apart from the reference's own.
+        Largest distance between the two [m]: smaller errors are not distinguishable from the reference's own.
     wall_time : float
         Of the run [s].
     """
@@ -232,7 +232,7 @@ def machine() -> dict[str, Any]:
 
 def _versions() -> dict[str, str | None]:
     out: dict[str, str | None] = {}
-    for package in _PACKAGES:
+    for package in _TIMING_PACKAGES:
         try:
             out[package] = version(package)
         except PackageNotFoundError:

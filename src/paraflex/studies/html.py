@@ -21,7 +21,7 @@ from paraflex.studies.sensitivities.study import Sensitivities
 from paraflex.studies.tracking import StudyResult
 
 # Rows of tables that could be long.
-_MOST = 60
+_MOST_LISTED = 60
 
 
 @view.register(StudyResult)
@@ -120,7 +120,7 @@ def indices_html(result: IndicesResult) -> str:
     names = ("metric", "path", "mode", "parameter", "first", "first_confidence", "total", "total_confidence")
     rows = [tuple(row[name] for name in names) for row in result.to_dict()["indices"]]
     heads = ("metric", "path", "mode", "parameter", "first order", "±", "total", "±")
-    shown = table(heads, rows[:_MOST], "with half the widths of the intervals of 95 %")
+    shown = table(heads, rows[:_MOST_LISTED], "with half the widths of the intervals of 95 %")
     return page(f"Sobol indices: {_state(result.sweep.complete, result.sweep.interrupted)}", shown, _more(len(rows)))
 
 
@@ -135,7 +135,7 @@ def sensitivities_html(found: Sensitivities) -> str:
     ]
     heads = ("metric", "path", "mode", "value", "unit", *(f"by {name}" for name in found.parameters))
     caption = "change of metrics by that of parameters [% / %]"
-    return page(f"{found.name}: sensitivities of {found.mechanism}", table(heads, rows[:_MOST], caption),
+    return page(f"{found.name}: sensitivities of {found.mechanism}", table(heads, rows[:_MOST_LISTED], caption),
                 _more(len(rows)))  # fmt: skip
 
 
@@ -175,7 +175,7 @@ def comparison_html(comparison: MethodComparison) -> str:
     return page(
         f"{comparison.mechanism}, {comparison.case}: methods compared",
         facts([("reference", title), ("its uncertainty [m]", None if reference is None else reference.uncertainty)]),
-        table(heads, rows[:_MOST]),
+        table(heads, rows[:_MOST_LISTED]),
         _more(len(rows)),
     )
 
@@ -207,4 +207,4 @@ def _millimetres(metres: float | None) -> float | None:
 
 
 def _more(rows: int) -> str:
-    return sentence(f"and {rows - _MOST} more rows") if rows > _MOST else ""
+    return sentence(f"and {rows - _MOST_LISTED} more rows") if rows > _MOST_LISTED else ""

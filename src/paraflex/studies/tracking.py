@@ -114,7 +114,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
     ) -> StudyResult:
         """Simulate every mode; one that fails is reported and the others go on. See `Study.run`.
 
-        Progress is told of each mode in seconds of its motion. Workers are threads.
+        Progress is that of each mode in seconds of its motion. Workers are threads.
 
         Raises
         ------
@@ -144,7 +144,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
                     futures[mode.name] = pool.submit(self._mode, mode, stop, on_progress)
                 wait(futures.values())
             except KeyboardInterrupt:
-                # Ctrl-C reaches the main thread only; the runs hear of it at their next report and keep what they have.
+                # Ctrl-C reaches the main thread only; runs stop at their next progress report and keep their samples.
                 stop.set()
         outcomes = {name: future.result() for name, future in futures.items()}
         return self._result(outcomes, interrupted=stop.is_set())

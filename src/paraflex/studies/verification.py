@@ -144,7 +144,7 @@ class VerificationStudy(Study[Verification], CheckedFields):
                 extended = _extended(so_far, level, partial(run_model, task, mode, name, level, options))
             except KeyboardInterrupt:
                 return True
-            # A run that was stopped returns what it has; it is none to compare.
+            # A stopped run returns its samples, but cannot be compared.
             if any(run.figures["status"] == "interrupted" for run in extended.records.values()):
                 return True
             runs[mode.name][name] = extended

@@ -48,7 +48,7 @@ HINGES = 20.0
 # Distance of a centre of mass from its body's points over the mechanism's size.
 OFF_CENTRE = 5.0
 # Standard gravity and how far places on Earth differ from it [m/s^2].
-GRAVITY, ON_EARTH = 9.81, 0.05
+STANDARD_GRAVITY, ON_EARTH = 9.81, 0.05
 # Points nearer one another than this part of the mechanism are at one place.
 APART = 1e-9
 # Speed of a body that no mechanism has [m/s].
@@ -153,7 +153,7 @@ def _gravity(gravity: Place) -> Iterator[Finding]:
     if not strength:
         return
     text = f"({gravity[0]:g}, {gravity[1]:g}) m/s^2"
-    if abs(strength - GRAVITY) > ON_EARTH:
+    if abs(strength - STANDARD_GRAVITY) > ON_EARTH:
         yield Finding("gravity", "gravity", f"{text} is {strength:.4g} m/s^2", "on Earth it is 9.81, in m/s^2")
     elif 0.0 not in gravity:
         yield Finding("gravity", "gravity", f"{text} is along no axis", "is the mechanism to lie on a slope?")

@@ -144,7 +144,7 @@ class Change:
         for stencil in STENCILS:
             try:
                 near = [_described(setting, _moved(task, k, place * self.size)) for place in stencil.places]
-                # What a mesh refuses is refused here.
+                # Invalid meshes are refused here.
                 self.beside: list[System] = [build_system(each.mechanism) for each in (near[0], near[-1])]
                 return stencil, near
             except ParaflexError as error:

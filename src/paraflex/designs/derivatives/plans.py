@@ -23,7 +23,7 @@ from paraflex.tracking import TrackingTask
 Array = NDArray[np.float64]
 
 # Numbers of an integration that a run's steps depend on, which stay as they are.
-_OF_STEPS = ("tolerance", "step")
+_STEP_OPTIONS = ("tolerance", "step")
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> 
     """
     name, value = setting.names[k], task.values[k]
     where = f"vary.{name}"
-    if setting.whole[k] or any(place[0] == INTEGRATION and place[1] in _OF_STEPS for place in setting.places[k]):
+    if setting.whole[k] or any(place[0] == INTEGRATION and place[1] in _STEP_OPTIONS for place in setting.places[k]):
         raise InputError("has no derivative", field=where, value=value, remedy="leave it out")
     size = abs(value) if size is None else abs(size)
     if not size > 0.0:

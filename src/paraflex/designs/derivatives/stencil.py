@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 # Between places, as parts of a parameter's size. What is differentiated is smooth over many times as far: powers of a
 # number, sines and cosines.
-_SPACING = 4e-3
+_STENCIL_SPACING = 4e-3
 
 
 class Difference(NamedTuple):
@@ -42,7 +42,7 @@ class Stencil:
     def derivative(self, values: list[Array]) -> Difference:
         """Derivative from values at the points, arrays of one shape."""
         stack = np.stack(values)
-        # Differences from one of the values: what does not change leaves no rounding.
+        # Differences from one of the values: constant parts cancel without rounding.
         stack = stack - stack[0]
         fine, coarse = (np.asarray(np.tensordot(w, stack, axes=1), dtype=float) for w in (self.weights, self.coarse))
         return Difference(fine, np.abs(fine - coarse))
@@ -64,9 +64,9 @@ def _weights(places: Array) -> Array:
     return np.linalg.solve(taylor, np.eye(places.size)[1])
 
 
-# About a value, and to either side of it alone.
+# Centred on a value, and to either side of it only.
 STENCILS = (
-    make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _SPACING),
-    make_stencil(range(9), _SPACING),
-    make_stencil(range(0, -9, -1), _SPACING),
+    make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _STENCIL_SPACING),
+    make_stencil(range(9), _STENCIL_SPACING),
+    make_stencil(range(0, -9, -1), _STENCIL_SPACING),
 )

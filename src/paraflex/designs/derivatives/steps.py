@@ -20,8 +20,8 @@ from paraflex.errors import InputError
 
 T = TypeVar("T")
 
-# Its square is nothing beside one, and no power of it that occurs underflows.
-STEP = 1e-40
+# Its square is negligible against one, and no power that occurs underflows.
+COMPLEX_STEP = 1e-40
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,12 @@ class Stepped(Generic[T]):
 
 def part(values: Any) -> NDArray[np.float64]:
     """The derivative in numbers with a complex step; zero for real ones."""
-    return np.imag(values) / STEP
+    return np.imag(values) / COMPLEX_STEP
 
 
 def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> Numbers:
     """Numbers with a complex step along a derivative."""
-    return values + 1j * STEP * derivative
+    return values + 1j * COMPLEX_STEP * derivative
 
 
 def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> Stepped[T]:
@@ -100,7 +100,7 @@ class _Walk:
             return here
         found = self.stencil.derivative([np.array(each, dtype=float) for each in near])
         self.error = max(self.error, float(found.error / max(abs(found.value), abs(here))))
-        return np.complex128(complex(here, STEP * float(found.value)))
+        return np.complex128(complex(here, COMPLEX_STEP * float(found.value)))
 
     def array(self, here: Numbers, near: list[Numbers]) -> Numbers:
         if here.dtype.kind != "f" or all(np.array_equal(each, here) for each in near):

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from paraflex.integrators.method import INDEX_1, Family, NativeMethod, Treatment
+from paraflex.integrators.method import EQUATIONS_INDEX_1, Family, NativeMethod, Treatment
 from paraflex.kernel.run_state import Tableau as Tableau
 
 Number = str | float
@@ -24,7 +24,7 @@ class ESDIRK(NativeMethod):
     """
 
     family = Family.ESDIRK
-    form = INDEX_1
+    form = EQUATIONS_INDEX_1
     treatments: ClassVar[tuple[Treatment, ...]] = (Treatment.BAUMGARTE, Treatment.PROJECTION, Treatment.GGL)
     tableau: ClassVar[Tableau]
 

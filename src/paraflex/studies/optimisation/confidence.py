@@ -19,7 +19,7 @@ from paraflex.studies.optimisation.study import DesignStudy
 Array = NDArray[np.float64]
 # Beyond this condition of the Jacobian, parameters as shares of their ranges, its weakest direction is not known.
 ILL_CONDITIONED = 1e3
-# Residuals along a direction may change by this part otherwise than the Jacobian says.
+# Largest relative difference of a change of residuals from the Jacobian's prediction.
 _AGREES = 0.5
 # Probability within one standard deviation of a normal distribution.
 ONE_DEVIATION = math.erf(math.sqrt(0.5))

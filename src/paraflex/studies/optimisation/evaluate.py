@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.campaign import Engine, Journal, LostWorker, Row, outcomes
 from paraflex.campaign.study import Result
-from paraflex.designs.run import COMPLETE, Outcome, Task, lost, run_id, run_task
+from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, lost, run_id, run_task
 from paraflex.designs.setting import Setting
 from paraflex.studies.optimisation.study import DesignStudy
 
@@ -51,7 +51,7 @@ class Evaluated:
     def reason(self) -> str:
         """Reason why the design cannot be used; empty if all runs are complete."""
         for row in self.rows:
-            if row["status"] != COMPLETE:
+            if row["status"] != STATUS_COMPLETE:
                 return f'{row["path"]}, mode "{row["mode"]}": {row["reason"]}'
             for column in self.counting:
                 if not _is_finite(row.get(column)):

@@ -15,7 +15,7 @@ from paraflex.studies.optimisation.study import DesignStudy
 
 Array = NDArray[np.float64]
 # Relative change at which it ends, of residuals and parameters.
-_TOLERANCE = 1e-6
+_FIT_TOLERANCE = 1e-6
 
 
 def residuals(targets: Sequence[Target], design: Evaluated) -> Array:
@@ -51,7 +51,7 @@ def fit(
     from scipy.optimize import least_squares
 
     given = study.search.tolerance
-    tolerance = _TOLERANCE if given is None else given
+    tolerance = _FIT_TOLERANCE if given is None else given
 
     def values(x: Array) -> Array:
         return residuals(targets, evaluate([study.design(x)])[0])

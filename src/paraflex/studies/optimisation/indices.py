@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.campaign import OnProgress, Study, Workers
-from paraflex.designs.run import COMPLETE, run_task
+from paraflex.designs.run import STATUS_COMPLETE, run_task
 from paraflex.designs.samples import RANDOM
 from paraflex.designs.schema import SamplingTable, study_table
 from paraflex.designs.sweep import RunTask, SweepStudy, SweptResult, make_study
@@ -26,11 +26,11 @@ from paraflex.writing import GO_ON, write_json
 
 Array = NDArray[np.float64]
 TABLE = "indices.parquet"
-# What SALib calls the shares, and a row of the table.
+# SALib's names of the shares, and columns of a row.
 _SHARES = {"first": "S1", "first_confidence": "S1_conf", "total": "ST", "total_confidence": "ST_conf"}
-_ROW = ("path", "mode", "metric", "parameter", *_SHARES, "samples", "dropped")
-# Base samples unless asked otherwise, and the fewest of which anything can be said.
-_SAMPLES, _FEWEST = 128, 8
+_ROW_COLUMNS = ("path", "mode", "metric", "parameter", *_SHARES, "samples", "dropped")
+# Default number of base samples, and the least number for an estimate.
+_BASE_SAMPLES, _FEWEST_BASE_SAMPLES = 128, 8
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,11 @@ class IndicesResult(SweptResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The indices in plain values: one row per index and parameter."""
-        table = self.indices.to_dataframe(dim_order=["index", "parameter"]).reset_index().reindex(columns=list(_ROW))
+        table = (
+            self.indices.to_dataframe(dim_order=["index", "parameter"])
+            .reset_index()
+            .reindex(columns=list(_ROW_COLUMNS))
+        )
         plain = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
         return {"kind": "indices", "name": self.sweep.name, "indices": plain}
 
@@ -141,7 +145,7 @@ def load_indices(
         chosen = table.sampling.seed if seed is None else seed
         sampling = SamplingTable(kind=RANDOM, number=1, seed=chosen)
         base = make_study(table.model_copy(update={"sampling": sampling}), folder)
-    number = samples if samples is not None else table.sampling.number or _SAMPLES
+    number = samples if samples is not None else table.sampling.number or _BASE_SAMPLES
     _check_samples(number)
     wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].per_motor]
     columns = _columns(wanted, base)
@@ -175,7 +179,7 @@ def _indices(study: IndicesStudy, table: Path) -> list[dict[str, Any]]:
     shape = (len(study.sweep.designs), len(setting.paths), len(setting.modes))
     read = read_parquet(table, ["status", *study.columns])
     # Rows are in order of designs, then paths, then modes.
-    complete = (read["status"].to_numpy() == COMPLETE).reshape(shape)
+    complete = (read["status"].to_numpy() == STATUS_COMPLETE).reshape(shape)
     out = []
     for column in study.columns:
         values = read[column].to_numpy().astype(float).reshape(shape)
@@ -192,7 +196,7 @@ def _analysed(
     """Indices from the base samples with complete runs only."""
     kept = usable.reshape(study.samples, -1).all(axis=1)
     count = int(np.count_nonzero(kept))
-    if count < _FEWEST:
+    if count < _FEWEST_BASE_SAMPLES:
         raise InputError(
             f"only {count} of {study.samples} base samples are complete in {names[1]}", field="vary",
             remedy="narrow the ranges: reasons stand in the table",
@@ -231,10 +235,10 @@ def _columns(names: list[str], base: SweepStudy) -> tuple[str, ...]:
 
 
 def _check_samples(number: int) -> None:
-    if number < _FEWEST or number & (number - 1):
+    if number < _FEWEST_BASE_SAMPLES or number & (number - 1):
         raise InputError(
             "Sobol's sequence wants a power of two", field="--samples", value=number,
-            remedy=f"say {max(_FEWEST, 1 << max(number, 1).bit_length())}",
+            remedy=f"say {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
         )  # fmt: skip
 
 

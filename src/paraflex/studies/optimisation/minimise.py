@@ -16,12 +16,12 @@ Array = NDArray[np.float64]
 SLSQP, TRUST, LBFGSB, SIMPLEX = "slsqp", "trust-constr", "l-bfgs-b", "nelder-mead"
 EVOLUTION, OPTUNA = "differential-evolution", "optuna"
 WITH_SLOPES = (SLSQP, TRUST, LBFGSB)
-DEFAULT_METHOD = SLSQP
+DEFAULT_SEARCH = SLSQP
 
 # Metrics are known no better than to this share: time steps are chosen anew for each design.
-_TOLERANCE = 1e-4
+_METRIC_TOLERANCE = 1e-4
 # More iterations than any limit of evaluations allows.
-_MANY = 100_000
+_ITERATION_LIMIT = 100_000
 # Edges of the first simplex, as shares of the ranges.
 _SIMPLEX = 0.1
 # Members of a population per parameter.
@@ -40,7 +40,7 @@ def minimise(problem: DesignProblem, method: str | None, start: Array) -> str:
     LimitReached
         As many designs as the study allows.
     """
-    name = method or DEFAULT_METHOD
+    name = method or DEFAULT_SEARCH
     if name == LBFGSB and problem.objective.limits:
         raise InputError(
             "the method takes no limits (at_most)",
@@ -56,13 +56,13 @@ def minimise(problem: DesignProblem, method: str | None, start: Array) -> str:
 
 def _tolerance(problem: DesignProblem) -> float:
     given = problem.study.search.tolerance
-    return _TOLERANCE if given is None else given
+    return _METRIC_TOLERANCE if given is None else given
 
 
 def _slsqp(problem: DesignProblem, start: Array) -> str:
     limits = {"type": "ineq", "fun": problem.room, "jac": problem.room_slope}
     constraints = [limits] if problem.objective.limits else []
-    options = {"ftol": _tolerance(problem) * problem.cost, "maxiter": _MANY}
+    options = {"ftol": _tolerance(problem) * problem.cost, "maxiter": _ITERATION_LIMIT}
     return _scipy(problem, start, "SLSQP", constraints=constraints, options=options)
 
 
@@ -72,12 +72,22 @@ def _trust(problem: DesignProblem, start: Array) -> str:
     limits = NonlinearConstraint(problem.room, 0.0, np.inf, jac=problem.room_slope)  # pyright: ignore[reportArgumentType]
     constraints = [limits] if problem.objective.limits else []
     tolerance = _tolerance(problem)
-    options = {"gtol": tolerance * problem.cost, "xtol": tolerance, "barrier_tol": tolerance, "maxiter": _MANY}
+    options = {
+        "gtol": tolerance * problem.cost,
+        "xtol": tolerance,
+        "barrier_tol": tolerance,
+        "maxiter": _ITERATION_LIMIT,
+    }
     return _scipy(problem, start, "trust-constr", constraints=constraints, options=options)
 
 
 def _lbfgsb(problem: DesignProblem, start: Array) -> str:
-    return _scipy(problem, start, "L-BFGS-B", options={"ftol": _tolerance(problem), "maxfun": _MANY, "maxiter": _MANY})
+    return _scipy(
+        problem,
+        start,
+        "L-BFGS-B",
+        options={"ftol": _tolerance(problem), "maxfun": _ITERATION_LIMIT, "maxiter": _ITERATION_LIMIT},
+    )
 
 
 def _scipy(problem: DesignProblem, start: Array, method: str, **given: Any) -> str:
@@ -95,7 +105,7 @@ def _simplex(problem: DesignProblem, start: Array) -> str:
     tolerance = _tolerance(problem)
     problem.scores(list(corners))
     options = {"initial_simplex": corners, "xatol": np.sqrt(tolerance), "fatol": tolerance * problem.cost}
-    bounds, many = [(0.0, 1.0)] * start.size, {"maxiter": _MANY, "maxfev": _MANY}
+    bounds, many = [(0.0, 1.0)] * start.size, {"maxiter": _ITERATION_LIMIT, "maxfev": _ITERATION_LIMIT}
     return _why_ended(
         minimize(lambda x: problem.scores([x])[0], start, method="Nelder-Mead", bounds=bounds, options=options | many)
     )
@@ -113,7 +123,7 @@ def _evolution(problem: DesignProblem, start: Array) -> str:
             popsize=_POPULATION,
             tol=_tolerance(problem),
             init="sobol",
-            maxiter=_MANY,
+            maxiter=_ITERATION_LIMIT,
             polish=False,
             vectorized=True,
             updating="deferred",

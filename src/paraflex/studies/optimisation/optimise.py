@@ -13,7 +13,7 @@ from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
-from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, minimise
+from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.problem import DesignProblem, best_of, holds_limits
 from paraflex.studies.optimisation.result import SearchResult, of_session
@@ -23,7 +23,7 @@ from paraflex.studies.optimisation.slopes import slopes_of
 from paraflex.studies.optimisation.study import DesignStudy, base_study, read_search
 
 # Step of differences, as a share of a range.
-_DIFFERENCE = 1e-3
+_DIFFERENCE_SHARE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +123,7 @@ def load_optimisation(file: str | Path) -> OptimisationStudy:
         objective = _objective(table.objective)
         search = read_search(table.search)
         if search.difference is None:
-            search = replace(search, difference=_DIFFERENCE)
+            search = replace(search, difference=_DIFFERENCE_SHARE)
         return OptimisationStudy(base, search, objective)
 
 
@@ -171,7 +171,7 @@ def _result(study: OptimisationStudy, folder: Path, session: Session) -> Optimis
     best = best_of(objective, scales, history) if running else None
     return OptimisationResult(
         **of_session(study, folder, session, best),
-        method=study.search.method or DEFAULT_METHOD,
+        method=study.search.method or DEFAULT_SEARCH,
         sought=study.sought()["objective"],
         objective=None if best is None else objective.value(best, scales),
         start_objective=objective.value(start, scales) if start is not None and running else None,

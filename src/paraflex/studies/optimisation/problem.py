@@ -16,9 +16,9 @@ from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
 
 Array = NDArray[np.float64]
-# A limit is held that is passed by no more than this share of it.
-_HELD = 1e-6
-# What a design costs that passes a limit, and one that does not run, in objectives of the start.
+# Relative violation of a limit that still counts as none.
+_LIMIT_EXCESS = 1e-6
+# Cost of a design that violates a limit, and of one that does not run, in objectives of the start.
 _OUTSIDE, _FAILED = 1e2, 1e4
 # The same for methods with slopes, which accept nothing above the start: more would spoil what they learn of curvature.
 _REFUSED = 3.0
@@ -96,7 +96,7 @@ class DesignProblem:
         if not design.complete:
             return _FAILED * self.cost
         violation = self.objective.violation(design)
-        if violation > _HELD:
+        if violation > _LIMIT_EXCESS:
             return _OUTSIDE * self.cost * (1.0 + violation)
         return self.objective.value(design, self.scales)
 
@@ -143,11 +143,11 @@ def best_of(objective: Objective, scales: Mapping[str, float], designs: Sequence
     def rank(design: Evaluated) -> tuple[float, float, int]:
         violation = objective.violation(design)
         value = objective.value(design, scales)
-        return (violation if violation > _HELD else 0.0, value, design.number)
+        return (violation if violation > _LIMIT_EXCESS else 0.0, value, design.number)
 
     return min((design for design in designs if design.complete), key=rank, default=None)
 
 
 def holds_limits(objective: Objective, design: Evaluated) -> bool:
     """Whether no limit is violated."""
-    return objective.violation(design) <= _HELD
+    return objective.violation(design) <= _LIMIT_EXCESS

@@ -18,7 +18,7 @@ from paraflex.writing import GO_ON, write_json
 # So near a bound, as a share of the range, a parameter is at it.
 _AT_BOUND = 1e-4
 # Different reasons of failures that are listed.
-_REASONS = 5
+_MOST_REASONS = 5
 # Of a session, and no results.
 _OF_SESSION = ("fresh", "seconds", "folder")
 
@@ -97,7 +97,7 @@ def of_session(study: DesignStudy[Result], folder: Path, session: Session, best:
         "evaluations": len(history),
         "fresh": session.evaluate.fresh,
         "failed": len(reasons),
-        "reasons": tuple(dict.fromkeys(reasons))[:_REASONS],
+        "reasons": tuple(dict.fromkeys(reasons))[:_MOST_REASONS],
         "stopped": session.stopped,
         "interrupted": session.interrupted,
         "seconds": session.seconds,

@@ -17,7 +17,7 @@ from paraflex.designs.run import is_row_of, run_task, table_schema
 from paraflex.designs.samples import SOBOL, designs
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
-from paraflex.studies.optimisation.minimise import DEFAULT_METHOD, WITH_SLOPES
+from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, WITH_SLOPES
 from paraflex.studies.optimisation.slopes import (
     DIFFERENCES,
     EXACT,
@@ -158,7 +158,7 @@ def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | No
     asked = study.search.gradients
     if asked == DIFFERENCES or (asked is None and (run is not None or not study.least_squares)):
         return None
-    method = study.search.method or DEFAULT_METHOD
+    method = study.search.method or DEFAULT_SEARCH
     if not study.least_squares and method not in WITH_SLOPES:
         raise InputError(
             f"{method} uses no gradients", field="search.gradients", value=EXACT,

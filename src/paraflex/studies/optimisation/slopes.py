@@ -20,9 +20,9 @@ from paraflex.studies.optimisation.study import DesignStudy
 
 Array = NDArray[np.float64]
 EXACT, DIFFERENCES = "exact", "differences"
-# Column that says why a run has no exact derivatives.
+# Column with the reason why a run has no exact derivatives.
 NO_SLOPES = "slope.reason"
-# Bounds of a step that is chosen against noise, as a share of the ranges: what is curved is no straight line beyond.
+# Bounds of a step adapted to noise, as a fraction of the ranges: beyond the upper one curvature dominates.
 _LEAST_STEP, _MOST_STEP = 1e-3, 0.05
 
 
@@ -185,7 +185,7 @@ def run_slopes(
                 if not np.all(np.isfinite(found)):
                     raise NumericalError(f"the derivative of {column} is not finite")
                 row |= {slope_column(column, name): x for name, x in zip(setting.names, found, strict=True)}
-        # Whatever a strange design does, differences stand in for its derivatives.
+        # Any failure of exact derivatives is replaced by differences.
         except Exception as error:
             row[NO_SLOPES] = trouble(error)["reason"]
         rows.append(row)

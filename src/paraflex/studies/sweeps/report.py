@@ -30,9 +30,9 @@ from paraflex.results.doubts import doubt_lines
 from paraflex.results.metrics import VALIDITY
 from paraflex.writing import read_json
 
-_FOUND = "result.json"
-# So much a metric may differ from its row's before the reader is warned: other machines round otherwise.
-_SAME = 1e-6
+_SEARCH_RESULT = "result.json"
+# Relative difference of a metric from its row above which the report warns: other machines round differently.
+_ROW_DIFFERENCE = 1e-6
 
 
 def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = None) -> Page:
@@ -57,7 +57,7 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
     designs = read_designs(files) if files else None
     if designs is None or not designs.run.size:
         raise InputError("no run is done yet", field=str(folder), remedy="run the study first")
-    found = _found(study.folder / _FOUND)
+    found = _found(study.folder / _SEARCH_RESULT)
     picked = best_runs(designs)
     if found:
         picked = _searched(designs, found, picked)
@@ -102,14 +102,14 @@ def _again(
         except ParaflexError as error:
             return " ".join(str(error).split())
         rows = {name: designs.metrics[name][row] for name in metrics if name in designs.metrics}
-        return data, all(np.isclose(metrics[name], rows[name], rtol=_SAME, equal_nan=True) for name in rows)
+        return data, all(np.isclose(metrics[name], rows[name], rtol=_ROW_DIFFERENCE, equal_nan=True) for name in rows)
 
     rows = [one.row for one in picked]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         try:
             outcomes = dict(zip(rows, pool.map(again, rows), strict=True))
         except KeyboardInterrupt:
-            # Ctrl-C reaches the main thread only; the others hear of it at their next report.
+            # Ctrl-C reaches the main thread only; the others stop at their next progress report.
             stop.set()
             raise
     runs = {row: outcome[0] for row, outcome in outcomes.items() if not isinstance(outcome, str)}
