@@ -37,6 +37,9 @@ ELEMENTS = 200
 SHAPE_FUNCTIONS = 100
 # Samples of a run: an hour at 250 Hz; of fifty coordinates they take a gigabyte.
 SAMPLES = 1_000_000
+# Instants at which loops are closed along a path, each a millisecond after the one before: of thirty coordinates they
+# take a gigabyte and a minute.
+INSTANTS = 2_000_000
 # Designs of a study: at ten runs a second they take twelve days, and more than their table would fill the memory.
 DESIGNS = 10_000_000
 # What to do about numbers that cannot be computed with.

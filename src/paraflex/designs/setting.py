@@ -22,7 +22,7 @@ from paraflex.files.model import read_model
 from paraflex.files.read import exists
 from paraflex.findings import Verdict
 from paraflex.integrators import IntegrationOptions, check_times
-from paraflex.limits import of_size
+from paraflex.limits import WHOLE, at_most, of_size
 from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
 from paraflex.results.following import Part
@@ -204,6 +204,8 @@ def _varied(name: str, entry: VaryTable) -> Varied:
         raise InputError(
             "not all of them whole", field=f"vary.{name}.values", value=values, remedy="leave out whole = true"
         )
+    for value in (*(values or ()), entry.low or 0.0, entry.high or 0.0) if whole else ():
+        at_most(abs(value), WHOLE, f"vary.{name}", "too large for a whole number")
     return Varied(
         name=name,
         fields=tuple(entry.fields) or (name,),
