@@ -60,6 +60,13 @@ def of_size(value: float, field: str) -> None:
         raise InputError("beyond all proportion", field=field, value=value, remedy=f"at most {LARGEST:g}, in SI units")
 
 
+def possible(value: float, field: str, unit: str) -> None:
+    """Raise an `InputError` unless the magnitude of a number that is not zero is one that a quantity can have."""
+    if not SMALLEST <= abs(value) <= LARGEST:
+        remedy = f"give it in {unit}, from {SMALLEST:g} to {LARGEST:g}"
+        raise InputError("beyond all proportion", field=field, value=value, remedy=remedy)
+
+
 @contextmanager
 def solvable(what: str) -> Iterator[None]:
     """Name what cannot be computed because a matrix is singular to rounding, or a number beyond what floats hold.
