@@ -241,9 +241,14 @@ def _study(case: Case, file: Path) -> str:
     import paraflex as pf
 
     chance = random.Random(case.seed)
-    loaders = [pf.load_sweep, pf.load_sweep, pf.load_optimisation, pf.load_identification, pf.load_indices,
-               pf.load_sensitivities]  # fmt: skip
-    loader: Callable[[Path], Any] = chance.choice(loaders)
+    loaders: dict[str, list[Callable[[Path], Any]]] = {
+        "sweep": [pf.load_sweep], "thickness_study": [pf.load_sweep, pf.load_indices],
+        "search": [pf.load_optimisation, pf.load_indices], "optimisation": [pf.load_optimisation],
+        "identification": [pf.load_identification], "sensitivity_study": [pf.load_sensitivities],
+    }  # fmt: skip
+    # Now and then by a command that it is not meant for.
+    known = loaders[case.origin] if chance.random() < 0.9 else [one for each in loaders.values() for one in each]
+    loader = chance.choice(known)
     study = loader(file)
     if loader is pf.load_sweep and study.setting.duration is not None and study.setting.duration < 0.1:
         with tempfile.TemporaryDirectory() as folder:

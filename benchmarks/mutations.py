@@ -69,7 +69,10 @@ class Case:
 def originals(kind: str) -> dict[str, str]:
     """Texts of the files that are made wrong, by name: "models" or "studies"."""
     if kind == STUDIES:
-        files = [*sorted((HERE.parent / "examples").glob("*.toml")), HERE / "fuzzed" / "indices.toml"]
+        files = [
+            *(HERE.parent / "examples").glob("*.toml"),
+            *(HERE / "fuzzed" / f"{name}.toml" for name in ("sweep", "search")),
+        ]
         return {file.stem: file.read_text() for file in files}
     from paraflex.files import library_names, library_text
     from paraflex.files.generators import generated_text

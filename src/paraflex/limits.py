@@ -37,6 +37,11 @@ ELEMENTS = 200
 SHAPE_FUNCTIONS = 100
 # Samples of a run: an hour at 250 Hz; of fifty coordinates they take a gigabyte.
 SAMPLES = 1_000_000
+# Instants at which loops are closed along a path, each a millisecond after the one before: of thirty coordinates they
+# take a gigabyte and a minute.
+INSTANTS = 2_000_000
+# Designs of a study: at ten runs a second they take twelve days, and more than their table would fill the memory.
+DESIGNS = 10_000_000
 # What to do about numbers that cannot be computed with.
 OUT_OF_PROPORTION = "look at lengths, masses and stiffnesses: they are in SI units"
 
@@ -49,10 +54,17 @@ def at_most(value: float, limit: float, field: str, problem: str = "too many") -
 
 def of_size(value: float, field: str) -> None:
     """Raise an `InputError` unless a number is finite and one that a quantity in SI units can be."""
-    if not math.isfinite(value):
+    if value != value or abs(value) == math.inf:
         raise InputError("not a finite number", field=field, value=value, remedy="give a number")
     if abs(value) > LARGEST:
         raise InputError("beyond all proportion", field=field, value=value, remedy=f"at most {LARGEST:g}, in SI units")
+
+
+def possible(value: float, field: str, unit: str) -> None:
+    """Raise an `InputError` unless the magnitude of a number that is not zero is one that a quantity can have."""
+    if not SMALLEST <= abs(value) <= LARGEST:
+        remedy = f"give it in {unit}, from {SMALLEST:g} to {LARGEST:g}"
+        raise InputError("beyond all proportion", field=field, value=value, remedy=remedy)
 
 
 @contextmanager

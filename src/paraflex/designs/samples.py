@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.limits import DESIGNS, at_most
 from paraflex.mechanism.quantities import known
 
-# More designs than this are a slip: their table alone would fill the memory.
-_MOST_DESIGNS = 10_000_000
 KINDS = GRID, LIST, RANDOM, SOBOL = "grid", "list", "random", "sobol"
 
 
@@ -137,14 +136,24 @@ def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: i
     if not parameters:
         return np.zeros((1, 0))
     if kind == GRID:
-        levels = [parameter.levels() for parameter in parameters]
-        _check_total(math.prod(level.size for level in levels), "vary")
-        return np.stack([axis.ravel() for axis in np.meshgrid(*levels, indexing="ij")], axis=1)
+        sizes = [parameter.number or len(parameter.values or ()) for parameter in parameters]
+        at_most(math.prod(sizes), DESIGNS, "vary", "too many designs")
+        return _grid([parameter.levels() for parameter in parameters])
     if kind == LIST:
         return np.stack([parameter.levels() for parameter in parameters], axis=1)
     assert number is not None
     fractions = _fractions(kind, number, len(parameters), seed)
     return np.stack([p.spread(column) for p, column in zip(parameters, fractions.T, strict=True)], axis=1)
+
+
+def _grid(levels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Every combination of levels, the last fastest."""
+    total, columns, before = math.prod(level.size for level in levels), [], 1
+    for level in levels:
+        after = total // (before * level.size)
+        columns.append(np.tile(np.repeat(level, after), before))
+        before *= level.size
+    return np.stack(columns, axis=1)
 
 
 def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np.float64]:
@@ -192,7 +201,7 @@ def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, s
                 "must be positive" if number is not None else "is missing", field="sampling.number", value=number,
                 remedy="say how many designs",
             )  # fmt: skip
-        _check_total(number, "sampling.number")
+        at_most(number, DESIGNS, "sampling.number", "too many designs")
     elif number is not None:
         raise InputError(
             f"a {kind} has as many designs as its values make", field="sampling.number", value=number,
@@ -203,8 +212,3 @@ def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, s
         if len(set(lengths.values())) > 1:
             listed = ", ".join(f"{name}: {length}" for name, length in lengths.items())
             raise InputError(f"lists of different lengths ({listed})", field="vary", remedy="give one value per design")
-
-
-def _check_total(total: int, field: str) -> None:
-    if total > _MOST_DESIGNS:
-        raise InputError("too many designs", field=field, value=total, remedy=f"at most {_MOST_DESIGNS}")

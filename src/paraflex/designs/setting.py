@@ -11,8 +11,6 @@ from importlib.metadata import version
 from pathlib import Path as FilePath
 from typing import Any
 
-import numpy as np
-
 from paraflex.designs.measure import metrics_of
 from paraflex.designs.overlay import Place, find_place, overlaid
 from paraflex.designs.samples import Varied
@@ -24,6 +22,7 @@ from paraflex.files.model import read_model
 from paraflex.files.read import exists
 from paraflex.findings import Verdict
 from paraflex.integrators import IntegrationOptions, check_times
+from paraflex.limits import WHOLE, at_most, of_size
 from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
 from paraflex.results.following import Part
@@ -197,13 +196,16 @@ def _mechanism(name: str, folder: FilePath) -> str:
 def _varied(name: str, entry: VaryTable) -> Varied:
     values = entry.values
     for value in values or []:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise InputError("not a number", field=f"vary.{name}.values", value=value, remedy="give a list of numbers")
+        of_size(value, f"vary.{name}.values")
     whole = entry.whole or (bool(values) and all(isinstance(value, int) for value in values))
     if entry.whole and any(value % 1 for value in values or []):
         raise InputError(
             "not all of them whole", field=f"vary.{name}.values", value=values, remedy="leave out whole = true"
         )
+    for value in (*(values or ()), entry.low or 0.0, entry.high or 0.0) if whole else ():
+        at_most(abs(value), WHOLE, f"vary.{name}", "too large for a whole number")
     return Varied(
         name=name,
         fields=tuple(entry.fields) or (name,),

@@ -15,6 +15,7 @@ from paraflex.dynamics.damping import damping_matrix
 from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
+from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, PointRef
 
 
@@ -135,6 +136,8 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     ------
     InputError
         A body whose mass matrix is not positive definite.
+    ProportionError
+        One whose damping cannot be found, for numbers too far apart.
     """
     bodies, offset = [], 0
     for body in mechanism.bodies:
@@ -144,6 +147,9 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
         offset += 3 + coordinates.nf
     index = {body.name: i for i, body in enumerate(bodies)}
     undamped = tuple(bodies)
-    bodies = tuple(replace(body, damping=damping_matrix(mechanism, undamped, index, body.name)) for body in undamped)
-    packed, rows = pack_system(mechanism, bodies, index, row_order(mechanism, index))
-    return System(mechanism=mechanism, bodies=bodies, packed=packed, rows=rows)
+    damped = []
+    for body in undamped:
+        with solvable(f"the damping of {body.name}"):
+            damped.append(replace(body, damping=damping_matrix(mechanism, undamped, index, body.name)))
+    packed, rows = pack_system(mechanism, tuple(damped), index, row_order(mechanism, index))
+    return System(mechanism=mechanism, bodies=tuple(damped), packed=packed, rows=rows)

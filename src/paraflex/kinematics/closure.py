@@ -27,7 +27,7 @@ from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, ma
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.kinematics.reach import PoseSearch, Shortfall
-from paraflex.limits import solvable
+from paraflex.limits import INSTANTS, solvable
 from paraflex.mechanism import Assembly, Mechanism, PointRef
 from paraflex.mechanism.members import TASK_COORDINATES
 
@@ -216,7 +216,13 @@ def reach_shortfall(
 
 def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Times, with more between those further apart than closure steps; which of them were given."""
-    pieces = np.maximum(1, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9))).astype(int)
+    pieces = np.maximum(1.0, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9)))
+    if np.sum(pieces) > INSTANTS:
+        raise InputError(
+            "too long for a motion along a path", field="duration", value=float(times[-1] - times[0]),
+            remedy=f"at most {INSTANTS * _LONGEST_STEP:g} s: loops are closed every {_LONGEST_STEP:g} s",
+        )  # fmt: skip
+    pieces = pieces.astype(int)
     first = np.concatenate([[0], np.cumsum(pieces)])
     step = np.repeat(np.diff(times) / pieces, pieces)
     within = np.arange(first[-1]) - np.repeat(first[:-1], pieces)

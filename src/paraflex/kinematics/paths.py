@@ -15,6 +15,7 @@ from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.kinematics.laws import TrapezoidalLaw
+from paraflex.mechanism.quantities import finite, positive
 
 # Points of Gauss's rule for the length between two knots of a path.
 _LENGTH_POINTS = 40
@@ -76,7 +77,7 @@ class Polygon(CheckedFields):
         super().__post_init__()
         corners = _points(self.corners, "corners", 2)
         object.__setattr__(self, "corners", tuple(map(tuple, corners.tolist())))
-        _acceleration(self.max_acceleration)
+        positive(self.max_acceleration, "max_acceleration", "m/s^2")
         for length in self._lengths:
             if not length > 0.0:
                 raise InputError(
@@ -169,15 +170,12 @@ class Circle(CheckedFields):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "centre", _pair(self.centre, "centre"))
-        if not (np.isfinite(self.radius) and self.radius > 0.0):
-            raise InputError("must be positive", field="radius", value=self.radius, remedy="give it in metres")
-        if not np.isfinite(self.start_angle):
-            raise InputError(
-                "not a finite number", field="start_angle", value=self.start_angle, remedy="give it in rad"
-            )
+        positive(self.radius, "radius", "metres")
+        finite(self.start_angle, "start_angle")
         if not (np.isfinite(self.sweep) and self.sweep != 0.0):
             raise InputError("no angle to sweep", field="sweep", value=self.sweep, remedy="give it in rad, not zero")
-        _acceleration(self.max_acceleration)
+        finite(self.sweep, "sweep")
+        positive(self.max_acceleration, "max_acceleration", "m/s^2")
 
     @cached_property
     def _law(self) -> TrapezoidalLaw:
@@ -227,10 +225,7 @@ class PointPath(CheckedFields):
         super().__post_init__()
         points = _points(self.points, "points", 2, (2, 3))
         object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
-        if not (np.isfinite(self.motion_time) and self.motion_time > 0.0):
-            raise InputError(
-                "must be positive", field="motion_time", value=self.motion_time, remedy="give it in seconds"
-            )
+        positive(self.motion_time, "motion_time", "seconds")
         if np.any(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) == 0.0):
             raise InputError("two neighbouring points coincide", field="points", remedy="drop one of them")
 
@@ -305,9 +300,5 @@ def _points(values: Sequence[Sequence[float]], field: str, at_least: int, column
             "not a list of points", field=field, value=values,
             remedy=f"give at least {at_least} of [x, y] in metres{', or all of [x, y, angle]' if 3 in columns else ''}",
         )  # fmt: skip
+    finite(points.ravel(), field)
     return points
-
-
-def _acceleration(value: float) -> None:
-    if not (np.isfinite(value) and value > 0.0):
-        raise InputError("must be positive", field="max_acceleration", value=value, remedy="give it in m/s^2")

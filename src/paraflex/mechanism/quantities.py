@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any, Literal, cast
 
 from paraflex.errors import InputError, suggestion
-from paraflex.limits import LARGEST, SMALLEST, of_size
+from paraflex.limits import of_size, possible
 
 # Motions of joints that members name: an angle, a travel, or either.
 JointThat = Literal["moves", "turns", "slides"]
@@ -32,7 +32,7 @@ def positive(value: float, field: str, unit: str) -> None:
     """Raise an `InputError` unless a value is positive and finite."""
     if not (math.isfinite(value) and value > 0.0):
         raise InputError("must be positive", field=field, value=value, remedy=f"give it in {unit}")
-    _possible(value, field, unit)
+    possible(value, field, unit)
 
 
 def not_negative(value: float, field: str, unit: str) -> None:
@@ -40,20 +40,14 @@ def not_negative(value: float, field: str, unit: str) -> None:
     if not (math.isfinite(value) and value >= 0.0):
         raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")
     if value:
-        _possible(value, field, unit)
+        possible(value, field, unit)
 
 
 def not_zero(value: float, field: str, unit: str) -> None:
     """Raise an `InputError` unless a value is finite and not zero."""
     if not (math.isfinite(value) and value != 0.0):
         raise InputError("must be a finite number other than zero", field=field, value=value, remedy=f"give it {unit}")
-    _possible(value, field, unit.removeprefix("in "))
-
-
-def _possible(value: float, field: str, unit: str) -> None:
-    if not SMALLEST <= abs(value) <= LARGEST:
-        remedy = f"give it in {unit}, from {SMALLEST:g} to {LARGEST:g}"
-        raise InputError("beyond all proportion", field=field, value=value, remedy=remedy)
+    possible(value, field, unit.removeprefix("in "))
 
 
 def said(

@@ -18,6 +18,7 @@ from paraflex.designs.samples import RANDOM
 from paraflex.designs.schema import SamplingTable, study_table
 from paraflex.designs.sweep import RunTask, SweepStudy, SweptResult, make_study
 from paraflex.errors import InputError, suggestion
+from paraflex.limits import DESIGNS, at_most
 from paraflex.results.metrics import METRICS
 from paraflex.results.parquet import read_parquet, write_parquet
 from paraflex.results.summary import finite_or_none
@@ -147,6 +148,7 @@ def load_indices(
         base = make_study(table.model_copy(update={"sampling": sampling}), folder)
     number = samples if samples is not None else table.sampling.number or _BASE_SAMPLES
     _check_samples(number)
+    at_most(number * (len(base.parameters) + 2), DESIGNS, "--samples", "too many designs")
     wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].per_motor]
     columns = _columns(wanted, base)
     points = _salib_sample(base.setting.names, number, chosen)

@@ -19,6 +19,7 @@ from paraflex.designs.schema import SamplingTable
 from paraflex.designs.setting import Setting
 from paraflex.designs.sweep import SweepStudy, make_study
 from paraflex.errors import InputError, suggestion
+from paraflex.limits import DESIGNS, at_most
 from paraflex.mechanism import quantities
 from paraflex.studies.optimisation.schema import (
     GradientsName,
@@ -236,6 +237,7 @@ def read_search(table: SearchTable) -> Search:
             raise InputError(
                 "must not be negative", field=f"search.{name}", value=getattr(table, name), remedy="leave it out"
             )
+    at_most(table.samples, DESIGNS, "search.samples", "too many designs")
     if table.difference is not None and table.difference > 0.1:
         raise InputError(
             "too large for a derivative", field="search.difference", value=table.difference, remedy="say 1e-3"
