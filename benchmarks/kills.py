@@ -1,10 +1,11 @@
-"""Kill every command at its changes of files and at any time, look at what it left, and run it again.
+"""Kill every command at its changes of files and at any time, let it run out of room, and run it again.
 
-    python benchmarks/kills.py [--kills 100] [--seed 0] [--only sweep ...]
+    python benchmarks/kills.py [--kills 100] [--full 20] [--seed 0] [--only sweep ...]
 
 Each kill is in a process of its own: before its nth change of a file in the results folder (opening for writing,
 renaming, removing, making and removing folders), or, every second one, at a random time by SIGKILL, also within SQLite.
-Every third command is killed over results that are there. It counts
+Every third command is killed over results that are there. Room ends where a file would become larger than a limit, from
+nothing to the largest file that the command writes. It counts
 
 - silent: a reader takes a file that is not the one its folder's manifest lists, or results of two runs are mixed,
 - error: the same command again does not end well, or a raw exception is shown,
@@ -18,6 +19,7 @@ import argparse
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import sys
@@ -26,8 +28,11 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 CHANGES = {"open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "sqlite3.connect"}
+# What a command says is shorter, and goes to a file too [bytes].
+_LOG = 4096
 KILLED = -signal.SIGKILL
 STUDY = """
 name = "bars"
@@ -135,6 +140,16 @@ def command(line: list[str], out: Path, at: int | None = None, count: Path | Non
     return work
 
 
+def out_of_room(work: Callable[[], None], limit: int) -> Callable[[], None]:
+    """Some work that cannot write files of more bytes than a limit."""
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        work()
+
+    return limited
+
+
 def silent(folder: Path) -> str:
     """What a reader of a folder takes for right and is not; empty where all is well."""
     from paraflex.errors import InputError
@@ -157,13 +172,13 @@ def silent(folder: Path) -> str:
     return f"not listed: {numbers}" if numbers else ""
 
 
-def content(folder: Path) -> dict[str, object]:
+def content(folder: Path) -> dict[str, Any]:
     """What a folder of results holds, by file; wall times aside."""
     import xarray as xr
 
     from paraflex.results import open_results
 
-    found: dict[str, object] = {}
+    found: dict[str, Any] = {}
     for file in sorted(each for each in folder.rglob("*") if each.is_file()):
         name = file.relative_to(folder).as_posix()
         if name.startswith("figures/"):
@@ -189,8 +204,8 @@ def without_times(value: object) -> object:
     return [without_times(one) for one in value] if isinstance(value, list) else value
 
 
-def attack(name: str, place: Path, kills: int, chance: random.Random) -> Counter[str]:
-    """Kill a command many times; how it went."""
+def attack(name: str, place: Path, kills: int, full: int, chance: random.Random) -> Counter[str]:
+    """Kill a command many times, and let it run out of room; how it went."""
     line, log, counted = LINES[name], place / "log", place / "count"
     whole = place / f"{name}-whole"
     began = time.perf_counter()
@@ -211,20 +226,35 @@ def attack(name: str, place: Path, kills: int, chance: random.Random) -> Counter
         else:
             code = in_child(command(line, out, at=at), log)
         told["killed"] += code == KILLED
-        problem = silent(out) if out.exists() else ""
-        if problem:
-            report(told, "silent", f"{name}, kill {i}: {problem}")
-        code = in_child(command(line, out), log)
-        if code != 0 or "Traceback" in log.read_text():
-            report(told, "error", f"{name}, kill {i}: exit code {code}\n{log.read_text()}")
-        elif (found := content(out)) != expected:
-            files = [each for each in {*found, *expected} if found.get(each, 0) != expected.get(each, 0)]
-            report(told, "differs", f"{name}, kill {i}: {sorted(files)}")
-        left = [each.name for each in out.iterdir() if each.name in (".new", ".ready") or each.suffix == ".part"]
-        if left:
-            report(told, "left", f"{name}, kill {i}: {left}")
-        shutil.rmtree(out)
+        look_and_repeat(name, f"kill {i}", out, log, expected, told)
+    largest = max(file.stat().st_size for file in whole.rglob("*") if file.is_file())
+    for i in range(full):
+        out, limit = place / f"{name}-full-{i}", _LOG + int((largest - _LOG) * (i / full) ** 2)
+        code = in_child(out_of_room(command(line, out), limit), log)
+        said = log.read_text(errors="replace")
+        told["full"] += code == 2
+        if code not in (0, 2) or "Traceback" in said or (code == 2 and "error: " not in said):
+            report(told, "error", f"{name}, no file over {limit} bytes: exit code {code}\n{said}")
+        look_and_repeat(name, f"no file over {limit} bytes", out, log, expected, told)
     return told
+
+
+def look_and_repeat(name: str, how: str, out: Path, log: Path, expected: dict[str, Any], told: Counter[str]) -> None:
+    """See whether readers are deceived by what a command left, run it again, and compare; the folder is gone then."""
+    problem = silent(out) if out.exists() else ""
+    if problem:
+        report(told, "silent", f"{name}, {how}: {problem}")
+    code = in_child(command(LINES[name], out), log)
+    said = log.read_text(errors="replace")
+    if code != 0 or "Traceback" in said:
+        report(told, "error", f"{name}, {how}: then exit code {code}\n{said}")
+    elif (found := content(out)) != expected:
+        files = [each for each in {*found, *expected} if found.get(each, 0) != expected.get(each, 0)]
+        report(told, "differs", f"{name}, {how}: {sorted(files)}")
+    left = [each.name for each in out.iterdir() if each.name in (".new", ".ready") or each.suffix == ".part"]
+    if left:
+        report(told, "left", f"{name}, {how}: {left}")
+    shutil.rmtree(out)
 
 
 def report(told: Counter[str], what: str, text: str) -> None:
@@ -237,6 +267,7 @@ def main() -> None:
     """Kill all commands, and print a table of what came of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=100, help="of each command")
+    parser.add_argument("--full", type=int, default=20, help="times without room, of each command")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", nargs="*", choices=LINES, default=list(LINES))
     asked = parser.parse_args()
@@ -247,7 +278,7 @@ def main() -> None:
     import paraflex.report
     import paraflex.studies  # noqa: F401
 
-    heads = ("changes", "killed", "silent", "error", "differs", "left")
+    heads = ("changes", "killed", "full", "silent", "error", "differs", "left")
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -255,13 +286,13 @@ def main() -> None:
             Path(f"{name}.toml").write_text(text, encoding="utf-8")
         for name in asked.only:
             began = time.perf_counter()
-            told = attack(name, Path(folder), asked.kills, random.Random(f"{asked.seed} {name}"))
+            told = attack(name, Path(folder), asked.kills, asked.full, random.Random(f"{asked.seed} {name}"))
             rows.append((name, *(told[head] for head in heads), f"{time.perf_counter() - began:.0f} s"))
             print(*rows[-1], flush=True)
     print("\n" + "".join(f"{head:>16}" for head in ("command", *heads, "took")))
     for row in rows:
         print("".join(f"{cell!s:>16}" for cell in row))
-    sys.exit(any(sum(row[3:7]) for row in rows))
+    sys.exit(any(sum(row[4:8]) for row in rows))
 
 
 if __name__ == "__main__":

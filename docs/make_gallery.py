@@ -93,23 +93,23 @@ TITLES = {
 }
 INTRODUCTION = """# Gallery
 
-Every figure that paraflex draws, by the kind of results it is drawn of. Any of them is drawn again for print with
+This page has every figure that paraflex draws, by kind of results. To draw one for print:
 
 ```sh
 paraflex plot RESULTS FIGURE... --style single --format pdf,svg,png
 ```
 
-`RESULTS` is the folder a command wrote, or one of its files; what it is is seen from its content. Without a figure, or
-with `--list`, the figures of these results are listed; `all` draws all of them. Figures that show one actuation mode
-take `--mode`, which may be repeated; the others show the modes named, or all. Figures of many designs take `--metric`.
+`RESULTS` is the folder that a command wrote, or one of its files. Without a figure, or with `--list`, the command lists
+the figures of these results; `all` draws all of them. Figures that show one actuation mode are drawn for each `--mode`;
+the others show the modes named, or all. Figures of many designs take `--metric`.
 
 `--style single` makes them 84 mm wide, one column of most journals, and `--style double` 174 mm, two columns; panels
-that do not fit beside one another stand below one another. Text is 8 pt, numbers on axes 7 pt, fonts are embedded in
-PDF as TrueType. Colours are those of Okabe and Ito, and lines differ in their dashes as well, so that they are told
-apart in grey and by colour-blind readers. Files go to `figures/` in the folder of the results, or to `--output`;
-nothing is written over without `--force`.
+that do not fit side by side are placed below one another. Text is 8 pt, numbers on axes 7 pt; fonts are embedded in PDF
+as TrueType. Colours are those of Okabe and Ito, and lines also differ in their dashes, for prints in grey and
+colour-blind readers. Files go to `figures/` in the folder of the results, or to `--output`; existing files are replaced
+only with `--force`.
 
-In Python each is a function of `paraflex.plots`, of results or of the folder they were written to:
+In Python each figure is a function of `paraflex.plots` that takes results or their folder:
 
 ```python
 import paraflex as pf
@@ -119,7 +119,7 @@ pf.plots.tracking_errors(data).savefig("errors.pdf")
 pf.plots.link_motions(data, "++++").savefig("links.pdf")
 ```
 
-The figures here are of small studies and made by `python docs/make_gallery.py`.
+`python docs/make_gallery.py` makes the figures here from small studies.
 """
 
 

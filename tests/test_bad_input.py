@@ -248,7 +248,7 @@ FILES = {
     "binary": (b"\x7fELF\x02\x01\x01\x00\xff\xfe", "file: not a text file in UTF-8; name a TOML file"),
     "other encoding": ('name = "Mühle"\n'.encode("latin-1"), "file: not a text file in UTF-8"),
     "null bytes": (b'name = "a"\x00\n', "file: not valid TOML"),
-    "huge": (b"# " + b"x" * 6_000_000, "file: too large for a model file; name a TOML file"),
+    "huge": (b"# " + b"x" * 6_000_000, "file: too large a file; name a TOML file, of at most 5 MB"),
     "prose": (b"This is a letter.\n", "file: not valid TOML"),
     "JSON": (b'{"name": "a"}', "file: not valid TOML"),
     "unclosed": (b'name = "a\n', "file: not valid TOML"),

@@ -24,7 +24,9 @@ def test_run_writes_summary_results_and_figures(results):
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     assert "tracking error" in done.stdout
-    assert sorted(entry.name for entry in out.iterdir()) == ["figures", "report.html", "results.nc", "summary.json"]
+    assert sorted(entry.name for entry in out.iterdir()) == [
+        ".lock", "figures", "manifest.json", "report.html", "results.nc", "summary.json",
+    ]  # fmt: skip
     names = {entry.name[:5] for entry in (out / "figures").iterdir()}
     assert names == {f"fig{number}" for number in range(11, 19)}
     assert {entry.suffix for entry in (out / "figures").iterdir()} == {".png", ".svg"}

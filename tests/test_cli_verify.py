@@ -25,7 +25,9 @@ def test_verify_prints_and_saves_how_models_agree(tmp_path):
     assert "RMS difference of each link's angular velocity [rad/s] from 2nd-ord." in done.stdout
     # Whole numbers at eighty columns, none cut short.
     assert "…" not in done.stdout
-    assert sorted(entry.name for entry in out.iterdir()) == ["figures", "report.html", "verify.json", "verify.nc"]
+    assert sorted(entry.name for entry in out.iterdir()) == [
+        ".lock", "figures", "manifest.json", "report.html", "verify.json", "verify.nc",
+    ]  # fmt: skip
     figures = json.loads((out / "verify.json").read_text())
     models = figures["modes"]["++++"]["models"]
     assert list(models) == ["linear", "second-order", "mujoco"]

@@ -62,7 +62,7 @@ BROKEN = [
     ("B1 = 0.250 }", "B1 = 0.3 }", "body.link1.points.B1: the point lies beyond the beam's end", "between 0 and"),
     ("elements = 3", "elements = 0", "body.link1.elements: a span needs at least one element", "1 or more"),
     ("elements = 3", "elements = 2.5", "body.link1.elements: should be a valid integer (got 2.5)", "span"),
-    ("elements = [1, 2]", "elements = [1, 2, 3]", "body.link4.elements: the beam has 2 span(s)", "one number a span"),
+    ("elements = [1, 2]", "elements = [1, 2, 3]", "body.link4.elements: the beam has 2 span(s)", "one number per span"),
     ("elements = 3", "elements = 3\nmodes = 0", "body.link1.modes: no such number of modes (got 0)", "from 1 to 12"),
     ("elements = 3", "elements = 3\nmodes = 13", "body.link1.modes: no such number of modes (got 13)", "from 1 to 12"),
     ("youngs_modulus = 70e9  # Pa\n", "", "material.aluminium.youngs_modulus: is missing", "Young's modulus in Pa"),

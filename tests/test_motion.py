@@ -166,7 +166,9 @@ def test_the_library_pendulum_runs_from_the_command_line(tmp_path):
     assert "flexible pendulum: complete at t = 0.5 s" in done.stdout
     assert "beam.tip: (" in done.stdout
     assert sorted(entry.name for entry in (tmp_path / "out").iterdir()) == [
+        ".lock",
         "figures",
+        "manifest.json",
         "report.html",
         "results.nc",
         "summary.json",

@@ -82,7 +82,7 @@ def test_torques_that_no_spline_follows(monkeypatch):
 def test_a_mass_matrix_that_is_not_positive_definite():
     """Nothing is left of the beam in floating point."""
     pendulum = pf.load("pendulum").mechanism
-    heavy = replace(pendulum.bodies[0], material=Material(210e9, 1e-300))
+    heavy = replace(pendulum.bodies[0], material=Material(210e9, 1e-30))
     refused(
         lambda: build_system(pendulum.with_bodies([heavy])),
         "body.beam", "its mass matrix is not positive definite", "many orders of magnitude apart",
@@ -159,7 +159,8 @@ def test_a_table_of_too_many_rows(tmp_path):
     (tmp_path / "law.csv").write_text("0.0, 1.0\n" * 600_000, encoding="utf-8")
     file = tmp_path / "driven.toml"
     file.write_text(PENDULUM + '[prescribed.drive]\njoint = "pivot"\ntable = "law.csv"\n', encoding="utf-8")
-    refused(lambda: pf.load(file), "prescribed.drive.table", "too large a file", "at most 5 MB of two columns")
+    remedy = "save two columns as CSV, of at most 5 MB"
+    refused(lambda: pf.load(file), "prescribed.drive.table", "too large a file", remedy)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +212,7 @@ def test_samples_without_numbers(tmp_path):
     for replaced, field, problem, remedy in (
         ('[sampling]\nkind = "random"\n', "sampling.number", "is missing", "say how many designs"),
         ('[sampling]\nkind = "random"\nnumber = 0\n', "sampling.number", "must be positive", "say how many designs"),
-        ('[sampling]\nkind = "list"\n', "vary.arm.values", "is missing", "give a list of numbers, one a design"),
+        ('[sampling]\nkind = "list"\n', "vary.arm.values", "is missing", "give a list of numbers, one per design"),
     ):
         file = tmp_path / "study.toml"
         file.write_text(f"{text}\n{replaced}", encoding="utf-8")

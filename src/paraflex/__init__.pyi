@@ -1,7 +1,7 @@
 # Every public name, once; grouped as the page "The interface" of the documentation shows them.
 from . import library as library, plots as plots
 
-# Mechanisms: bodies, joints, what acts on them
+# Mechanisms: bodies, joints, forces
 from .mechanism import (
     Mechanism as Mechanism,
     RigidBody as RigidBody,
@@ -43,7 +43,7 @@ from .mechanism import (
 # Paths
 from .kinematics import Circle as Circle, Line as Line, PointPath as PointPath, Polygon as Polygon
 
-# Models: read, looked over, planned, run
+# Models: read, checked, planned, run
 from .files import Model as Model, load as load, load_path as load_path, plan as plan
 from .checks import check as check
 from .tracking import simulate as simulate
@@ -91,7 +91,7 @@ from .results import (
 from .results.export import export as export
 from .plots.film import FilmOptions as FilmOptions, animate as animate
 
-# What goes wrong, and what is doubted
+# Errors and warnings
 from .errors import (
     ParaflexError as ParaflexError,
     InputError as InputError,

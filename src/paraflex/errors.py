@@ -11,7 +11,7 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher, get_close_matches
 from enum import Enum
@@ -19,7 +19,16 @@ from typing import Any, TypeVar
 
 E = TypeVar("E", bound=Enum)
 
+# Names in a message: more than a mechanism's members, or the metrics, are not read.
+_LISTED = 60
 _PACKAGE = os.path.dirname(__file__) + os.sep
+
+
+def printable(text: str) -> str:
+    """A text for a terminal: what would move the cursor, colour or turn round what follows stands as its escape."""
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() or one == "\n" else one.encode("unicode_escape").decode() for one in text)
 
 
 class ParaflexError(Exception):
@@ -55,7 +64,7 @@ class InputError(ParaflexError, ValueError):
         where = f"{self.source}: {self.field}" if self.source else self.field
         value = "" if self.value is None else f" (got {_short(self.value)})"
         remedy = f"; {self.remedy}" if self.remedy else ""
-        return f"{where}: {self.problem}{value}{remedy}"
+        return printable(f"{where}: {self.problem}{value}{remedy}").replace("\n", "\\n")
 
     def in_file(self, source: str) -> InputError:
         """The same error, naming the file it came from."""
@@ -109,7 +118,13 @@ def suggestion(name: object, known: Iterable[str]) -> str:
     alike = [SequenceMatcher(None, str(name), each).ratio() for each in near]
     if near and len(set(alike)) == len(alike):
         return f'did you mean "{near[0]}"?'
-    return f"choose from {', '.join(known)}" if known else "there is none to choose from"
+    return f"choose from {listed(known)}" if known else "there is none to choose from"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a message, the first of them where they are many."""
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return ", ".join(names[:_LISTED]) + more
 
 
 def _short(value: object, limit: int = 80) -> str:
@@ -176,7 +191,11 @@ class NumericalError(ParaflexError, ArithmeticError):
         return self.cause if self.moment is None else f"{self.cause} at {self.moment}"
 
     def __str__(self) -> str:
-        return f"{self.problem}; {self.remedy}" if self.remedy else self.problem
+        return printable(f"{self.problem}; {self.remedy}" if self.remedy else self.problem)
+
+
+class ProportionError(NumericalError):
+    """Numbers so far apart that equations of them cannot be solved in floating point."""
 
 
 class AssemblyError(NumericalError):

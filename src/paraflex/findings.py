@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from paraflex.errors import ModelWarning, ParaflexWarning, warn_user
+from paraflex.errors import ModelWarning, ParaflexWarning, printable, warn_user
 
 __all__ = ["CODES", "Code", "Finding", "Level", "Verdict", "warn_of"]
 
@@ -55,6 +55,7 @@ _WRONG = {
     "study-refused": "The study asks for something that the model does not have.",
     "task-freedoms": "The coordinates of the end-effector that a path prescribes are not as many as the freedoms.",
     "start-refused": "The start of a run contradicts the joints, prescribed motions or itself.",
+    "out-of-proportion": "Numbers of the model are so far apart that its equations cannot be solved at a pose.",
     "path-unreachable": "The end-effector cannot follow a path of the study, in the assembly of the study.",
     "path-singular": "A mode loses control of the mechanism on the path: a Type II singular position.",
 }
@@ -102,6 +103,7 @@ _DOUBTFUL = {
     "deflection-large": "A link bends so far that it is more a spring than a link.",
     "speed-large": "A body moves, or a drive turns, as fast as no mechanism does.",
     "error-large": "The tracking error is of the size of the path.",
+    "tolerance-loose": "The tolerance is a large part of the mechanism's size: positions may be off by as much.",
     "stability": "An explicit method takes very many steps, by stability alone.",
     "validity": "A run went beyond what the geometry of its model can describe.",
 }
@@ -144,7 +146,7 @@ class Finding:
 
     def __str__(self) -> str:
         where = f"{self.place}: " if self.place else ""
-        return f"{where}{self.text}; {self.remedy} [{self.code}]"
+        return printable(f"{where}{self.text}; {self.remedy} [{self.code}]")
 
     def to_dict(self) -> dict[str, str]:
         """For JSON: code, level, place, text, remedy."""

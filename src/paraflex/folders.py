@@ -200,6 +200,9 @@ class ResultsFolder:
             write_json(new / MANIFEST, {"paraflex_version": version("paraflex")} | vars(manifest))
             write_json(new / _REMOVED, removed)
             new.replace(ready)
+        except KeyboardInterrupt as interrupt:
+            interrupt.args = interrupt.args or (f"nothing was written; {self.path} is as it was",)
+            raise
         except OutputError as error:
             raise error.at(error.field.replace(str(new), str(self.path))) from None
         except OSError as error:
@@ -233,8 +236,10 @@ def hold_folder(
     OutputError
         It cannot be made or written.
     """
-    made = [each for each in (path, *path.parents) if not each.exists()]
+    made: list[Path] = []
     try:
+        with suppress(OSError):  # a name that is too long, which the lock tells
+            made += [each for each in (path, *path.parents) if not each.exists()]
         with lock_folder(path, field=field) as locks:
             there = kind_of_folder(path)
             if there not in ("", kind) and not force:
@@ -420,10 +425,10 @@ def _digest_of(file: Path, *, sync: bool = False) -> str:
         return digest.hexdigest()
 
 
-def _remove_empty(folder: Path, made: Iterable[Path]) -> None:
+def _remove_empty(folder: Path, made: Sequence[Path]) -> None:
     """Remove folders that were made for results of which nothing came."""
     with suppress(OSError):
-        if folder in (made := list(made)) and {file.name for file in folder.iterdir()} == {LOCK}:
+        if folder in made and {file.name for file in folder.iterdir()} == {LOCK}:
             (folder / LOCK).unlink()
         for each in made:
             each.rmdir()

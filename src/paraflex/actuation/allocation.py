@@ -27,7 +27,7 @@ SINGULAR_RATIO = 1e-6
 
 @dataclass(frozen=True)
 class Effort:
-    """What a rigid motion asks of the motors.
+    """The required effort of a rigid motion, and the actuation matrix.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Effort:
     matrix: Array
 
     def active(self, mode: ActuationMode) -> NDArray[np.bool_]:
-        """Which motors a mode drives (motors,)."""
+        """The motors that a mode drives (motors,)."""
         return np.array([motor.name in mode.motors for motor in self.motion.mechanism.motors], dtype=bool)
 
 
@@ -64,7 +64,7 @@ def motor_rows(motion: RigidMotion) -> Array:
 
 
 def add_springs_and_dampers(motion: RigidMotion, forces: Array) -> None:
-    """What springs, dampers and friction at joints ask for besides inertia, into forces (k, n)."""
+    """Add the forces against springs, dampers and friction at joints to forces (k, n)."""
     for spring in motion.mechanism.springs:
         value, _, rows = joint_coordinate(motion.system, spring.joint, motion.q)
         forces += (spring.stiffness * (value - spring.rest))[:, None] * rows
@@ -106,7 +106,7 @@ def allocate(effort: Effort, mode: ActuationMode) -> Array:
 
 
 def check_mode(effort: Effort, mode: ActuationMode) -> None:
-    """Whether a mode's motors can drive the mechanism all along the motion; see `allocate` for what is raised."""
+    """Check that a mode's motors can drive the mechanism along the whole motion; see `allocate` for its errors."""
     tasks, count = effort.required.shape[1], int(effort.active(mode).sum())
     if count < tasks:
         raise ActuationError(

@@ -1,4 +1,4 @@
-"""Torques as smooth functions of time: splines between the path's knots, fine enough to be exact in effect."""
+"""Torques as smooth functions of time: splines between the path's knots, fine enough to be exact to the tolerance."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _IN_TIME = ("t", "q", "v", "a", "basis")
 
 @dataclass(frozen=True)
 class FeedForward:
-    """The torques of a mode in time.
+    """The torques of a mode as functions of time.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class TorquePlan:
         )
 
     def _effort(self, refined: int) -> Effort:
-        """On the fine grid with every interval halved so often."""
+        """Effort on the fine grid with every interval halved a number of times."""
         efforts = [self.fine, *self.finer]
         while len(efforts) <= refined:
             t = efforts[-1].motion.t
@@ -145,7 +145,7 @@ def _alternating(a: Array, b: Array) -> Array:
 
 
 def _interleaved(effort: Effort, between: Effort) -> Effort:
-    """Effort at instants and at those between them."""
+    """Efforts at the instants and between them, in order of time."""
     parts = {name: _alternating(getattr(effort.motion, name), getattr(between.motion, name)) for name in _IN_TIME}
     return Effort(
         replace(effort.motion, **parts),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from paraflex.campaign.journal import JOURNAL, Journal, read_journal
+from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.writing import GO_ON, whole_file
 
 if TYPE_CHECKING:
@@ -97,12 +98,13 @@ def _write_csv(table: Path, file: Path) -> None:
     import pyarrow.parquet as pq
 
     read = pq.ParquetFile(table)
+    schema = spreadsheet_table(read.schema_arrow.empty_table()).schema
     with (
         whole_file(file, remedy=GO_ON) as unfinished,
-        pyarrow.csv.CSVWriter(unfinished, read.schema_arrow) as writer,
+        pyarrow.csv.CSVWriter(unfinished, schema) as writer,
     ):
         for number in range(read.num_row_groups):
-            writer.write_table(read.read_row_group(number))
+            writer.write_table(spreadsheet_table(read.read_row_group(number)))
 
 
 def _schema(journal: Journal) -> pa.Schema:

@@ -12,6 +12,7 @@ from paraflex.checks.unused import file_findings
 from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.findings import Finding, Verdict
+from paraflex.integrators import loose_tolerance
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.tracking import TrackingTask
 from paraflex.validity.numbers import doubtful_numbers
@@ -65,6 +66,8 @@ def check(
     found: list[Finding] = [*doubtful_numbers(mechanism, duration), *pose_findings(seen, at_rest=at_rest)]
     if isinstance(model, Model):
         found += [*file_findings(model), *start_findings(model, seen, assembly)]
+        loose = loose_tolerance(model.study.integration().tolerance, seen.system.size)
+        found += [] if loose is None else [loose]
     # Without an assembly there is no pose to run from.
     if isinstance(model, Model) and seen.starts:
         short = {one.place for one in found if one.code == "mode-short"}

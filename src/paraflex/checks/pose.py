@@ -23,8 +23,9 @@ from paraflex.dynamics import (
     undeformed,
 )
 from paraflex.dynamics.linearise import LOWEST
-from paraflex.errors import NumericalError
+from paraflex.errors import NumericalError, ProportionError
 from paraflex.findings import Finding
+from paraflex.limits import OUT_OF_PROPORTION
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.poses import approximate_poses
 
@@ -51,6 +52,8 @@ class Examination:
     mobility : Mobility or None
     reach : Reach or None
         None of an assembly that does not close.
+    problem : str
+        Why they could not be computed where it does; empty for none.
     """
 
     system: System
@@ -59,6 +62,7 @@ class Examination:
     chosen: Closure | None
     mobility: Mobility | None
     reach: Reach | None
+    problem: str = ""
 
 
 def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
@@ -77,8 +81,11 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
     chosen = next(start for start in starts if start.assembly == wanted.name)
     if chosen.state is None:
         return Examination(system, rigid, starts, chosen, None, None)
-    free = mobility(rigid, chosen.state)
-    return Examination(system, rigid, starts, chosen, free, reach(rigid, chosen.state, free.freedoms))
+    try:
+        free = mobility(rigid, chosen.state)
+        return Examination(system, rigid, starts, chosen, free, reach(rigid, chosen.state, free.freedoms))
+    except ProportionError as error:
+        return Examination(system, rigid, starts, chosen, None, None, str(error))
 
 
 def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Finding]:
@@ -96,6 +103,8 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
             )  # fmt: skip
         else:
             yield from _elbow(seen.rigid, start)
+    if seen.problem:
+        yield Finding("out-of-proportion", "assembly", seen.problem, OUT_OF_PROPORTION)
     if seen.mobility is not None and seen.reach is not None:
         yield from _mobility(seen.mobility, seen.reach)
         if seen.reach.all_motors < seen.mobility.freedoms and seen.chosen is not None and seen.chosen.state is not None:
@@ -173,6 +182,9 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
     state = undeformed(seen.system, seen.rigid, seen.chosen.state)
     try:
         vibration = natural_frequencies(seen.system, state, motors, count=LOWEST)
+    except ProportionError as error:
+        yield Finding("out-of-proportion", "assembly", str(error), OUT_OF_PROPORTION)
+        return
     except NumericalError:
         return
     growing = int(np.sum(vibration.squares < 0.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import sys
@@ -60,6 +61,12 @@ def main() -> None:
     except ParaflexError as error:
         _complain(error)
         sys.exit(TROUBLE)
+    except OSError as error:
+        # Wherever a name is first looked for.
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        _complain(InputError("too long a name", field="file", value=error.filename, remedy="choose a shorter one"))
+        sys.exit(BAD_INPUT)
     except KeyboardInterrupt:
         typer.echo("interrupted", err=True)
         sys.exit(exit_code())

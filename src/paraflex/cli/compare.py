@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import time
 
-from rich.console import Console
-
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.runs import CompareRequest
 from paraflex.cli.compare_tables import print_comparison
@@ -67,14 +65,11 @@ def _compare(
     summary = comparison.to_dict()
     if comparison.measurements:
         comparison.save_in(folder)
+    tell(summary, lambda out: print_comparison(out, summary), as_json=request.json, doubts=())
+    if comparison.measurements:
         write_drawn(summary, folder)
-
-    def show(out: Console) -> None:
-        print_comparison(out, summary)
-        if comparison.measurements:
+        if not request.json:
             say_where(began, "numbers and figure", folder.path)
-
-    tell(summary, show, as_json=request.json, doubts=())
     done = any(run.status == "complete" for run in comparison.measurements)
     return exit_code(done, interrupted=comparison.interrupted)
 

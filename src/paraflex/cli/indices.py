@@ -31,8 +31,6 @@ def indices_command(request: IndicesRequest) -> int:
         console.print(f"interrupted; so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
         return signals.exit_code()
     numbers = result.to_dict()
-    with result.added() as new:
-        save_figures(numbers, new / "figures")
     verdict = study.sweep.setting.verdict()
 
     def show(out: Console) -> None:
@@ -40,6 +38,7 @@ def indices_command(request: IndicesRequest) -> int:
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)
 
     tell(numbers | {"verdict": verdict.to_dict()}, show, as_json=request.json, doubts=verdict)
+    save_figures(numbers, request.folder / "figures")
     return COMPLETE
 
 

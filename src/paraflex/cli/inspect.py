@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import suppress
 from typing import Any
 
 from paraflex.checks import check, examine
@@ -12,6 +13,7 @@ from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.frequencies import frequencies, hertz
 from paraflex.cli.inspect_tables import print_facts, print_library
 from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, closure_of, mobility
+from paraflex.errors import ProportionError
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
 from paraflex.mechanism import Mechanism, Relation, grouped, loops
@@ -83,7 +85,9 @@ def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]
     assert chosen is not None
     assert chosen.state is not None
     facts |= _mobility_facts(seen.mobility) | {"drives": _reach_facts(seen.reach)}
-    facts["frequencies"] = frequencies(model, seen.system, seen.rigid, chosen.state, chosen.assembly, request)
+    # The verdict says why there are none.
+    with suppress(ProportionError):
+        facts["frequencies"] = frequencies(model, seen.system, seen.rigid, chosen.state, chosen.assembly, request)
     return facts
 
 

@@ -16,7 +16,7 @@ from paraflex.cli.bars import bars, begun_late
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, say_where, tell
+from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     UNBALANCED,
@@ -24,7 +24,7 @@ from paraflex.cli.request import (
     of_assembly,
 )
 from paraflex.cli.tables import FINISHED, plain_console, validity
-from paraflex.cli.writing import write_run
+from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
 from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning, ValidityWarning
@@ -87,16 +87,12 @@ def _run_held(
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     summary = motion_summary(data)
-    write_run(data, summary, folder, report=request.report)
-
-    def show(out: Console) -> None:
-        _report(out, summary, data)
-        say_where(began, "results, figures", folder.path, report=request.report)
-
-    tell(summary, show, as_json=request.json)
+    write_numbers(data, summary, folder)
+    tell(summary, lambda out: _report(out, summary, data), as_json=request.json)
     finished = run.solution.status in FINISHED
     if not finished:
         console.print(f"error: {run.solution.message}", soft_wrap=True)
+    write_drawn_run(data, folder, request, began)
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 

@@ -95,6 +95,7 @@ def at_fault(error: InputError, model: Model) -> InputError:
     flags = {
         "duration": "--duration",
         "samples": "--samples",
+        "tolerance": "--tol",
         "assembly": "--assembly",
         "after": "--after",
         "events": "--stop-at",

@@ -16,7 +16,7 @@ from paraflex.checks import check_planned
 from paraflex.cli.bars import bars
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, say_where, tell
+from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import hold_results
@@ -29,7 +29,7 @@ from paraflex.cli.request import (
     with_frames,
 )
 from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of
-from paraflex.cli.writing import write_run
+from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -99,15 +99,15 @@ def _run_along(
         return exit_code(False, interrupted=result.interrupted)
     keep_findings(result.data, collected(verdict_of(result.data)))
     summary = result.to_dict()
-    write_run(result.data, summary, folder, report=request.report)
+    write_numbers(result.data, summary, folder)
 
     def show(out: Console) -> None:
         print_study(out, summary, task, _model_name(request, mechanism))
         validity(out, {name: mode.get("validity") for name, mode in summary["modes"].items()})
-        say_where(began, "results, figures", folder.path, report=request.report)
 
     tell(summary, show, as_json=request.json)
     failures(console, result)
+    write_drawn_run(result.data, folder, request, began)
     return exit_code(result.complete, interrupted=result.interrupted)
 
 

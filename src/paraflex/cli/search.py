@@ -32,9 +32,6 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
         console.print("interrupted before the first design was done")
         return signals.exit_code()
     numbers = result.to_dict()
-    if not result.interrupted:
-        with result.added() as new:
-            save_figures(numbers, new / "figures")
     verdict = study.base.setting.verdict()
 
     def show(out: Console) -> None:
@@ -43,6 +40,8 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
 
     more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
     tell(numbers | more, show, as_json=request.json, doubts=verdict)
+    if not result.interrupted:
+        save_figures(numbers, request.folder / "figures")
     return exit_code(bool(result.values), interrupted=result.interrupted)
 
 

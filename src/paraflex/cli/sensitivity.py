@@ -34,14 +34,14 @@ def sensitivity_command(request: SensitivityRequest) -> int:
         found = study.run()
         found.save_in(held)
         summary = found.to_dict()
+
+        def show(out: Console) -> None:
+            for row in range(len(found.rows)):
+                _print(out, found, row)
+            out.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
+
+        tell(summary, show, as_json=request.json)
         write_drawn(summary, held)
-
-    def show(out: Console) -> None:
-        for row in range(len(found.rows)):
-            _print(out, found, row)
-        out.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
-
-    tell(summary, show, as_json=request.json)
     return COMPLETE
 
 

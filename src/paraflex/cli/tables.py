@@ -6,10 +6,12 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.table import Table
 
 from paraflex.cli.collected import printed
+from paraflex.errors import printable
 from paraflex.findings import Finding
 
 if TYPE_CHECKING:
@@ -21,9 +23,18 @@ if TYPE_CHECKING:
 FINISHED = ("complete", "stopped")
 
 
+class _PlainConsole(Console):
+    """A console on which names from files do nothing: their control characters stand as escapes."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """The parts of what is printed; rich's own controls and styles stand beside the text, not in it."""
+        for part in super().render(renderable, options):
+            yield part if part.control else part._replace(text=printable(part.text))
+
+
 def plain_console(*, stderr: bool = False) -> Console:
     """A console that leaves square brackets alone: here they hold units."""
-    return Console(highlight=False, markup=False, stderr=stderr)
+    return _PlainConsole(highlight=False, markup=False, stderr=stderr)
 
 
 def warn_of(console: Console, findings: Iterable[Finding]) -> None:

@@ -73,22 +73,23 @@ def _verify(
     with counting(console) as report:
         verification = study.run(on_progress=report)
     summary = verification.to_dict()
-    if any(runs.base for by_model in verification.runs.values() for runs in by_model.values()):
-        data = verification.data
-        assert data is not None
+    data = verification.data
+    if data is not None:
         verification.save_in(folder)
-        write_drawn(data, folder, (lambda: verification_page(data, summary)) if request.report else None)
 
     def show(out: Console) -> None:
         for mode in summary["modes"]:
             print_agreement(out, summary, mode)
-        say_where(began, "numbers, figures", folder.path, report=request.report)
 
     tell(summary, show, as_json=request.json)
     for mode, by_model in verification.runs.items():
         for name, runs in by_model.items():
             if runs.failure:
                 console.print(f'error: mode "{mode}", {name}: {runs.failure}', soft_wrap=True)
+    if data is not None:
+        write_drawn(data, folder, (lambda: verification_page(data, summary)) if request.report else None)
+        if not request.json:
+            say_where(began, "numbers, figures", folder.path, report=request.report)
     return exit_code(verification.complete, interrupted=verification.interrupted)
 
 

@@ -7,20 +7,31 @@ from typing import Any
 
 import xarray as xr
 
+from paraflex.cli.commands.runs import RunRequest
+from paraflex.cli.ending import say_where
+from paraflex.errors import OutputError
 from paraflex.folders import ResultsFolder
 from paraflex.report import Page
 from paraflex.results import save_results
 from paraflex.writing import write_json
 
+_LATER = "paraflex plot and paraflex report draw them"
 
-def write_run(data: xr.Dataset, summary: dict[str, Any], folder: ResultsFolder, *, report: bool) -> None:
-    """Write results, their summary, figures, and the report if it is wanted."""
-    from paraflex.cli.report import page_of
 
+def write_numbers(data: xr.Dataset, summary: dict[str, Any], folder: ResultsFolder) -> None:
+    """Write a run and its summary, in place of the results before."""
     with folder.replaced() as new:
         save_results(data, new / "results.nc")
         write_json(new / "summary.json", summary)
-    write_drawn(data, folder, (lambda: page_of(data, folder.path)) if report else None)
+
+
+def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest, began: float) -> None:
+    """Add the figures of a run, and the report if it is wanted; say where all is."""
+    from paraflex.cli.report import page_of
+
+    write_drawn(data, folder, (lambda: page_of(data, folder.path)) if request.report else None)
+    if not request.json:
+        say_where(began, "results, figures", folder.path, report=request.report)
 
 
 def write_drawn(
@@ -29,9 +40,16 @@ def write_drawn(
     """Add figures, and a report where one is wanted, to results that are written: an interruption costs these alone."""
     from paraflex.plots import save_figures
 
-    with folder.amended() as new:
-        save_figures(results, new / "figures")
-        if page is not None:
-            from paraflex.report import save_page
+    try:
+        with folder.amended() as new:
+            save_figures(results, new / "figures")
+            if page is not None:
+                from paraflex.report import save_page
 
-            save_page(page(), new / "report.html")
+                save_page(page(), new / "report.html")
+    except KeyboardInterrupt as interrupt:
+        interrupt.args = (f"the numbers are in {folder.path}; {_LATER}",)
+        raise
+    except OutputError as error:
+        remedy = f"the numbers are in {folder.path}: once there is room, {_LATER}"
+        raise OutputError(error.problem, field=error.field, remedy=remedy) from error

@@ -1,1 +1,1 @@
-"""Designs: the numbers of a model that vary, and what their runs are judged by."""
+"""Designs: the parameters of a model, and the metrics of its runs."""

@@ -20,7 +20,7 @@ SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)
 
 
 def metric_of(column: str) -> Metric:
-    """The metric whose numbers stand in a column."""
+    """The metric of a column."""
     return METRICS[column.partition(".")[0]]
 
 
@@ -38,7 +38,7 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
 
 
 def metrics_of(names: Sequence[str], error: ErrorSpan | str) -> tuple[str, ...]:
-    """Metrics in the order asked for; all where none is, that error first.
+    """Metrics in the given order; all if none is given, with the ranking error first.
 
     Raises
     ------
@@ -51,13 +51,13 @@ def metrics_of(names: Sequence[str], error: ErrorSpan | str) -> tuple[str, ...]:
 
 
 def metric_columns(run: TrackingRun, names: Sequence[str]) -> tuple[str, ...]:
-    """Numbers that metrics give by name, NAME.MOTOR of those per motor."""
+    """Columns of the metrics by name, NAME.MOTOR for those per motor."""
     motors = [motor.name for motor in run.task.mechanism.motors]
     return tuple(column for name in names for column in METRICS[name].columns(motors))
 
 
 def metric_values(traces: Traces, nominal: Traces, names: Sequence[str]) -> NDArray[Any]:
-    """Numbers of `metric_columns` of a run near another."""
+    """Numbers of `metric_columns` for a run near another."""
     return np.concatenate([np.zeros(0), *(np.ravel(METRICS[name].formula(traces, nominal)) for name in names)])
 
 
@@ -80,7 +80,7 @@ def measure(run: TrackingRun, names: Sequence[str]) -> dict[str, float | int]:
 
 
 def smooth_metrics(names: Sequence[str]) -> tuple[str, ...]:
-    """Those metrics that have derivatives."""
+    """The metrics that have derivatives."""
     return tuple(name for name in names if METRICS[name].smooth)
 
 
@@ -100,6 +100,6 @@ def check_smooth(names: Sequence[str]) -> None:
 
 
 def beyond_limits(runs: int) -> str:
-    """What to tell of runs whose validity is above 1."""
+    """A sentence on runs whose validity is above 1."""
     which = "one run is" if runs == 1 else f"{runs} runs are"
     return f"{which} beyond what the model can describe (column {VALIDITY} above 1): use second-order geometry"

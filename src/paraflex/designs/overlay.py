@@ -17,7 +17,7 @@ _PART = re.compile(r'\s*(?:"([^"]*)"|\'([^\']*)\'|([^."\'\s]+))\s*(\.|\Z)')
 
 
 def find_place(data: Mapping[str, Any], field: str) -> Place:
-    """Where a number stands in a model's data.
+    """Place of a number in a model's data.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def number_at(data: Mapping[str, Any], place: Place) -> float:
 
 
 def overlaid(data: dict[str, Any], numbers: Sequence[tuple[Place, float | int]]) -> dict[str, Any]:
-    """A model's data with numbers in place of those there; what is not on the way to one is shared, not copied."""
+    """A model's data with other numbers at given places; unchanged tables are shared, not copied."""
     out: Any = dict(data)
     for place, number in numbers:
         inside: Any = out

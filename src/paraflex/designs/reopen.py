@@ -1,4 +1,4 @@
-"""A study's folder opened again: what was varied in what, and single runs of it made once more."""
+"""A study's folder opened again: its parameters and mechanism, and single runs repeated."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _AGAIN = "run the study again, in a new folder"
 
 @dataclass(frozen=True)
 class StudyFolder:
-    """What a folder's `study.json` says.
+    """Content of a folder's `study.json`.
 
     Attributes
     ----------
@@ -51,14 +51,14 @@ class StudyFolder:
 
     @property
     def same_versions(self) -> bool:
-        """Whether runs made now are those of the folder to the last bit."""
+        """Whether runs made now would equal those of the folder to the last bit."""
         return all(versions()[name] == had for name, had in self.versions.items() if name in versions())
 
 
 def study_account(
     name: str, setting: Setting, parameters: Sequence[Varied], content: Mapping[str, Any], **more: Any
 ) -> dict[str, Any]:
-    """What the `study.json` of a folder is to say.
+    """Content of the `study.json` of a folder.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def open_study(folder: str | Path) -> StudyFolder:
             versions=account.get("versions", {}),
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError("not the study of a folder of ours", field=str(folder / STUDY), remedy=_AGAIN) from error
+        raise InputError("not a study.json of paraflex", field=str(folder / STUDY), remedy=_AGAIN) from error
 
 
 def run_again(
@@ -105,7 +105,7 @@ def run_again(
     mode: str,
     watch: Callable[[float], None] | None = None,
 ) -> tuple[xr.Dataset, dict[str, float | int]]:
-    """A run of a design as `paraflex run` keeps it, and its metrics.
+    """A run of a design with all its samples, and its metrics.
 
     Parameters
     ----------

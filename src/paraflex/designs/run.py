@@ -1,4 +1,4 @@
-"""One design along one path in every mode: the one function that all engines call."""
+"""One design along one path in every mode: the function that all engines of a campaign call."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task.
+    """Result of a task.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Outcome:
 
 
 class Abandoned(Exception):
-    """A run was told to stop; nothing of it counts."""
+    """A run was asked to stop; its results are discarded."""
 
 
 def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None = None) -> Outcome:
@@ -102,7 +102,7 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
 
 
 def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOptions]:
-    """The planned motion of a design along its path, and how its runs are integrated.
+    """The planned motion of a design along its path, and the integration options of its runs.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
 
 
 def table_schema(setting: Setting, motors: Sequence[str]) -> pa.Schema:
-    """Columns of rows: runs, parameters, how they ended, metrics; with units in the fields' metadata."""
+    """Columns of rows: runs, parameters, status, metrics; with units in the fields' metadata."""
     import pyarrow as pa
 
     whole, real, text = pa.int64(), pa.float64(), pa.string()
@@ -145,13 +145,13 @@ def trouble(error: Exception) -> Row:
 
 
 def lost(setting: Setting, task: Task, reason: str) -> Outcome:
-    """Rows of a task that no worker survives."""
+    """Rows of a task that killed its workers."""
     rows = [_blank(setting, task, mode) | {"status": FAILED, "reason": reason} for mode in setting.modes]
     return Outcome(task, rows)
 
 
 def run_id(setting: Setting, task: Task, mode: str) -> str:
-    """Of a run, from all it depends on: the same design of the same file has the same one in any study."""
+    """Identity of a run, a digest of everything it depends on: the same in any study."""
     numbers = sorted((str(place), number) for place, number in setting.numbers(task.values))
     return digest([setting.identity, numbers, task.path, mode])[:_ID_DIGITS]
 
@@ -191,12 +191,12 @@ def _check_versions(setting: Setting) -> None:
         if versions()[name] != wanted:
             raise InputError(
                 f"a worker has {name} {versions()[name]}, the sweep was begun with {wanted}", field="--cluster",
-                remedy="give workers the same installation: results must not depend on who computes them",
+                remedy="give workers the same installation: results must not depend on the worker",
             )  # fmt: skip
 
 
 def _compile(mechanism: Mechanism) -> None:
-    """Compile the kernels where whoever started this process has not: once a process and geometry."""
+    """Compile the kernels if the parent process has not, once per process and geometry."""
     if mechanism.geometry not in _compiled:
         with _compiling:
             if mechanism.geometry not in _compiled:

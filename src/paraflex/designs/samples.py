@@ -71,7 +71,7 @@ class Varied:
 
 
 def check_varied(parameter: Varied, kind: str) -> None:
-    """Nothing, if a parameter says what a kind of sampling asks for.
+    """Check that a parameter has the fields that a kind of sampling needs.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def check_varied(parameter: Varied, kind: str) -> None:
             raise InputError("has no values", field=f"{where}.values", value=[], remedy="give at least one")
         return
     if kind == LIST:
-        raise InputError("is missing", field=f"{where}.values", remedy="give a list of numbers, one a design")
+        raise InputError("is missing", field=f"{where}.values", remedy="give a list of numbers, one per design")
     for side in ("low", "high"):
         if getattr(parameter, side) is None:
             raise InputError("is missing", field=f"{where}.{side}", remedy="give low and high, or values")
@@ -202,7 +202,7 @@ def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, s
         lengths = {p.name: len(p.values or ()) for p in parameters}
         if len(set(lengths.values())) > 1:
             listed = ", ".join(f"{name}: {length}" for name, length in lengths.items())
-            raise InputError(f"lists of different lengths ({listed})", field="vary", remedy="give one value a design")
+            raise InputError(f"lists of different lengths ({listed})", field="vary", remedy="give one value per design")
 
 
 def _check_total(total: int, field: str) -> None:

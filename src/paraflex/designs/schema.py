@@ -1,4 +1,4 @@
-"""The study file of a sweep as pydantic sees it, and how study files are read."""
+"""The schema of a sweep's study file in pydantic, and a function that reads study files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Table(BaseModel):
 
 
 class VaryTable(Table):
-    """A parameter that varies."""
+    """A parameter."""
 
     fields: list[Text] = Field(default=[], description="fields of the mechanism's file, all given the same number")
     values: list[Any] | None = Field(default=None, description="a list of numbers")
@@ -34,7 +34,7 @@ class VaryTable(Table):
 
 
 class SamplingTable(Table):
-    """How designs are taken from the ranges of the parameters."""
+    """Sampling of the ranges of the parameters."""
 
     kind: Literal["grid", "list", "random", "sobol"] = Field(
         default="grid", description='"grid", "list", "random" or "sobol"'
@@ -44,7 +44,7 @@ class SamplingTable(Table):
 
 
 class IntegrationTable(Table):
-    """How runs are integrated; the mechanism's [study] and the program's defaults where nothing is said."""
+    """Integration of the runs; by default that of the mechanism's [study], then the program's."""
 
     method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
     tolerance: Number | None = Field(default=None, description="the tolerance in m")
@@ -76,7 +76,7 @@ class SweepTable(Table):
 
 @contextmanager
 def study_table(kind: type[T], file: str | Path) -> Iterator[tuple[T, Path]]:
-    """A study file as its schema has it, and its folder; errors of what is made of them name the file.
+    """A study file by its schema, and its folder; errors of what is made of it name the file.
 
     Raises
     ------

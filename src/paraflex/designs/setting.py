@@ -1,4 +1,4 @@
-"""What all runs of a study have in common: a mechanism, which of its numbers vary, and how it is run."""
+"""Common settings of all runs of a study: a mechanism, its parameters, and how it is run."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.files import Model, library_names, model_from
 from paraflex.files.generators import is_generated
 from paraflex.files.model import read_model
+from paraflex.files.read import exists
 from paraflex.findings import Verdict
 from paraflex.integrators import IntegrationOptions, check_times
 from paraflex.mechanism.quantities import known
@@ -42,7 +43,7 @@ _PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
 @dataclass(frozen=True)
 class Setting:
-    """All that a run needs besides its own numbers; goes to worker processes.
+    """All inputs of a run but its own numbers; sent to worker processes.
 
     Attributes
     ----------
@@ -92,12 +93,12 @@ class Setting:
 
     @cached_property
     def identity(self) -> str:
-        """Of what all runs have in common, for their ids."""
+        """Digest of the common settings of all runs, for their ids."""
         asked = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
         return digest([dict(self.data), *asked])
 
     def numbers(self, values: tuple[float, ...]) -> list[tuple[Place, float | int]]:
-        """Every place that a design sets, and to what."""
+        """Every place that a design sets, and its value."""
         return [
             (place, int(value) if whole else value)
             for places, whole, value in zip(self.places, self.whole, values, strict=True)
@@ -105,7 +106,7 @@ class Setting:
         ]
 
     def design(self, values: tuple[float, ...]) -> tuple[Model, IntegrationOptions]:
-        """A design's model, and how its runs are integrated.
+        """A design's model, and the integration options of its runs.
 
         Raises
         ------
@@ -119,7 +120,7 @@ class Setting:
         return model, self.options(model, chosen)
 
     def parts(self) -> dict[str, Part]:
-        """Of the paths that runs are too short for, which part they do: of the design that the file describes."""
+        """The part of each path that runs too short for it do, for the design that the file describes."""
         model = model_from(dict(self.data), self.source)
         found = {}
         for name in self.paths:
@@ -128,13 +129,13 @@ class Setting:
         return {name: part for name, part in found.items() if part is not None}
 
     def verdict(self) -> Verdict:
-        """What is doubtful about the design that the file describes, and which paths runs are too short for."""
+        """Findings on the design that the file describes, and on paths for which runs are too short."""
         model = model_from(dict(self.data), self.source)
         parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
         return Verdict([*doubtful_numbers(model.mechanism), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
-        """How the runs of a design are integrated: as the design chooses, then as the study says, else as its file.
+        """Integration options of a design: its own, else those of the study, else those of its file.
 
         Raises
         ------
@@ -145,7 +146,7 @@ class Setting:
 
 
 def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Varied, ...], Model]:
-    """What all runs of a study have in common, its parameters, and the mechanism's model as its file has it.
+    """The common settings of a study, its parameters, and the mechanism's model as in its file.
 
     Raises
     ------
@@ -179,18 +180,18 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
 
 @cache
 def versions() -> Mapping[str, str]:
-    """Of the packages that results depend on."""
+    """Versions of the packages that results depend on."""
     return {name: version(name) for name in _PACKAGES}
 
 
 def digest(content: Any) -> str:
-    """SHA-256 of plain values, whatever the order of keys."""
+    """SHA-256 of plain values, independent of the order of keys."""
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def _mechanism(name: str, folder: FilePath) -> str:
     beside = folder / name
-    return str(beside) if name not in library_names() and not is_generated(name) and beside.exists() else name
+    return str(beside) if name not in library_names() and not is_generated(name) and exists(beside) else name
 
 
 def _varied(name: str, entry: VaryTable) -> Varied:
@@ -256,7 +257,7 @@ def _integration(table: SweepTable) -> dict[str, Any]:
 
 
 def _check(setting: Setting, model: Model) -> None:
-    """Check that what every run has in common can be."""
+    """Check the common settings of all runs."""
     model.check_start()
     try:
         setting.options(model)

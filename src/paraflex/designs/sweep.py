@@ -1,4 +1,4 @@
-"""Thousands of runs of a mechanism whose numbers vary: one row each, whoever computes them and however often begun."""
+"""Sweeps: thousands of runs of a mechanism, one row each, independent of the workers and of restarts."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ RunTask = Callable[..., Outcome]
 
 @dataclass(frozen=True)
 class SweepResult(KeptResult):
-    """Where a sweep stands after a session.
+    """State of a sweep after a session.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ class SweepStudy(Study["SweepResult"]):
         limit: int | None = None,
         run: RunTask = run_task,
     ) -> SweepResult:
-        """Do the runs that a folder has no rows of yet; see `Study.run`.
+        """Do the runs that a folder has no rows for yet; see `Study.run`.
 
         Parameters
         ----------
@@ -221,7 +221,7 @@ def load_sweep(file: str | Path) -> SweepStudy:
 
 
 def make_study(table: SweepTable, folder: Path) -> SweepStudy:
-    """A study as a file in a folder says it; see `load_sweep`."""
+    """A study from a file in a folder; see `load_sweep`."""
     setting, parameters, model = make_setting(table, folder)
     for parameter in parameters:
         check_varied(parameter, table.sampling.kind)
@@ -246,7 +246,7 @@ def sweep(
     on_progress: OnProgress | None = None,
     run: RunTask = run_task,
 ) -> SweepResult:
-    """Do the runs of a study, or of its file, that a folder has no rows of yet.
+    """Do the runs of a study, or of its file, that a folder has no rows for yet.
 
     `study.run(folder)` in one call: see there and `Workers`.
     """
@@ -255,7 +255,7 @@ def sweep(
 
 
 class _Session:
-    """One session of a sweep: what is done, and how it ended."""
+    """One session of a sweep: its finished runs, and how it ended."""
 
     def __init__(self, study: SweepStudy, campaign: Campaign, on_progress: OnProgress | None) -> None:
         self.study, self.setting, self.campaign = study, study.setting, campaign
@@ -272,7 +272,7 @@ class _Session:
         return bool(np.all(self.done))
 
     def go(self, engine: Engine, run: Callable[..., Outcome], limit: int | None) -> bool:
-        """Do what is left; whether the user stopped it. The engine is closed."""
+        """Do the remaining runs; whether the user stopped it. The engine is closed."""
         began = time.perf_counter()
         try:
             with engine:

@@ -1,4 +1,4 @@
-"""Units of the numbers of a mechanism's file, from what its schema says of them."""
+"""Units of the numbers of a mechanism's file, from the descriptions in its schema."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _UNIT = re.compile(rf"\bin ({'|'.join(map(re.escape, _UNITS))})(?=[\s,.)]|$)")
 
 @cache
 def unit_of(place: Place) -> str:
-    """The unit of a number of a mechanism's file, or of a study's [integration]; empty where none is given."""
+    """The unit of a number of a mechanism's file, or of a study's [integration]; empty if it has none."""
     descriptions = list(_descriptions((ModelTable, IntegrationTable, SweepTable), place))
     found = [match.group(1) for match in map(_UNIT.search, descriptions) if match]
     return found[0] if found and len(set(found)) == 1 else ""
 
 
 def _descriptions(kinds: tuple[Any, ...], place: Place) -> Iterator[str]:
-    """What is said of the field at a place, by each of the tables that may stand there."""
+    """Descriptions of the field at a place, by each of the tables that may be there."""
     key, *rest = place
     for kind in kinds:
         field = kind.model_fields.get(str(key)) if isinstance(kind, type) and issubclass(kind, BaseModel) else None
@@ -45,7 +45,7 @@ def _descriptions(kinds: tuple[Any, ...], place: Place) -> Iterator[str]:
 
 
 def _inside(annotation: Any) -> tuple[tuple[Any, ...], int]:
-    """The tables within an annotation, and how many keys of dicts and lists lead to them."""
+    """The tables within an annotation, and the number of keys of dicts and lists that lead to them."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return (annotation,), 0
     arguments = get_args(annotation)

@@ -1,4 +1,4 @@
-"""Brakes: joints locked from an instant on, at the angle or travel they then have."""
+"""Brakes: joints locked from an instant on, at the angle or travel of that instant."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ class Braked:
     rows: tuple[int, ...]
 
     def holding(self, multipliers: Array) -> Array:
-        """What the brakes hold with (k, joints), signed as motors' torques [N m, N], from multipliers (k, m)."""
+        """Torques of the brakes (k, joints), signed as those of motors [N m, N], from multipliers (k, m)."""
         # Phi_q^T lambda stands on the left of the equations, a motor's torque on the right.
         return -multipliers[:, list(self.rows)]
 
 
 def brake(system: System, state: State, joints: Sequence[str]) -> Braked:
-    """Lock joints at a state, at once and without rebound.
+    """Lock joints at a state by a plastic impact.
 
     Velocities become the nearest, in the metric of mass, that locked joints allow: an inelastic engagement,
     v+ = v - M^-1 C^T (C M^-1 C^T)^-1 C v, with C the derivatives of constraints and locked joints. It takes the kinetic

@@ -1,4 +1,4 @@
-"""How far a body bends from its chord: the same number whatever the body frame is."""
+"""Deflections of a body from its chord, which do not depend on the body frame."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from paraflex.arrays import Array
 
 
 def across_chord(stations: Array, rest: Array) -> Array:
-    """How far stations of a bent body are from their places across its chord [m], (k, s); positive to the left.
+    """Distances of stations of a deformed body from their places across its chord [m], (k, s); positive to the left.
 
     The chord is the line from the first station to the last. A station of a beam has its place on that line; one of a
     body of another form has it where it stands beside the chord of the undeformed body. A rigid motion changes nothing.
@@ -29,7 +29,7 @@ def across_chord(stations: Array, rest: Array) -> Array:
 
 
 def _across(stations: Array) -> Array:
-    """Coordinates of stations across the line from the first to the last."""
+    """Coordinates of stations normal to the line from the first to the last."""
     arms = stations - stations[:, :1]
     x, y = arms[:, -1:, 0], arms[:, -1:, 1]
     # No norm and no magnitude: a complex step goes through roots and products.

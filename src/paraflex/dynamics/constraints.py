@@ -1,4 +1,4 @@
-"""What joints, springs, dampers, friction and prescribed motions hold, part by part, and in which order."""
+"""Constraints of joints and compliant members, part by part, and their order."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from paraflex.mechanism import Joint, Mechanism, PointRef, Relation
 
 @dataclass(frozen=True)
 class Term:
-    """What a joint contributes to a constraint: a quantity of point b less that of point a, times a weight.
+    """A part of a joint's constraint: a quantity of point b less that of point a, times a weight.
 
     Attributes
     ----------
@@ -75,12 +75,12 @@ class Constraint:
 
     @property
     def points(self) -> Iterator[PointRef]:
-        """Of all terms."""
+        """Points of all terms."""
         return (ref for term in self.terms for ref in (term.a, term.b))
 
 
 def _joint_constraints(joint: Joint) -> list[Constraint]:
-    """What a joint holds."""
+    """Constraints of a joint."""
     name, a, b = joint.name, joint.a, joint.b
     normal, carrier = joint.direction + 0.5 * np.pi, "track" if joint.follows_beam else "material"
     axis = Term(name, AXIS, a, b, direction=normal, carrier=carrier)
@@ -93,7 +93,7 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
 
 
 def axis_of(joint: Joint) -> dict[str, Any]:
-    """Direction and carrier of the axis that a joint's travel is measured on."""
+    """Direction and carrier of the axis along which a joint's travel is measured."""
     return {"direction": joint.direction, "carrier": "frame" if joint.follows_beam else "material"}
 
 
@@ -105,7 +105,7 @@ def _coordinate(joint: Joint, weight: float = 1.0) -> Term:
 
 
 def _what(joint: Joint) -> str:
-    """What a joint's coordinate is."""
+    """Kind of a joint's coordinate."""
     return "travel" if joint.slides else "angle"
 
 
@@ -136,12 +136,12 @@ def _relation_constraint(mechanism: Mechanism, one: Relation) -> Constraint:
 
 
 def constraint_count(mechanism: Mechanism) -> int:
-    """How many constraints joints, prescribed motions and gears are, redundant ones included."""
+    """Number of constraint rows of joints, prescribed motions and gears, redundant ones included."""
     return sum(len(one.labels) for one in _constraints(mechanism) if one.row == CONSTRAINT)
 
 
 def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
-    """Constraints in an order that keeps the envelope of the Schur complement small (reverse Cuthill-McKee)."""
+    """An order of constraints with a small envelope of the Schur complement (reverse Cuthill-McKee)."""
     constraints = _constraints(mechanism)
     if not constraints:
         return []

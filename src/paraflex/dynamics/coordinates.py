@@ -1,4 +1,4 @@
-"""A body's coordinates and its material points: which slice of q is whose."""
+"""Coordinates and material points of a body: the only place that maps slices of q to bodies."""
 
 from __future__ import annotations
 
@@ -22,11 +22,13 @@ from paraflex.fem import (
 from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
+# The least eigenvalue of a body's mass matrix, scaled to ones along its diagonal, that is more than rounding.
+_SINGULAR = 1e-14
 
 
 @dataclass(frozen=True)
 class BodyCoordinates:
-    """Where a body's coordinates stand and what they mean.
+    """Indices of a body's coordinates in q, and the data to interpret them.
 
     Attributes
     ----------
@@ -54,7 +56,7 @@ class BodyCoordinates:
 
     @property
     def mesh(self) -> BeamMesh | None:
-        """Of a flexible beam; None for any other body."""
+        """Mesh of a flexible beam; None for any other body."""
         return self.shape.mesh
 
     @property
@@ -69,17 +71,17 @@ class BodyCoordinates:
 
     @property
     def position(self) -> slice:
-        """Of r in q."""
+        """Slice of r in q."""
         return slice(self.offset, self.offset + 2)
 
     @property
     def flexible(self) -> slice:
-        """Of the modal coordinates in q."""
+        """Slice of the modal coordinates in q."""
         return slice(self.offset + 3, self.offset + 3 + self.nf)
 
     @property
     def all(self) -> slice:
-        """Of every coordinate of the body in q."""
+        """Slice of all coordinates of the body in q."""
         return slice(self.offset, self.offset + 3 + self.nf)
 
     def slopes(self, q: Array) -> Array:
@@ -113,7 +115,7 @@ class Marker:
 
     @property
     def on_frame(self) -> Marker:
-        """The same place, fixed in the body frame: it does not follow the deformation."""
+        """The same place fixed to the body frame, without the deformation."""
         return replace(self, N=np.zeros_like(self.N), slope=np.zeros_like(self.slope), bending=None)
 
     def place(self, u: Array) -> Array:
@@ -147,26 +149,48 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry, like: ModalBas
             integrals = integrals.without_flexibility()
         modes = modal_basis(integrals)
     except np.linalg.LinAlgError as error:
-        raise InputError(
-            "its mass matrix is not positive definite",
-            field=f"body.{body.name}",
-            remedy="check section, material and lumped masses for values many orders of magnitude apart",
-        ) from error
+        raise _not_definite(body.name) from error
     if like is not None:
         modes = modes.like(like, integrals.Mff)
     elif not isinstance(body, RigidBody) and body.modes is not None:
         modes = modes.lowest(body.modes)
     integrals = integrals.in_basis(modes.vectors)
+    _check_mass(body.name, integrals)
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
         points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
     return BodyCoordinates(body.name, offset, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
 
 
+def _check_mass(name: str, body: ShapeIntegrals) -> None:
+    """The mass matrix of a whole body, undeformed, is positive definite beyond rounding.
+
+    It is not where what is left of its inertia about its centre of mass is rounding beside that about its origin.
+    """
+    rigid = [[body.m, 0.0, -body.S1[1]], [0.0, body.m, body.S1[0]], [-body.S1[1], body.S1[0], body.I0 + body.J]]
+    mass = np.real(np.array(rigid))
+    if body.nf:
+        coupling = np.real(np.vstack([body.S2, body.G1 + body.Jf]))
+        mass = np.block([[mass, coupling], [coupling.T, np.real(body.Mff)]])
+    if np.all(np.isfinite(mass)) and np.all(np.diag(mass) > 0.0):
+        size = np.sqrt(np.diag(mass))
+        if np.linalg.eigvalsh(mass / size / size[:, None])[0] > _SINGULAR:
+            return
+    raise _not_definite(name)
+
+
+def _not_definite(name: str) -> InputError:
+    return InputError(
+        "its mass matrix is not positive definite, or only by rounding", field=f"body.{name}",
+        remedy="check inertia, centre of mass, section, material and lumped masses for values many orders of "
+        "magnitude apart",
+    )  # fmt: skip
+
+
 def make_marker(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], ref: PointRef
 ) -> Marker:
-    """The material point of that name; of the ground, a place without a body."""
+    """The material point of a name; for the ground, a place without a body."""
     if ref.on_ground:
         return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point]) * 1.0, np.zeros((2, 0)), np.zeros(0))
     i = index[ref.body]
@@ -177,7 +201,7 @@ def make_marker(
 
 
 def end_markers(index: int, body: BodyCoordinates) -> tuple[Marker, ...]:
-    """First and last end of a beam or bar, first and last point of a modal body; none of a rigid body."""
+    """First and last end of a beam or bar, first and last point of a modal body; none for a rigid body."""
     if body.mesh is None:
         return tuple(_point_marker(index, body, point) for point in body.shape.ends)
     return node_marker(index, body, 0), node_marker(index, body, body.mesh.n_elements)

@@ -1,4 +1,4 @@
-"""The damping matrix of a flexible body: that of its modes as its joints hold it, in the coordinates of its frame.
+"""The damping matrix of a flexible body: that of its modes with its joints held, in the coordinates of its frame.
 
 Damping ratios belong to a vibration, and how a body vibrates is a matter of how it is held, not of the frame that its
 deformation is described in. Its points are held as its joints hold them, the bodies on their other sides at rest:
@@ -43,7 +43,7 @@ _ROUNDING = 1e-9
 def damping_matrix(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
 ) -> Array:
-    """Damping matrix of a body in its modal coordinates (nf, nf) [1/s], exactly diagonal where it is so to rounding.
+    """Damping matrix of a body in its modal coordinates (nf, nf) [1/s], exactly diagonal if it is so to rounding.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def _by_modes(damping: Damping, squares: Numbers, omega: Numbers, modes: Numbers
 
 
 def _without_rounding(matrix: Numbers) -> Numbers:
-    """The matrix symmetric, with zeros for off-diagonal entries that are rounding."""
+    """The symmetric matrix, with zeros for off-diagonal entries of the size of rounding."""
     sizes = np.sqrt(np.abs(np.real(np.diag(matrix))))
     small = np.abs(np.real(matrix)) <= _ROUNDING * np.outer(sizes, sizes)
     np.fill_diagonal(small, False)
@@ -81,7 +81,7 @@ def _without_rounding(matrix: Numbers) -> Numbers:
 
 
 def _held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]:
-    """Frequencies (k,) and flexible part (nf, k) of the mass-normalised elastic modes of a body held by conditions.
+    """Frequencies (k,) and flexible part (nf, k) of the mass-normalised elastic modes of a body under conditions.
 
     `held` has a row a condition on its coordinates (r, phi, u), which are zero together.
     """
@@ -101,7 +101,7 @@ def _held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]
 
 
 def _null_space(rows: Numbers) -> tuple[Numbers, int]:
-    """Columns that span the null space of conditions on (r, phi, u), and how many rigid motions are in it."""
+    """Columns that span the null space of conditions on (r, phi, u), and the number of rigid motions in it."""
     n = rows.shape[1]
     if not rows.size:
         return np.eye(n), 3
@@ -119,7 +119,7 @@ def _null_space(rows: Numbers) -> tuple[Numbers, int]:
 def _conditions(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
 ) -> Iterator[Numbers]:
-    """Rows on (r, phi, u) of the undeformed body that its joints hold at zero: see the module."""
+    """Conditions of a body's joints as rows on (r, phi, u) of the undeformed body: see the module."""
     pinned: list[Marker] = []
     across: list[Marker] = []
     driven = {prescribed.joint for prescribed in mechanism.prescribed}
@@ -149,7 +149,7 @@ def _conditions(
 
 
 def _along_itself(joint: Joint, here: PointRef) -> bool:
-    """Whether a joint slides along the body of this point."""
+    """Whether a joint slides along the body of a point."""
     return joint.slides and "angle" not in joint.holds and here is joint.a
 
 

@@ -1,4 +1,4 @@
-"""Which motors move what: the freedoms that sets of motors reach at a pose."""
+"""The degrees of freedom that sets of motors drive at a pose."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SETS_TRIED, _SETS_KEPT = 20_000, 1000
 
 @dataclass(frozen=True)
 class Reach:
-    """Which motors move what.
+    """Degrees of freedom that motors drive at a pose.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Reach:
 
 
 def reach(system: System, state: State, freedoms: int) -> Reach:
-    """Freedoms that motors reach at a pose with so many freedoms, and the smallest sets of motors that reach all.
+    """Degrees of freedom that motors drive at a pose, and the smallest sets of motors that drive all of them.
 
     With S the columns of the motors' joint coordinates and Z a basis of the motions that constraints allow, motors
     reach as many as the rank of B = Z^T S; it is that of S^T Z (Z^T M Z)^-1 Z^T S, accelerations per torque, which asks
@@ -71,6 +71,6 @@ def reach(system: System, state: State, freedoms: int) -> Reach:
 
 
 def _rank(effect: Array, chosen: Sequence[int]) -> int:
-    """Independent directions in which the chosen motors act."""
+    """Number of independent directions in which the chosen motors act."""
     values = np.linalg.eigvalsh(effect[np.ix_(chosen, chosen)]) if len(chosen) else np.zeros(0)
     return int(np.sum(values > _WEAK * values.max(initial=0.0)))

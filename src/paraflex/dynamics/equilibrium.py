@@ -1,4 +1,4 @@
-"""Equilibrium under weight, loads and springs: at rest, some joints held, and in the motion that drives prescribe."""
+"""Equilibrium under weight, loads and springs: at rest with some joints held, and in a prescribed motion."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import CONSTRAINT, INDEX_1
 from paraflex.kernel.stage import equations
+from paraflex.limits import solvable
 
 _MAX_ITERATIONS = 50
 # Newton's iteration has converged when it moves links by less than this [sizes of the mechanism, rad] ...
@@ -43,8 +44,9 @@ Motion = Callable[[Array], tuple[Array, Array]]
 
 
 @checked_arguments()
+@solvable("an equilibrium")
 def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -> State:
-    """The state of rest nearest a start: all forces balance, joints closed, the angles of held joints kept.
+    """The state of rest nearest a start: all forces in balance, joints closed, the angles of held joints kept.
 
     Newton's iteration on forces and constraints, with the Jacobian by differences. Motors that hold may do so with any
     torque; those that do not hold give none. A mechanism that nothing holds in some direction must be held there by
@@ -66,8 +68,9 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
     return State(start.time, _find(system, start, held, None), np.zeros(system.n))
 
 
+@solvable("an equilibrium")
 def moving_equilibrium(system: System, start: State, motion: Motion) -> Array:
-    """The pose (n,) nearest a start at which all forces balance those of inertia in a motion.
+    """The pose (n,) nearest a start at which forces balance the inertia forces of a motion.
 
     The iteration of `static_equilibrium` with M a + h(q, v) among the forces, dampers and friction at joints too;
     v and a follow every iteration.
@@ -160,7 +163,7 @@ def _sparse_equilibrium(system: System, start: State, held: Sequence[str], motio
 
 
 def _solve(K: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, f: Array, r: Array) -> tuple[Array, Array]:
-    """[K, C^T; C, 0] [x; mu] = [f; r]. K is indefinite: unlike `sparse.Saddle` this regularises nothing."""
+    """Solve [K, C^T; C, 0] [x; mu] = [f; r]. K is indefinite, so unlike `sparse.Saddle` this does not regularise."""
     size = max(1.0, float(abs(K).max()))
     matrix = scipy.sparse.csc_matrix(scipy.sparse.bmat([[K / size, C.T], [C, None]]))
     right, factor = np.concatenate([f / size, r]), scipy.sparse.linalg.splu(matrix)
@@ -170,12 +173,12 @@ def _solve(K: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, f: Array, r: 
 
 
 def _largest_move(system: System, change: Array) -> float:
-    """How far a change of coordinates moves links [sizes of the mechanism, rad]."""
+    """The largest displacement or turn of links by a change of coordinates [sizes of the mechanism, rad]."""
     return max(float(np.max(np.abs(change / system.units)[body.offset : body.offset + 3])) for body in system.bodies)
 
 
 class _Residual:
-    """Forces, constraints and held joints at (q, multipliers, holding torques), in motion at `v` and `a` (n,)."""
+    """Residuals of forces, constraints and held joints at (q, multipliers, torques), in motion at `v` and `a` (n,)."""
 
     def __init__(self, system: System, start: State, held: Sequence[str]) -> None:
         mechanism = system.mechanism

@@ -1,4 +1,4 @@
-"""Which function of time is whose: those of the motors come first, then those of prescribed motions."""
+"""Order of the functions of time: motors first, then prescribed motions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from paraflex.mechanism import Mechanism
 
 
 class Inputs(NamedTuple):
-    """Numbers of a mechanism's signals, as `pack_signals` orders them and kernels ask for them.
+    """Numbers of a mechanism's signals, in the order of `pack_signals`, by which kernels find them.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a joint's motor turns or moves: the angle of a revolute joint, the travel of a prismatic joint or slot."""
+"""The coordinate on which a joint's motor acts: the angle of a revolute joint, the travel of a joint that slides."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None
 
 
 def place_along_beam(system: System, name: str, q: Array) -> Array:
-    """How far from its beam's first end (k,) the point of a sliding joint stands in the undeformed beam [m]."""
+    """Distance from the beam's first end (k,) of the point of a sliding joint, in the undeformed beam [m]."""
     joint = system.mechanism.joint(name)
     return joint_coordinate(system, name, q).value + system.marker(joint.a).x0[0]
 
 
 def axis_marker(system: System, joint: Joint) -> Marker:
-    """What carries a joint's axis: the material at point a, of a sliding joint the body's frame there."""
+    """Carrier of a joint's axis: the material at point a; for a sliding joint the body's frame there."""
     marker = system.marker(joint.a)
     return marker.on_frame if joint.follows_beam else marker
 
@@ -61,7 +61,7 @@ def axis_angle(system: System, joint: Joint, q: Array) -> Array:
 
 
 def material_angle(system: System, ref: PointRef, q: Array) -> Array:
-    """Angle (k,) of the material at a point, of its body and the slope there; zero on the ground [rad]."""
+    """Angle (k,) of the material at a point, that of its body and the slope; zero on the ground [rad]."""
     return _angle(system, ref, q)[0]
 
 

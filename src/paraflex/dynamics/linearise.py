@@ -22,6 +22,7 @@ from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiff
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
 from paraflex.dynamics.system import System
+from paraflex.limits import solvable
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix as Sparse
@@ -70,6 +71,7 @@ class Vibration:
 
 
 @checked_arguments()
+@solvable("natural frequencies")
 def natural_frequencies(
     system: System,
     state: State,
@@ -109,13 +111,13 @@ def natural_frequencies(
 
 
 def _with_joints(system: System, jacobian: Sparse, q: Array, joints: Sequence[str]) -> Sparse:
-    """Constraint rows, and below them those of the joints' angles or travels."""
+    """Constraint rows, followed by those of the joints' angles or travels."""
     rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
     return scipy.sparse.csr_matrix(scipy.sparse.vstack([jacobian, *rows]))
 
 
 def _forces_at_rest(system: System, state: State, M: Sparse, C: Sparse) -> tuple[Array, float]:
-    """Multipliers (m,) of joints and springs at rest, motors giving what holds them; the acceleration that is left."""
+    """Multipliers (m,) of joints and springs at rest with motors holding; the remaining acceleration."""
     forces, lam = RestingForces(system, state.time), np.zeros(system.m)
     springs = forces.springs
     lam[springs] = forces(state.q, lam)[1] / system.packed.rows["compliance"][springs]
@@ -125,7 +127,7 @@ def _forces_at_rest(system: System, state: State, M: Sparse, C: Sparse) -> tuple
 
 
 def _typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
-    """A square of a frequency to measure others by: the lowest of any body, else by springs and weight, else one."""
+    """A reference for squares of frequencies: the lowest of any body, else by springs and weight, else one."""
     if np.any(elastic > 0.0):
         return float(np.min(elastic[elastic > 0.0]))
     largest = float(np.max(np.abs(other.diagonal()) / np.asarray(M.diagonal()), initial=0.0))
@@ -133,7 +135,7 @@ def _typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
 
 
 def _all(K: Sparse, M: Sparse, C: Sparse, elastic: Array, typical: float) -> tuple[Array, Array]:
-    """All squares, ascending, and shapes, in a basis of what the constraints allow.
+    """All squares, ascending, and shapes, in a basis of the admissible motions.
 
     Stiff coordinates are scaled down, and 1 / (square + shift) is sought: low frequencies keep all their digits beside
     high ones.
@@ -153,7 +155,7 @@ def _all(K: Sparse, M: Sparse, C: Sparse, elastic: Array, typical: float) -> tup
 
 
 def _shift(mass: Array, stiffness: Array, typical: float) -> float:
-    """What of the mass, added to the stiffness, outweighs all that pushes the mechanism away from the pose."""
+    """Multiple of the mass that makes the stiffness positive definite when added to it."""
     shift = typical
     for _ in range(_SHIFTS):
         if np.linalg.eigvalsh(stiffness + shift * mass)[0] > 0.0:
@@ -163,14 +165,14 @@ def _shift(mass: Array, stiffness: Array, typical: float) -> float:
 
 
 def _inverse(solver: Saddle, n: int) -> scipy.sparse.linalg.LinearOperator:
-    """From forces to the displacements that constraints allow."""
+    """Linear map from forces to admissible displacements."""
     return scipy.sparse.linalg.LinearOperator(
         (n, n), matvec=lambda x: solver.solve(x.ravel())[0], dtype=np.dtype(float)
     )
 
 
 def _lowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> tuple[Array, Array]:
-    """The squares nearest to one below zero, ascending, and shapes, of at most so many freedoms.
+    """The squares nearest to one below zero, ascending, and shapes, of at most a number of freedoms.
 
     By Lanczos' method on the inverse; of few freedoms in a basis of them all.
     """

@@ -1,4 +1,4 @@
-"""The numbers of a record of arrays as one vector, and back: to differentiate all of them at once."""
+"""The numbers of a record of arrays as one vector, and back, to differentiate all of them at once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ R = TypeVar("R", bound=tuple[Any, ...])
 
 
 def numbers_of(record: tuple[Any, ...]) -> Array:
-    """Every floating-point number of a named tuple of arrays, records and numbers, in order: a vector."""
+    """Every floating-point number of a named tuple of arrays, records and numbers, in order, as a vector."""
     return np.concatenate([np.zeros(0), *(np.ravel(part) for part in _parts(record))])
 
 
@@ -28,7 +28,7 @@ def with_numbers(record: R, numbers: Array) -> R:
 
 
 def same_layout(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
-    """Whether two named tuples of a kind differ in nothing but their floating-point numbers."""
+    """Whether two named tuples of a kind differ in their floating-point numbers only."""
     return all(_same(x, y) for x, y in zip(a, b, strict=True))
 
 

@@ -1,4 +1,4 @@
-"""A system's constraints, motors and bodies as the records the kernels read; which row is which joint's."""
+"""A system's constraints, motors and bodies as the records of the kernels; names of the rows."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class _Packer:
             self.add_term(term, first)
 
     def add_term(self, term: Term, row: int) -> None:
-        """The ports of a term, and what its ends on the ground give to its rows."""
+        """Add the ports of a term, and the contribution of its ends on the ground to its rows."""
         axis, rows = -1, 2 if term.kind == POINT else 1
         if term.kind == AXIS:
             axis = self.add_axis(
@@ -233,7 +233,7 @@ def _is_full(body: BodyCoordinates) -> bool:
 
 
 def _coupled_damping(body: BodyCoordinates) -> Array:
-    """Damping matrix of a body without its diagonal, rows padded; no rows where nothing is left."""
+    """Damping matrix of a body without its diagonal, rows padded; no rows if it is diagonal."""
     rest = body.damping - np.diag(np.diag(body.damping))
     return _padded(rest) if np.any(rest) else np.zeros((0, padded(body.nf)))
 
@@ -247,7 +247,7 @@ def _padded(matrix: Array) -> Array:
 
 
 def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[Array]:
-    """What coordinates give to the sums of each body, (nf, width): see `kernel.sums`."""
+    """Contribution of the coordinates to the sums of each body, (nf, width): see `kernel.sums`."""
     rows = [[_modal_rows(body)[:FIRST_MARKER]] for body in bodies]
     for marker in markers:
         rows[marker.body].append(np.vstack([marker.N, marker.slope]))
@@ -266,7 +266,7 @@ def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> Arra
 
 
 def _mass_weights(body: BodyCoordinates) -> list[Array]:
-    """Weights of each mass point, as far as they are not zero."""
+    """Weights of each mass point, up to the last that is not zero."""
     if body.points is None:
         return []
     return [row[: 1 + int(np.max(np.nonzero(row)[0], initial=-1))] for row in body.points.weights]
@@ -366,7 +366,7 @@ def _lanes(parts: int) -> int:
 
 
 def _own_sizes(body: BodyCoordinates, parts: int) -> dict[str, int]:
-    """How much of each array is a body's own, by the field that says where that starts."""
+    """Length of a body's part of each array, by the field that holds its start."""
     size, full = 3 + body.nf, _is_full(body)
     masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
     return {

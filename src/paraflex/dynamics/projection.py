@@ -1,4 +1,4 @@
-"""A mechanism put together: coordinates onto Phi = 0, then rates onto Phi' = 0, by the least change of either.
+"""Assembly of a mechanism: coordinates projected onto Phi = 0, then rates onto Phi' = 0, by the least change of either.
 
 Every pose of this package that is not a step of a run is found here: assemblies, starts, poses near a path.
 """
@@ -48,7 +48,7 @@ def assemble(
     free: NDArray[np.bool_] | None = None,
     longest: float = math.inf,
 ) -> tuple[Array, Array]:
-    """Newton's iteration on Phi(q, t) = 0, each step the least change of some measure.
+    """Newton's iteration on Phi(q, t) = 0, each step the least change in some measure.
 
     Parameters
     ----------
@@ -82,18 +82,18 @@ def assemble(
 
 
 def closed(system: System, q: Array, phi: Array) -> bool:
-    """Whether what constraints (m,) leave open at q is rounding: of the size of the mechanism, or of places far off."""
+    """Whether residuals (m,) of constraints at q are rounding, of the size of the mechanism or of distant places."""
     far = max(float(np.max(np.abs(q[body.position]), initial=system.size)) for body in system.bodies) / system.size
     return system.gap(phi) < CLOSED * far
 
 
 def shortened(step: Array, longest: float) -> float:
-    """The part of a step without dimension that is no longer than the longest."""
+    """A step without dimension, shortened to the longest one allowed."""
     return min(1.0, longest / max(float(np.max(np.abs(step), initial=0.0)), np.finfo(float).tiny))
 
 
 def link_metric(system: System, q: Array, stiffness: float, *, every_spring: bool = False) -> Sparse:
-    """M + stiffness K: with the stiffness [s^2] links move and keep their shape; with every spring those at joints."""
+    """M + stiffness K: with the stiffness [s^2] links keep their shape; `every_spring` adds those at joints."""
     mass = sparse_mass(system, q)
     if not stiffness:
         return mass
@@ -101,7 +101,7 @@ def link_metric(system: System, q: Array, stiffness: float, *, every_spring: boo
 
 
 def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.0) -> LeastChange:
-    """From wanted (m,) to the smallest x in a metric with rows x = wanted; least squares for dependent rows.
+    """The smallest x in a metric with rows x = wanted (m,); least squares for dependent rows.
 
     With damping it goes less far, as Levenberg and Marquardt have it: a fraction of the mean diagonal entry of
     rows metric^-1 rows^T.
@@ -144,7 +144,7 @@ def constraint_change(
 
 
 def project(change: LeastChange, x: Array, left: Callable[[Array], Array]) -> Array:
-    """The rates nearest to x (n,) of which nothing is `left` (m,), in which they are linear."""
+    """The rates nearest to x (n,) with zero residual `left` (m,), which is linear in them."""
     for _ in range(_PROJECTIONS):
         x = x - change(left(x))
     return x
@@ -158,7 +158,7 @@ def second_rates(system: System, signals: Signals, t: float, q: Array, v: Array,
 
 
 def joint_gaps(system: System, phi: Array) -> dict[str, float]:
-    """What is left open at joints, gears and prescribed motions by name [m, rad], the largest first, to its tenth."""
+    """Residuals of joints, gears and prescribed motions by name [m, rad], the largest first, down to a tenth of it."""
     gaps: dict[str, float] = {}
     for row, value in zip(system.rows, phi.tolist(), strict=True):
         gaps[joint_of_row(row)] = math.hypot(gaps.get(joint_of_row(row), 0.0), value)
@@ -172,7 +172,7 @@ def gap_unit(system: System, phi: Array) -> str:
 
 
 def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array, left: Array) -> None:
-    """Raise where a projection leaves more of what the rows want (m,) than rounding explains.
+    """Raise if a projection leaves a larger residual of rows (m,) than rounding explains.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array
 
 
 def contradiction(system: System, wanted: Array, found: Dependence, what: str) -> str:
-    """Who contradicts whom, and by how much: the dropped row furthest from what its sources have it want."""
+    """Names and size of the largest contradiction: the dropped row furthest from the value its sources imply."""
     if found.dropped.size:
         conflict = np.abs(found.conflict(wanted))
         k = int(np.argmax(conflict))

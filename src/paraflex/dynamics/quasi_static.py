@@ -1,4 +1,4 @@
-"""A balanced start: static equilibrium where drives are at rest, else the deflection that their motion needs."""
+"""A balanced start: static equilibrium if drives are at rest, else the deflection in their motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MOVE = 1e-3
 
 
 class JointMotion(NamedTuple):
-    """Rate and acceleration that a joint is driven with [rad/s, rad/s^2; m/s, m/s^2]; none of a joint that is held."""
+    """Rate and acceleration of a driven joint [rad/s, rad/s^2; m/s, m/s^2]; zero for a joint that is held."""
 
     rate: float = 0.0
     acceleration: float = 0.0
@@ -68,7 +68,7 @@ def joint_motions(system: System, q: Array, v: Array, a: Array, joints: Iterable
 
 
 def balanced_state(system: System, start: State, driven: Mapping[str, JointMotion]) -> State:
-    """The start from which links need not vibrate.
+    """The start from which links hardly vibrate.
 
     Where every drive is at rest that is `static_equilibrium`: they are held at the angles they have. Where one of them
     moves, links are deflected as that motion needs them, q with
@@ -113,7 +113,7 @@ def balanced_state(system: System, start: State, driven: Mapping[str, JointMotio
 
 
 def _moving(drives: System, start: State) -> State:
-    """The moving equilibrium, with the velocities at which it moves on."""
+    """The moving equilibrium, with its velocities."""
 
     def at(time: float, q: Array) -> Array:
         return moving_equilibrium(drives, State(time, q, np.zeros_like(q)), _Motion(drives, time))
@@ -126,7 +126,7 @@ def _moving(drives: System, start: State) -> State:
 
 
 class _Motion:
-    """Velocities and accelerations that drives give a system, its links keeping the shape they have."""
+    """Velocities and accelerations that drives give a system whose links keep their shape."""
 
     def __init__(self, system: System, time: float) -> None:
         self.system, self.time, self.signals = system, time, moment_signals(system.mechanism, time)
@@ -138,7 +138,7 @@ class _Motion:
         return v, project(change, rest, partial(second_rates, self.system, self.signals, self.time, q, v))
 
     def velocities(self, q: Array, near: Array | None = None) -> Array:
-        """Those allowed (n,) at coordinates (n,) that are nearest to others, to none by default."""
+        """Admissible velocities (n,) at coordinates (n,) nearest to others, by default to zero."""
         return project(self._change(q), np.zeros(self.system.n) if near is None else near, partial(self._rates, q))
 
     def _change(self, q: Array) -> LeastChange:
@@ -149,7 +149,7 @@ class _Motion:
 
 
 def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> System:
-    """The same system with laws at the joints driven too, each as it is at the start and smooth either side of that."""
+    """The same system with the joints driven too, each by a smooth law with its motion at the start."""
     own = tuple(
         replace(prescribed, law=_smooth(prescribed.law, start.time)) for prescribed in system.mechanism.prescribed
     )
@@ -167,7 +167,7 @@ def _smooth(law: AngleLaw, time: float) -> DrivenAngle:
 
 
 def _prescribes_all(drives: System, start: State) -> bool:
-    """Whether drives and springs at joints leave rigid bodies no freedom."""
+    """Whether drives and springs at joints determine the motion of rigid bodies."""
     mechanism = drives.mechanism
     taken = {prescribed.joint for prescribed in mechanism.prescribed}
     springs = {spring.joint for spring in mechanism.springs} - taken

@@ -1,4 +1,4 @@
-"""Constraint rows that follow from others: which, from which, and the multipliers of least norm they leave."""
+"""Redundant constraint rows: which rows follow from which others, and multipliers of least norm."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NO_PART = 1e-6
 
 @dataclass(frozen=True)
 class Dependence:
-    """Which constraint rows of a system follow from others at a pose.
+    """Redundant constraint rows of a system at a pose.
 
     Attributes
     ----------
@@ -42,16 +42,16 @@ class Dependence:
 
     @property
     def rank(self) -> int:
-        """Of the constraint Jacobian."""
+        """Rank of the constraint Jacobian."""
         return self.kept.size
 
     def sources(self, k: int) -> NDArray[np.int64]:
-        """Row numbers that the k-th dropped row follows from."""
+        """Row numbers from which the k-th dropped row follows."""
         part = np.abs(self.coefficients[:, k])
         return self.kept[part > _NO_PART * max(1.0, part.max(initial=0.0))]
 
     def conflict(self, residual: Array) -> Array:
-        """What each dropped row asks for beyond what the rows it follows from give it; residual (m,)."""
+        """Residual of each dropped row less that implied by the rows it follows from; residual (m,)."""
         return residual[self.dropped] - self.coefficients.T @ residual[self.kept]
 
     def least_norm(self, multipliers: Array) -> Array:
@@ -70,7 +70,7 @@ def constraint_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
 
 
 def dependence(system: System, q: Array, threshold: float = DEPENDENT, count: int | None = None) -> Dependence:
-    """Constraint rows that follow from others at q.
+    """Redundant constraint rows at q.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def dependence(system: System, q: Array, threshold: float = DEPENDENT, count: in
 
 
 def _dense(system: System, q: Array, rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
-    """By a QR factorisation of Phi_q^T with pivots, without dimension."""
+    """Dependence by a QR factorisation of Phi_q^T with pivots, without dimension."""
     units = system.row_units[rigid]
     jacobian = system.jacobian(q)[rigid] * system.units / units[:, None]
     factors = scipy.linalg.qr(jacobian.T, mode="r", pivoting=True)
@@ -103,7 +103,7 @@ def _dense(system: System, q: Array, rigid: NDArray[np.int64], threshold: float,
 
 
 def _sparse(system: System, q: Array, rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
-    """By the Cholesky factor of Phi_q M^-1 Phi_q^T that runs use, row by row within its envelope."""
+    """Dependence by the Cholesky factor of Phi_q M^-1 Phi_q^T as in runs, row by row within its envelope."""
     workspace = system.workspace()
     factor_system(system.packed, 0.0, q, workspace)
     rows = system.packed.rows[rigid]
@@ -126,12 +126,12 @@ def _sparse(system: System, q: Array, rigid: NDArray[np.int64], threshold: float
 
 
 def redundant_rows(system: System, q: Array, threshold: float = DEPENDENT) -> list[str]:
-    """Names of constraint rows that follow from the others at q: see `dependence`."""
+    """Names of constraint rows that follow from others at q: see `dependence`."""
     return sorted(system.rows[i] for i in dependence(system, q, threshold).dropped)
 
 
 def involved(system: System, found: Dependence, k: int) -> list[str]:
-    """Joints, gears and prescribed motions, these first, that the k-th dropped row is of or follows from."""
+    """Joints, gears and prescribed motions, these first, of the k-th dropped row and its sources."""
     rows = [found.dropped[k], *found.sources(k)]
     names = dict.fromkeys(joint_of_row(system.rows[row]) for row in rows)
     prescribed = {motion.name for motion in system.mechanism.prescribed}

@@ -1,4 +1,4 @@
-"""What modal reduction takes from a body: how it turns under the moments that its joints bring in.
+"""Error of modal reduction in the rotation of a body under moments at its joints.
 
 Modes of a body in its frame are free of moments where the frame does not clamp it: those of the pinned frame at both
 ends. A series of them converges to the turn of an end under a moment with the first power of 1/modes only, where the
@@ -21,7 +21,7 @@ _MISSED = 0.05
 
 
 class MissedTurn(NamedTuple):
-    """A point of a reduced body at which it turns too little.
+    """A point of a reduced body whose rotation under a moment is too small.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class MissedTurn(NamedTuple):
 
 
 def missed_turns(system: System) -> list[MissedTurn]:
-    """Where reduced bodies turn by five per cent too little under a moment that comes in there, body by body."""
+    """Points at which reduced bodies rotate by five per cent too little under a moment there, body by body."""
     found: dict[PointRef, MissedTurn] = {}
     for point, cause in _moments(system.mechanism):
         described = system.mechanism.body(point.body)
@@ -67,7 +67,7 @@ def _missed(body: BodyCoordinates, system: System, point: PointRef) -> float:
 
 
 def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
-    """Points of bodies at which joints or loads bring in moments, and what does so."""
+    """Points of bodies at which joints or loads apply moments, and their names."""
     causes = [
         (f"the {'rail' if joint.slides else joint.kind} {joint.name}", joint)
         for joint in mechanism.joints

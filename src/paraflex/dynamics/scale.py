@@ -1,4 +1,4 @@
-"""The length that tolerances of a mechanism are relative to."""
+"""The reference length for tolerances of a mechanism."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from paraflex.dynamics.coordinates import BodyCoordinates
 
 
 def mechanism_size(bodies: tuple[BodyCoordinates, ...]) -> float:
-    """The largest distance between two points of a body, as the nearest power of two: division by it is exact [m].
+    """The largest distance between two points of a body, rounded to a power of two, by which division is exact [m].
 
     Where no body has two points apart, the largest radius of gyration about a body's origin.
     """
@@ -22,7 +22,7 @@ def mechanism_size(bodies: tuple[BodyCoordinates, ...]) -> float:
 
 
 def _extent(body: BodyCoordinates) -> float:
-    """Length of a beam; of another body the largest distance between two of its named points [m]."""
+    """Length of a beam; for another body the largest distance between two of its named points [m]."""
     if body.mesh is not None:
         return float(np.real(body.mesh.nodes[-1] - body.mesh.nodes[0]))
     places = np.array([np.real(point.x0) for point in body.shape.points.values()], dtype=float).reshape(-1, 2)

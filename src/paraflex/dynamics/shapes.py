@@ -1,4 +1,4 @@
-"""What a body is made of, whatever kind it is: shape integrals and material points in its own coordinates."""
+"""Shape integrals and material points of a body of any kind, in its own coordinates."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PointShape(NamedTuple):
 
 @dataclass(frozen=True)
 class BodyShape:
-    """A body in its own coordinates, to which the D of its integrals leads.
+    """A body in its own coordinates, which the matrix D of its integrals defines.
 
     Attributes
     ----------

@@ -49,7 +49,7 @@ def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array) 
 
 
 def constant_signals(values: Sequence[float], end: float) -> list[InputSignals]:
-    """Signals that do not change on [0, end]."""
+    """Constant signals on [0, end]."""
     signals = []
     for value in values:
         coefficients = np.zeros((1, _DEGREE + 1))
@@ -59,7 +59,7 @@ def constant_signals(values: Sequence[float], end: float) -> list[InputSignals]:
 
 
 def no_signals(packed: PackedSystem) -> Signals:
-    """Zero for every motor torque and prescribed value that a packed system asks for."""
+    """Zero for every motor torque and prescribed value of a packed system."""
     numbers = [packed.rows["signal"], packed.motor_sides["signal"]]
     return _pack(constant_signals([0.0] * (1 + max(int(group.max(initial=-1)) for group in numbers)), 1.0))
 
@@ -103,12 +103,12 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
 
 
 def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float]]:
-    """What `pack_signals` returns where no motor drives."""
+    """The signals of `pack_signals` without motor torques."""
     return pack_signals(mechanism, _no_torques(mechanism, end), end)
 
 
 def moment_signals(mechanism: Mechanism, time: float) -> Signals:
-    """Signals at one time: no torques; laws with their rate and acceleration there, asked for at no other time."""
+    """Signals valid at one time: no torques; laws with their rate and acceleration."""
     signals = _no_torques(mechanism, 1.0)
     for prescribed in mechanism.prescribed:
         value, rate, acceleration = (float(x[0]) for x in _evaluate(prescribed, np.array([time])))
@@ -122,7 +122,7 @@ def _no_torques(mechanism: Mechanism, end: float) -> list[InputSignals]:
 
 
 def _grid(law: AngleLaw, a: float, b: float, end: float) -> Array:
-    """Breaks of a law's pieces on [a, b]: its own where it is a quintic between them, else many."""
+    """Breaks of a law's pieces on [a, b]: its own if it is a quintic between them, else many."""
     breaks = getattr(law, "breaks", None)
     if breaks is None:
         return np.linspace(a, b, max(8, round(_LAW_PIECES * (b - a) / end)) + 1)

@@ -1,4 +1,4 @@
-"""How far a pose is from a singular position: of the constraints, or of the mechanism with motors held."""
+"""Distance of a pose from a singular position, of the constraints or of the mechanism with motors held."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ class SingularityMeasure:
     motors: tuple[str, ...] = ()
 
     def __call__(self, q: Array) -> Array:
-        """Of every pose (k, n): (k,)."""
+        """Distances of poses (k, n): (k,)."""
         if self._number == 0:
             return np.zeros(len(q)) if self.motors else np.ones(len(q))
         return np.array([self._values(pose)[self._number - 1] for pose in q])
 
     @cached_property
     def _number(self) -> int:
-        """Which singular value it is, counted from the largest; none is 0."""
+        """Number of the singular value, counted from the largest; 0 for none."""
         values, columns = self._values(self.start), 3 * len(self.system.bodies)
         if self.motors:
             return columns if values.size == columns else 0
@@ -62,7 +62,7 @@ class SingularityMeasure:
         return np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
 
     def _scaled(self, q: Array) -> Array:
-        """The matrix (rows, 3 bodies): columns of the centre of mass and of the turn about it, by root of inertia."""
+        """The matrix (rows, 3 bodies) by displacements and rotations of centres of mass, scaled by inertia."""
         rows, parts = self._rows(q), self._bodies
         at = parts.offsets
         x, y, turn = rows[:, at], rows[:, at + 1], rows[:, at + 2]
@@ -85,7 +85,7 @@ class SingularityMeasure:
 
     @cached_property
     def _turning(self) -> Array:
-        """Rows of joints that turn, which do not depend on the pose."""
+        """Rows of revolute joints, which do not depend on the pose."""
         rows = [joint_coordinate(self.system, joint, self.start[None]).rows for joint in self._joints(slides=False)]
         return np.vstack(rows) if rows else np.zeros((0, self.system.n))
 
@@ -109,7 +109,7 @@ class SingularityMeasure:
 
 @dataclass(frozen=True)
 class _Bodies:
-    """Of every body, undeformed: where its coordinates start, roots of mass and inertia, its centre of mass."""
+    """For every undeformed body: start of its coordinates, roots of mass and inertia, its centre of mass."""
 
     offsets: NDArray[np.int64]
     root_m: Array

@@ -1,4 +1,4 @@
-"""Whether a mechanism is sound: does it close, what may it do, what is held twice."""
+"""Soundness of a mechanism: closure of its assemblies, degrees of freedom, redundant constraints."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass
 from paraflex.dynamics.state import State, close_downhill, consistent_state, reference_pose
 from paraflex.dynamics.system import System
-from paraflex.errors import AssemblyError, InconsistentConstraintsError
+from paraflex.errors import AssemblyError, InconsistentConstraintsError, ProportionError
+from paraflex.limits import solvable
 from paraflex.mechanism import Assembly
 
 # How far a body turns, or moves as a part of the mechanism's size, to look whether a pose is a special one.
@@ -28,7 +29,7 @@ _CLOSED, _BACK, _DEPENDENT = 1e-10, 3.0, 1e-6
 
 @dataclass(frozen=True)
 class Closure:
-    """How one assembly closes.
+    """Result of closing one assembly.
 
     Attributes
     ----------
@@ -62,7 +63,7 @@ class Closure:
 
 
 def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure:
-    """Close an assembly, and say how well it goes; nothing is raised where it cannot be closed.
+    """Close an assembly, and report the gaps; it raises nothing if the assembly cannot be closed.
 
     Take the rigid mechanism to learn what lengths and places allow: beams are not stretched to fit.
     """
@@ -74,7 +75,7 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
     except AssemblyError as error:
         gaps = joint_gaps(system, system.constraints(signals, time, error.partial)[0])
         return Closure(assembly.name, before, nan, nan, max(gaps.values()), tuple(gaps), error.cause, None)
-    except InconsistentConstraintsError as error:
+    except (InconsistentConstraintsError, ProportionError) as error:
         return Closure(assembly.name, before, nan, nan, 0.0, (), error.cause, None)
     phi, rate = system.constraints(signals, time, state.q, state.v)
     position, velocity = (float(np.max(np.abs(part), initial=0.0)) for part in (phi, rate))
@@ -82,7 +83,7 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
 
 
 def undeformed(system: System, rigid: System, state: State) -> State:
-    """The state of rest of a flexible system with its bodies, unbent, where the rigid one has them."""
+    """The state of rest of a flexible system with its undeformed bodies at the places of the rigid ones."""
     q = np.zeros(system.n)
     for body, source in zip(system.bodies, rigid.bodies, strict=True):
         q[body.offset : body.offset + 3] = state.q[source.all]
@@ -110,7 +111,7 @@ class Redundancy:
 
 @dataclass(frozen=True)
 class Mobility:
-    """What constraints leave of the freedoms of the bodies.
+    """Degrees of freedom that the constraints leave.
 
     Attributes
     ----------
@@ -134,25 +135,26 @@ class Mobility:
 
     @property
     def count(self) -> int:
-        """Gruebler's: three a body less the constraints."""
+        """Gruebler's count: three per body less the constraints."""
         return 3 * self.bodies - self.constraints
 
     @property
     def freedoms(self) -> int:
-        """Degrees of freedom at the pose: three a body less the rank."""
+        """Degrees of freedom at the pose: three per body less the rank."""
         return 3 * self.bodies - self.rank
 
     @property
     def lasting_redundant(self) -> int:
-        """Constraints that follow from others not only at a special pose."""
+        """Redundant constraints that are not those of a special pose only."""
         return len(self.redundant) - (self.freedoms - self.lasting if self.special and self.lasting is not None else 0)
 
     @property
     def special(self) -> bool:
-        """Whether some of the freedoms are there at this instant only."""
+        """Whether some of the freedoms exist at this pose only."""
         return self.lasting is not None and self.lasting < self.freedoms
 
 
+@solvable("degrees of freedom")
 def mobility(system: System, state: State) -> Mobility:
     """Degrees of freedom and redundant constraints of a rigid mechanism at a closed pose.
 
@@ -178,7 +180,7 @@ def _redundancies(system: System, found: Dependence) -> Iterator[Redundancy]:
 
 
 def _poses_nearby(system: System, state: State) -> Iterator[Array]:
-    """Closed poses a short way off, in random directions that the constraints allow to first order."""
+    """Closed poses a short distance away, in random directions within the null space of the constraints."""
     signals, random = moment_signals(system.mechanism, state.time), np.random.default_rng(0)
     M = sparse_mass(system, state.q)
     solver = Saddle(M, sparse_jacobian(system, state.q))

@@ -30,12 +30,12 @@ _WORTH_WHILE = 0.5
 
 
 def width(system: System) -> int:
-    """Coordinates of the body that has most of them."""
+    """The largest number of coordinates of a body."""
     return max(3 + body.nf for body in system.bodies)
 
 
 def without_stiffness(packed: PackedSystem) -> PackedSystem:
-    """The same system, of beams that no force is needed to bend: their stiffness, known exactly, drowns all else."""
+    """The same system with zero bending stiffness of beams, as their stiffness, known exactly, dominates all else."""
     modal = packed.modal.copy()
     modal[OMEGA2] = 0.0
     return packed._replace(modal=modal)
@@ -59,7 +59,7 @@ def body_masses(system: System, q: Array) -> list[Array]:
 
 
 def sparse_mass(system: System, q: Array) -> scipy.sparse.csr_matrix:
-    """Mass matrix (n, n) at q, one block a body."""
+    """Mass matrix (n, n) at q, one block per body."""
     return scipy.sparse.csr_matrix(scipy.sparse.block_diag(body_masses(system, q), format="csr"))
 
 
@@ -72,7 +72,7 @@ def stiffness_diagonal(system: System) -> Array:
 
 
 def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -> scipy.sparse.csr_matrix:
-    """Stiffness (n, n) that keeps links in shape: omega^2 of modes, J^T k J of the springs between finite segments.
+    """Elastic stiffness (n, n) of links: omega^2 of modes, J^T k J of the springs between finite segments.
 
     With every spring those at other joints as well.
     """
@@ -140,7 +140,7 @@ def neighbours(system: System, more: Iterable[Sequence[int]] = ()) -> list[set[i
 
 
 def greedy_colours(neighbours: list[set[int]]) -> NDArray[np.int64]:
-    """A colour of every body, one that no neighbour has."""
+    """A colour for every body, different from those of its neighbours."""
     colours = np.full(len(neighbours), -1)
     for body, others in enumerate(neighbours):
         taken = {int(colours[other]) for other in others if other != body}

@@ -1,4 +1,4 @@
-"""From a start as the user describes it, by names, to a state."""
+"""States from the start of a motion as the user gives it, by names."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from paraflex.dynamics.state import State, reference_pose
 from paraflex.dynamics.system import System
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
+from paraflex.limits import solvable
 from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start, check_start
 
 # What joints may be open by at a start that is given [sizes of the mechanism, rad], and velocities by, as a fraction
@@ -34,6 +35,7 @@ _POSITION_STIFFNESS, _VELOCITY_STIFFNESS = 1.0, 1e3
 
 
 @checked_arguments()
+@solvable("a start")
 def start_state(
     system: System,
     start: Start,
@@ -42,7 +44,7 @@ def start_state(
     q: Array | None = None,
     time: float = 0.0,
 ) -> State:
-    """The state a start describes; bodies it does not place come from an assembly, joints closed.
+    """The state of a start; bodies that it does not place come from an assembly, joints closed.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ def start_state(
 
 
 def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> Array:
-    """Modal coordinates (nf,) of a beam of least elastic energy at given deflections of its points.
+    """Modal coordinates (nf,) of a beam of least elastic energy with given deflections of its points.
 
     Deflections count from the tangent at the first end, whatever the reference condition; of a body of given shapes
     from its frame.
@@ -122,7 +124,7 @@ def _root_rows(system: System, name: str) -> Array:
 
 
 def point_rows(system: System, q: Array, ref: PointRef) -> Array:
-    """Rows (2, n) that take velocities of the coordinates to the velocity of a point of a body at q."""
+    """Rows (2, n) from the velocities of the coordinates to the velocity of a point of a body at q."""
     return marker_place(system, system.marker(ref), q[None])[1][0]
 
 
@@ -195,7 +197,7 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
 
 
 class _Given(NamedTuple):
-    """One number of a start's velocities: its row (1, n), its value, what that is compared with, where it stands."""
+    """One given velocity: its row (1, n), its value, its scale, and its field."""
 
     row: scipy.sparse.csr_matrix
     value: float
@@ -236,7 +238,7 @@ def _refuse_velocities(system: System, given: list[_Given], slip: Array, bad: ND
 
 
 def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> Array:
-    """A body's coordinates as they stand in q, or their rates."""
+    """A body's coordinates in q as given, or their rates."""
     frame = [values.x, values.y, values.phi]
     if values.flexible is None:
         return np.concatenate([frame, np.zeros(body.nf)])

@@ -28,6 +28,7 @@ from paraflex.dynamics.sparse import body_masses, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import Signals
+from paraflex.limits import solvable
 from paraflex.mechanism import GROUND, Assembly, PointRef
 from paraflex.mechanism.poses import approximate_poses
 
@@ -54,7 +55,7 @@ class State:
 
 
 def mass_matrix(system: System, q: Array) -> Array:
-    """Dense mass matrix (n, n) at q; of many bodies see `dynamics.sparse.sparse_mass`."""
+    """Dense mass matrix (n, n) at q; for many bodies see `dynamics.sparse.sparse_mass`."""
     return np.asarray(scipy.linalg.block_diag(*body_masses(system, q)))
 
 
@@ -118,7 +119,7 @@ def point_position(system: System, q: Array, ref: PointRef) -> Array:
 
 
 def project_position(system: System, signals: Signals, t: float, q: Array) -> Array:
-    """The nearest coordinates, in the metric of mass and stiffness, at which the constraints hold.
+    """The nearest coordinates, in the metric of mass and stiffness, that satisfy the constraints.
 
     Raises
     ------
@@ -138,7 +139,7 @@ def project_position(system: System, signals: Signals, t: float, q: Array) -> Ar
 
 
 def _keeps_shape(system: System, start: Array, q: Array) -> bool:
-    """Whether closing bends no link out of the shape it had: in linear theory any loop closes by stretching."""
+    """Whether closure leaves the shape of links nearly unchanged: in linear theory stretching closes any loop."""
     for body in system.bodies:
         markers = [system.marker(PointRef(body.name, point)) for point in system.mechanism.points[body.name]]
         if body.nf == 0 or not markers:
@@ -154,7 +155,7 @@ def _keeps_shape(system: System, start: Array, q: Array) -> bool:
 
 
 def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
-    """Where loops that do not close come closest to it, downhill from q.
+    """Coordinates at which loops that do not close have the smallest gaps, a local minimum found from q.
 
     All joints share the gap there; put together along the tree of joints, undeformed, those that close loops have it.
     """
@@ -168,7 +169,7 @@ def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
 
 
 def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Array:
-    """Coordinates near q at which the gaps of all joints are smallest, by the method of Levenberg and Marquardt.
+    """Coordinates near q at which the gaps of all joints are smallest, by the Levenberg-Marquardt method.
 
     Slower than `project_position` and not as exact, but at home near singular positions and where loops cannot close.
     """
@@ -189,7 +190,7 @@ def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Arra
 
 
 def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Array, stiffness: float = 0.0) -> Array:
-    """The nearest velocities, in the metric of mass, at which the constraints' first derivative vanishes.
+    """The nearest velocities, in the metric of mass, at which Phi' is zero.
 
     That is what a blow does. With a weight of stiffness [s^2] against mass links move and do not begin to bend.
 
@@ -208,6 +209,7 @@ def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Ar
 
 
 @checked_arguments()
+@solvable("a consistent pose")
 def consistent_state(
     system: System,
     assembly: str | Assembly | None,
@@ -216,7 +218,7 @@ def consistent_state(
     velocity: Array | None = None,
     time: float = 0.0,
 ) -> State:
-    """A start: an assembly closed, with an initial deflection and velocity if given.
+    """A start: an assembly closed, with the initial deflection and velocity if given.
 
     Parameters
     ----------
@@ -255,7 +257,7 @@ def consistent_state(
 
 
 def check_accelerations(system: System, signals: Signals, t: float, q: Array, v: Array) -> None:
-    """Whether there are accelerations that all constraints allow at a consistent position and velocity.
+    """Check that accelerations exist that satisfy all constraints at a consistent position and velocity.
 
     Raises
     ------

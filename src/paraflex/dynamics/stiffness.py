@@ -1,4 +1,4 @@
-"""Forces at rest and how they change with the pose: stiffness by springs, weight, loads and constraint forces."""
+"""Forces at rest and their derivatives by the pose: stiffness of springs, weight, loads and constraint forces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _STEP, _SHORTEST = 1e-3, 1e-6
 
 
 class RestingForces:
-    """Forces at rest (n,), as they stand on the left of the equations, and rows of springs (m,).
+    """Forces at rest (n,), with the sign of the left-hand side of the equations, and rows of springs (m,).
 
     All forces but the stiffness of beams, which is known exactly and would drown them. With velocities `v` and
     accelerations `a` (n,) in place of zeros they are those of a motion.
@@ -38,7 +38,7 @@ class RestingForces:
         self.springs: NDArray[np.intp] = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
 
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
-        """At coordinates (n,) with multipliers (m,)."""
+        """Forces and rows at coordinates (n,) with multipliers (m,)."""
         self._evaluate(q, lam)
         return self.workspace.f.copy(), self.workspace.rows[self.springs]
 
@@ -59,7 +59,7 @@ class RestingForces:
 
 
 def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.sparse.csr_matrix:
-    """Derivative (n, n) of the forces at rest by the coordinates, constraint forces kept, less that of the beams.
+    """Derivative (n, n) of the forces at rest by the coordinates at constant multipliers, without that of the beams.
 
     By differences; bodies between which no force or row reaches are displaced at once.
 
@@ -128,7 +128,7 @@ def _difference(
 
 
 def _steps(system: System, q: Array) -> Array:
-    """A step (n,) of each coordinate, such that points move by a thousandth of a metre or of the shortest spring."""
+    """A step (n,) of each coordinate that moves points by a thousandth of a metre or of the shortest spring."""
     lengths = [1.0]
     for spring in system.mechanism.linear_springs:
         if spring.length > 0.0:

@@ -60,17 +60,17 @@ class System:
 
     @property
     def total_mass(self) -> float:
-        """Of all bodies [kg]."""
+        """Mass of all bodies [kg]."""
         return float(self.packed.total_mass)
 
     @property
     def size(self) -> float:
-        """The length that tolerances are relative to: see `dynamics.scale` [m]."""
+        """The reference length of tolerances: see `dynamics.scale` [m]."""
         return float(self.packed.size)
 
     @cached_property
     def units(self) -> Array:
-        """What one of each coordinate (n,) is compared with: the size of the mechanism for places, 1 for all others."""
+        """Unit of each coordinate (n,): the size of the mechanism for places, 1 for all others."""
         units = np.ones(self.n)
         for body in self.bodies:
             units[body.position] = self.size
@@ -78,7 +78,7 @@ class System:
 
     @cached_property
     def row_units(self) -> Array:
-        """The same of each constraint row (m,): the size for lengths, 1 for angles."""
+        """Unit of each constraint row (m,): the size for lengths, 1 for angles."""
         return np.real(self.packed.rows["unit"]).astype(float)
 
     def gap(self, phi: Array) -> float:
@@ -95,7 +95,7 @@ class System:
         return self.bodies[self.index[name]]
 
     def marker(self, ref: PointRef) -> Marker:
-        """The material point of that name."""
+        """The material point of a name."""
         return make_marker(self.mechanism, self.bodies, self.index, ref)
 
     def workspace(self) -> Workspace:

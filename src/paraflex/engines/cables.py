@@ -1,4 +1,4 @@
-"""Rigid bodies and ANCF cables: what coordinates as Exudyn has them say of the links of a mechanism."""
+"""Rigid bodies and ANCF cables: the motion of a mechanism's links from Exudyn's coordinates."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LENGTH_POWER = np.array([0, 1, 0, 1])
 
 
 class RigidState(NamedTuple):
-    """Where a body is at the start and how it moves [m, rad, m/s, rad/s]."""
+    """Pose and velocity of a body at the start [m, rad, m/s, rad/s]."""
 
     x: float
     y: float
@@ -49,7 +49,7 @@ class RigidState(NamedTuple):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What Exudyn computed at its steps.
+    """Results of Exudyn at its steps.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Trajectory:
     multipliers: Array
 
     def thinned(self, every: int) -> Trajectory:
-        """Every so many steps."""
+        """Every n-th step."""
         return Trajectory(self.t[::every], self.states[:, ::every], self.multipliers[::every])
 
 
@@ -79,23 +79,23 @@ class Turn(NamedTuple):
 
 @dataclass(frozen=True)
 class Ground:
-    """The ground: an object of the engine, by number, that does not move."""
+    """The ground, an object of the engine with a number."""
 
     item: int
     points: Mapping[str, tuple[float, float]]
     start: ClassVar[float] = 0.0
 
     def place(self, point: str) -> dict[str, Any]:
-        """Where a named point is, in the words of Exudyn's markers."""
+        """Marker of a named point, as arguments of Exudyn."""
         return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
 
     def motion(self, point: str, history: Trajectory) -> PointMotion:
-        """None."""
+        """Motion of a named point, which is at rest."""
         still = np.zeros((history.t.size, 2))
         return PointMotion(still + self.points[point], still, still)
 
     def turn(self, point: str, history: Trajectory) -> Turn:
-        """None."""
+        """Zero: the ground does not move."""
         return Turn(*np.zeros((3, history.t.size)))
 
 
@@ -125,11 +125,11 @@ class RigidLink:
     start: float
 
     def place(self, point: str) -> dict[str, Any]:
-        """Where a named point is, in the words of Exudyn's markers."""
+        """Marker of a named point, as arguments of Exudyn."""
         return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
 
     def motion(self, point: str, history: Trajectory) -> PointMotion:
-        """Of a named point."""
+        """Motion of a named point."""
         r, v, a = history.states[:, :, self.columns[:2]]
         angle, rate, acceleration = self.frame(history)
         x, y = self.points[point]
@@ -139,7 +139,7 @@ class RigidLink:
         return PointMotion(r + arm, v + w * across, a + dw * across - w**2 * arm)
 
     def curve(self, drawn: Outline, history: Trajectory) -> Array:
-        """Where the stations of the body are (k, s, 2) [m]."""
+        """Places of the stations of the body (k, s, 2) [m]."""
         r, angle = history.states[0][:, self.columns[:2]], self.frame(history).angle
         c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
         # Any joint of it tells how far the body's frame is from the centre of mass.
@@ -148,29 +148,29 @@ class RigidLink:
         return r[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
     def turn(self, point: str, history: Trajectory) -> Turn:
-        """Of the material at a named point."""
+        """Rotation of the material at a named point."""
         return self.frame(history)
 
     def frame(self, history: Trajectory) -> Turn:
-        """Of the body."""
+        """Rotation of the body."""
         return Turn(*history.states[:, :, self.columns[2]])
 
     def chord(self, history: Trajectory) -> Turn:
-        """Of the body."""
+        """Rotation of the body."""
         return self.frame(history)
 
     def tip(self, history: Trajectory) -> Array:
-        """Nothing bends."""
+        """Zero: a rigid body has no deflection."""
         return np.zeros((history.t.size, 3))
 
     @property
     def masses(self) -> tuple[int, ...]:
-        """The engine's objects that have mass along them."""
+        """The engine's objects with distributed mass."""
         return (self.item,)
 
     @property
     def lumped(self) -> list[tuple[dict[str, Any], float]]:
-        """Places and masses of what is lumped besides: nothing."""
+        """Places and masses of lumps: none."""
         return []
 
     def weighted(self, history: Trajectory) -> Array:
@@ -178,11 +178,11 @@ class RigidLink:
         return self.mass * history.states[0][:, self.columns[:2]]
 
     def kinetic_energy(self, history: Trajectory) -> Array:
-        """Of the body [J]."""
+        """Kinetic energy of the body [J]."""
         return 0.5 * history.states[1][:, self.columns] ** 2 @ [self.mass, self.mass, self.inertia]
 
     def strain_energy(self, history: Trajectory) -> Array:
-        """None."""
+        """Zero for a rigid body."""
         return np.zeros(history.t.size)
 
 
@@ -218,7 +218,7 @@ class Cable:
         return self.mesh.points
 
     def place(self, point: str) -> dict[str, Any]:
-        """Where a named point is, in the words of Exudyn's markers."""
+        """Marker of a named point, as arguments of Exudyn."""
         return self._at(self.points[point])
 
     def _at(self, node: int) -> dict[str, Any]:
@@ -227,11 +227,11 @@ class Cable:
         return {"bodyNumber": self.items[element], "localPosition": [along, 0.0, 0.0]}
 
     def motion(self, point: str, history: Trajectory) -> PointMotion:
-        """Of a named point."""
+        """Motion of a named point."""
         return PointMotion(*history.states[:, :, self.columns[2 * self.points[point]]])
 
     def curve(self, drawn: Outline, history: Trajectory) -> Array:
-        """Where the stations of the centre line are (k, s, 2) [m]."""
+        """Places of the stations of the centre line (k, s, 2) [m]."""
         x, nodes = drawn.places[:, 0], self.mesh.nodes
         element = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, self.mesh.n_elements - 1)
         rows = np.zeros((x.size, len(self.columns)))
@@ -241,15 +241,15 @@ class Cable:
         return rows @ history.states[0][:, self.columns]
 
     def turn(self, point: str, history: Trajectory) -> Turn:
-        """Of the tangent at a named point."""
+        """Rotation of the tangent at a named point."""
         return self._tangent(self.points[point], history)
 
     def frame(self, history: Trajectory) -> Turn:
-        """Of the tangent at the first end."""
+        """Rotation of the tangent at the first end."""
         return self._tangent(0, history)
 
     def chord(self, history: Trajectory) -> Turn:
-        """Of the line from the first end to the last."""
+        """Rotation of the line from the first end to the last."""
         return turn_of(self.start, *self._line(history))
 
     def tip(self, history: Trajectory) -> Array:
@@ -262,7 +262,7 @@ class Cable:
 
     @property
     def masses(self) -> tuple[int, ...]:
-        """The engine's objects that have mass along them."""
+        """The engine's objects with distributed mass."""
         return self.items
 
     @property
@@ -296,7 +296,7 @@ class Cable:
         return 0.5 * (axial + curvature**2 @ (weights * self._along("bending_stiffness", _BENDING_POINTS)))
 
     def rounding(self, reference: Array) -> float:
-        """Of the axial force: EA times the rounding of positions over the element's length, at its largest [N]."""
+        """Rounding error of the axial force: EA times that of positions over the element length, at its largest [N]."""
         far = float(np.max(np.abs(reference[self.columns[::2]])))
         stiffest = float(np.max(self._along("axial_stiffness", 1) / np.diff(self.mesh.nodes)))
         return float(np.finfo(float).eps) * stiffest * far
@@ -305,15 +305,15 @@ class Cable:
         return turn_of(self.start, *history.states[:, :, self.columns[1::2][node]])
 
     def _line(self, history: Trajectory) -> Array:
-        """From the first end to the last, with two derivatives (3, k, 2)."""
+        """Vector from the first end to the last, with two derivatives (3, k, 2)."""
         return history.states[:, :, self.columns[-2]] - history.states[:, :, self.columns[0]]
 
     def _along(self, quantity: str, count: int) -> Array:
-        """A property of the spans at so many Gauss points an element."""
+        """A property of the spans at the Gauss points of every element."""
         return np.repeat([getattr(span, quantity) for span in self.spans], count)
 
     def _quadrature(self, count: int, order: int) -> tuple[Array, Array]:
-        """Gauss points along the beam: weights [m], and rows that make of r and r' at the nodes a derivative of r."""
+        """Gauss points along the beam: weights [m], and rows from r and r' at the nodes to a derivative of r."""
         z, weights = np.polynomial.legendre.leggauss(count)
         lengths = np.diff(self.mesh.nodes)
         rows = np.zeros((lengths.size, count, len(self.columns)))
@@ -333,25 +333,25 @@ class Linkage:
     bodies: Mapping[str, Link]
 
     def part(self, ref: PointRef) -> Link | Ground:
-        """What a point belongs to."""
+        """The body of a point, or the ground."""
         return self.ground if ref.on_ground else self.bodies[ref.body]
 
     def motion(self, ref: PointRef, history: Trajectory) -> PointMotion:
-        """Of a named point."""
+        """Motion of a named point."""
         return self.part(ref).motion(ref.point, history)
 
     def gap(self, joint: Joint, history: Trajectory) -> Array:
-        """From side a of a joint to side b, with two derivatives (3, k, 2)."""
+        """Vector from side a of a joint to side b, with two derivatives (3, k, 2)."""
         return np.subtract(self.motion(joint.b, history), self.motion(joint.a, history))
 
     def joint_turn(self, joint: Joint, history: Trajectory) -> Turn:
-        """Of the material at side b of a joint against that at side a."""
+        """Rotation of the material at side b of a joint relative to that at side a."""
         a, b = (self.part(ref).turn(ref.point, history) for ref in (joint.a, joint.b))
         return Turn(*np.subtract(b, a))
 
 
 def turn_of(start: float, d: Array, v: Array, a: Array) -> Turn:
-    """Angle of a vector (k, 2) from its value at the start on, by the vector's first two derivatives."""
+    """Angle of a vector (k, 2) from its value at the start, from its first two derivatives."""
     angle = np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
     angle += 2.0 * np.pi * np.round((start - angle[:1]) / (2.0 * np.pi))
     square = np.sum(d**2, axis=1)

@@ -1,4 +1,4 @@
-"""What adapters share: importing an engine, refusing what it cannot express, steps that end at samples."""
+"""Common parts of adapters: importing an engine, refusing unsupported members, steps that end at samples."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ENGINES = tuple(_PRINTED)
 
 
 def check_dwell(name: str, task: TrackingTask) -> None:
-    """Check that motors are free after the path: engines have no brakes here.
+    """Check that motors are free after the path: adapters of engines have no brakes.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def check_dwell(name: str, task: TrackingTask) -> None:
 
 
 def check_engine(name: str, mechanism: Mechanism) -> None:
-    """Check that an engine is installed and can express a mechanism.
+    """Check that an engine is installed and supports a mechanism.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def import_engine(name: str) -> Any:
 
 
 def refuse(engine: str, what: str, field: str) -> NoReturn:
-    """Say that an engine, as we drive it, cannot express a part of a mechanism.
+    """Raise the error that the adapter of an engine does not support a part of a mechanism.
 
     Raises
     ------

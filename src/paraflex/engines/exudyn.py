@@ -132,7 +132,7 @@ def _last_moment(record: Record, history: Trajectory) -> Moment:
 
 @dataclass
 class _Engine:
-    """Exudyn's modules and the system under construction; who holds the system must hold its container."""
+    """Exudyn's modules and the system under construction; the container must live as long as the system."""
 
     exu: Any
     items: Any
@@ -144,13 +144,13 @@ class _Engine:
         return self.mbs.AddObject(getattr(self.items, kind)(**settings))
 
     def node(self, kind: str, place: list[float], velocity: list[float]) -> tuple[int, Columns]:
-        """A node and its coordinates among all, which Exudyn numbers node after node."""
+        """A node and the indices of its coordinates, which Exudyn numbers node after node."""
         node = getattr(self.items, kind)(referenceCoordinates=place, initialVelocities=velocity)
         first, self.coordinates = self.coordinates, self.coordinates + len(place)
         return self.mbs.AddNode(node), np.arange(first, self.coordinates)
 
     def marker(self, linkage: Linkage, ref: PointRef) -> int:
-        """On position and turn of the material at a point."""
+        """Markers of position and rotation of the material at a point."""
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(**linkage.part(ref).place(ref.point)))
 
     def markers(self, linkage: Linkage, joint: Joint) -> list[int]:
@@ -165,7 +165,7 @@ def _start_engine() -> _Engine:
 
 @contextmanager
 def _silent(exu: Any) -> Iterator[None]:
-    """Exudyn prints its failures; here they are exceptions."""
+    """Context without Exudyn's printed failures, which are exceptions here."""
     before = exu.config.printToConsole, exu.config.suppressWarnings
     exu.config.printToConsole, exu.config.suppressWarnings = False, True
     try:
@@ -175,7 +175,7 @@ def _silent(exu: Any) -> Iterator[None]:
 
 
 class _Model(NamedTuple):
-    """What was built: the links; for each motor its loads and their signs; the multipliers of each joint."""
+    """The model in Exudyn: links; loads of each motor and their signs; multipliers of each joint."""
 
     linkage: Linkage
     loads: list[list[tuple[int, float]]]
@@ -289,7 +289,7 @@ def _add_spring(engine: _Engine, linkage: Linkage, joint: Joint, spring: Torsion
 
 @dataclass
 class _Recorder:
-    """Drives the motors and keeps the state, step by step; Exudyn calls it before and after every step.
+    """Applies the torques and records the state at every step; Exudyn calls it before and after each step.
 
     Torques are those at the end of the step, where generalised alpha takes its forces.
     """
@@ -309,7 +309,7 @@ class _Recorder:
         return True
 
     def after(self, mbs: Any, _: float) -> bool:
-        """Keep the state, the start's too; False ends the run."""
+        """Record the state, that of the start too; False ends the run."""
         data = mbs.systemData
         state = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()
         self.finite = bool(np.isfinite(state).all())
@@ -319,7 +319,7 @@ class _Recorder:
         return self.finite and not self.interrupts
 
     def verdict(self) -> str:
-        """Why a run that raised nothing stopped early; nothing if it did not."""
+        """Reason why a run without an exception stopped early; empty if it did not."""
         if not self.finite:
             return "the solution is no longer finite"
         if len(self.states) == len(self.torques):
@@ -330,7 +330,7 @@ class _Recorder:
 def _run(
     engine: _Engine, model: _Model, task: TrackingTask, torques: FeedForward, substeps: int, options: ExudynOptions
 ) -> tuple[Trajectory, dict[str, Any]]:
-    """Integrate; the figures say why the run stopped early, if it did."""
+    """Integrate; the counts contain the reason why the run stopped early, if it did."""
     times = task.motion.t
     grid = np.linspace(times[0], times[-1], substeps * (times.size - 1) + 1)
     recorder = _Recorder(model.loads, torques.evaluate(grid))
@@ -448,7 +448,7 @@ def _record(
 
 
 def _drawing(mechanism: Mechanism, linkage: Linkage, history: Trajectory) -> Drawing:
-    """Bodies as the engine's own shape functions have them."""
+    """Bodies by the engine's own shape functions."""
     bodies = linkage.bodies
     shapes = {one.body: bodies[one.body].curve(one, history) for one in outlines(mechanism)}
 
@@ -464,13 +464,13 @@ def _largest(values: Array) -> float:
 
 
 def _work(linkage: Linkage, mechanism: Mechanism, torques: FeedForward, history: Trajectory) -> Array:
-    """Of the motors, by the trapezoidal rule over the steps."""
+    """Work of the motors, by the trapezoidal rule over the steps."""
     power = np.sum(torques.evaluate(history.t) * _motor_speeds(linkage, mechanism, history), axis=1)
     return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(history.t))])[: power.size]
 
 
 def _motor_speeds(linkage: Linkage, mechanism: Mechanism, history: Trajectory) -> Array:
-    """Of all motors (k, motors) [rad/s]."""
+    """Speeds of all motors (k, motors) [rad/s]."""
     joints = [mechanism.joint(motor.joint) for motor in mechanism.motors]
     return np.array([linkage.joint_turn(joint, history).rate for joint in joints]).reshape(-1, history.t.size).T
 

@@ -41,7 +41,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 @dataclass(frozen=True)
 class MuJoCoOptions:
-    """How MuJoCo is to run.
+    """Options of MuJoCo's integration.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
 
 
 def _model(mujoco: Any, system: System, tree: Tree, step: float) -> Any:
-    """The model of the tree, all angles zero in its own reference pose."""
+    """The model of the tree, with all angles zero in its reference pose."""
     spec = mujoco.MjSpec()
     spec.option.timestep = step
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
@@ -142,7 +142,7 @@ def _add_springs(spec: Any, mechanism: Mechanism, tree: Tree) -> None:
 
 
 def _add_relation(mujoco: Any, spec: Any, one: Relation, tree: Tree, step: float) -> None:
-    """The hinge of the second joint follows that of the first, as a polynomial of degree one."""
+    """Let the hinge of the second joint follow that of the first, by a polynomial of degree one."""
     hinge = {link.joint.name: link for link in tree.links}
     first, second = (hinge[name] for name in one.joints)
     equality = spec.add_equality(
@@ -180,7 +180,7 @@ def _stiffen(equality: Any, step: float) -> None:
 
 @dataclass(frozen=True)
 class _JointMotion:
-    """What MuJoCo said at the samples it reached: positions, velocities, accelerations of its joints; energies."""
+    """Results of MuJoCo at the samples reached: positions, velocities, accelerations of its joints; energies."""
 
     joints: tuple[Array, Array, Array]
     energy: Array

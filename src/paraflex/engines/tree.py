@@ -1,4 +1,4 @@
-"""A mechanism as a tree of bodies on hinges, as engines in joint coordinates see it, and its motion body by body."""
+"""A mechanism as a tree of bodies on hinges, for engines in joint coordinates, and its motion body by body."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Link:
 
     @property
     def sign(self) -> float:
-        """Of the joint's angle in terms of the hinge's, which is that of the child relative to the parent."""
+        """Sign of the joint's angle relative to the hinge's, which is that of the child relative to the parent."""
         return 1.0 if self.joint.b.body == self.name else -1.0
 
     @property
@@ -37,13 +37,13 @@ class Link:
 
     @property
     def parent(self) -> str:
-        """The body it hangs on, or the ground."""
+        """The parent body, or the ground."""
         return self.other.body
 
 
 @dataclass(frozen=True)
 class Tree:
-    """Bodies on hinges, parents before children, and what the tree leaves out.
+    """Bodies on hinges, parents before children, and the joints that close loops.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Tree:
 
 
 def spanning_tree(mechanism: Mechanism) -> Tree:
-    """Hang all bodies on the ground, by joints with springs or gears first and then by those with motors.
+    """Connect all bodies with the ground, by joints with springs or gears first and then by those with motors.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
 
 
 def _split(joints: list[Joint]) -> tuple[list[Joint], list[Joint]]:
-    """Joints that join what was apart before, first come first served, and those that close loops (Kruskal)."""
+    """Joints that join separate parts, in order, and those that close loops (Kruskal)."""
     group: dict[str, str] = {}
 
     def root(name: str) -> str:
@@ -141,7 +141,7 @@ def body_motion(system: System, tree: Tree, hinges: tuple[Array, Array, Array]) 
     q, v, a = out = tuple(np.zeros((k, system.n)) for _ in range(3))
 
     def arm(ref: PointRef) -> tuple[Array, Array, Array]:
-        """From a body's origin to a point of it, and the derivatives."""
+        """Vector from a body's origin to a point of it, and its derivatives."""
         angle = system.body(ref.body).angle
         x, y = place(system, ref)
         c, s, w = np.cos(q[:, angle]), np.sin(q[:, angle]), v[:, angle, None]

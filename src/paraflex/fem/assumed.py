@@ -28,12 +28,12 @@ _RIGID = 1e-7
 
 @dataclass(frozen=True)
 class Sine:
-    """A sine of so many half waves along the bar, sin(n pi z) with z = x/L."""
+    """A sine with a number of half waves along the bar, sin(n pi z) with z = x/L."""
 
     half_waves: int
 
     def evaluate(self, z: Array, derivative: int = 0) -> Array:
-        """Values at z (k,), or those of a derivative by z."""
+        """Values at z (k,), or values of a derivative by z."""
         k = self.half_waves * pi
         wave = (np.sin, np.cos)[derivative % 2](k * z)
         return (-1) ** (derivative // 2) * k**derivative * wave
@@ -46,7 +46,7 @@ class Polynomial:
     coefficients: tuple[float, ...]
 
     def evaluate(self, z: Array, derivative: int = 0) -> Array:
-        """Values at z (k,), or those of a derivative by z."""
+        """Values at z (k,), or values of a derivative by z."""
         derived = np.polynomial.polynomial.polyder(np.array(self.coefficients) * 1.0, derivative)
         return cast(Array, np.polynomial.polynomial.polyval(z, derived))
 
@@ -64,7 +64,7 @@ class PlacedLump(NamedTuple):
 
 @dataclass(frozen=True)
 class AssumedShapes:
-    """Shape functions of a bar of some length [m]."""
+    """Shape functions of a bar of a given length [m]."""
 
     length: float
     transverse: tuple[ShapeFunction, ...]

@@ -1,4 +1,4 @@
-"""Eigenpairs of stiffness and mass matrices, exact for the soft modes too, and their derivatives by a complex step."""
+"""Eigenpairs of stiffness and mass matrices, accurate for soft modes too, and their derivatives by a complex step."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def eigen_derivatives(values: Numbers, vectors: Numbers, dK: Numbers, dM: Number
 
 
 def _refined(K: Numbers, M: Numbers, values: Numbers, vectors: Numbers) -> tuple[Numbers, Numbers]:
-    """One correction of all pairs (Ogita and Aishima 2018): what errs by a part of the stiffest errs by one of its own.
+    """One correction of all pairs (Ogita and Aishima 2018): errors become relative to each eigenvalue.
 
     The stiffness of a beam's modes spans many powers of ten, and the error of a dense solver is a part of the largest.
     """

@@ -36,7 +36,7 @@ _AXIAL_COLUMNS = [AXIAL, 4 + AXIAL]
 
 @cache
 def _coefficients(derivative: int) -> Array:
-    """Of the derivatives of the Hermite polynomials with respect to z: (powers, 6)."""
+    """Coefficients of the derivatives of the Hermite polynomials with respect to z: (powers, 6)."""
     rows = np.polynomial.polynomial.polyder(_HERMITE, derivative, axis=1)
     return np.ascontiguousarray(rows.T, dtype=np.float64)
 

@@ -1,4 +1,4 @@
-"""Second-order geometry of a beam: as it bends, its points move towards its first end.
+"""Second-order geometry of a beam: bending moves its points towards its first end.
 
 With the axial coordinates taken as the stretch of the centre line, a point stands at
 s(x) = x0 + N u - 1/2 e_x f(x), f(x) = int_0^x (N2' u)^2 dx. Everything that moves is a mass point: Gauss points along
@@ -105,7 +105,7 @@ def slope_squares(mesh: BeamMesh, basis: Array, x: Array, u: Array) -> Array:
 
 
 def slope_square_integrals(mesh: BeamMesh, basis: Array, x: Array) -> Callable[[Array], Array]:
-    """`slope_squares` as a function of the flexible coordinates alone, for who asks often.
+    """`slope_squares` as a function of the flexible coordinates alone, for repeated calls.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Inertia shape integrals and stiffness of a body: all the constants its equations of motion need (Eqs. 13-28)."""
+"""Inertia shape integrals and stiffness of a body, the constants of its equations of motion (Eqs. 13-28)."""
 
 from __future__ import annotations
 

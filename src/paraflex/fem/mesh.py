@@ -1,4 +1,4 @@
-"""The mesh of a straight beam: its named points become nodes, each span between them is cut into elements."""
+"""The mesh of a straight beam: its named points are nodes, each span between them is divided into elements."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from paraflex.fem.element import (
     axial_shape,
     transverse_shape,
 )
+from paraflex.limits import ELEMENTS, at_most
 
 # Two points closer than this fraction of the beam are one node: an element that short is a typing slip.
 COINCIDENT_POINTS = 1e-9
@@ -71,7 +72,7 @@ class BeamMesh:
 
     @property
     def n_flexible(self) -> int:
-        """Number of flexible coordinates a reference condition leaves: 4 an element, and one a separate curvature."""
+        """Number of flexible coordinates under a reference condition: 4 per element, and one per separate curvature."""
         return self.n_nodal - (3 if self.n_elements in self.separate else 4)
 
     @property
@@ -80,7 +81,7 @@ class BeamMesh:
 
     @property
     def length(self) -> float:
-        """Of the beam [m]."""
+        """Length of the beam [m]."""
         return float(self.nodes[-1])
 
     def column(self, node: int, coordinate: int) -> int:
@@ -103,7 +104,7 @@ class BeamMesh:
         return np.arange(coordinate, COORDINATES_PER_NODE * self.nodes.size, COORDINATES_PER_NODE)
 
     def with_separate_curvature(self, nodes: Iterable[int]) -> BeamMesh:
-        """The same mesh with curvature separate on either side of these nodes, and free at the last if it is one."""
+        """The same mesh with curvature separate on either side of these nodes, and free at the last node among them."""
         return replace(self, separate=tuple(sorted(set(nodes))))
 
     def shape_at(self, x: float) -> tuple[Array, Array]:
@@ -190,9 +191,10 @@ def _per_span(elements: int | Sequence[int], n_spans: int) -> list[int]:
             f"the beam has {n_spans} span(s) between its points and ends",
             field="elements",
             value=counts,
-            remedy="give one number for all spans or one number a span",
+            remedy="give one number for all spans or one number per span",
         )
     for count in counts:
         if count < 1:
             raise InputError("a span needs at least one element", field="elements", value=count, remedy="use 1 or more")
+    at_most(sum(counts), ELEMENTS, "elements", "too many elements of a beam")
     return counts

@@ -1,4 +1,4 @@
-"""Eigenmodes of a body in its reference frame: the flexible coordinates the kernels work in."""
+"""Eigenmodes of a body in its reference frame: the flexible coordinates of the kernels."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class ModalBasis:
     vectors: Array
 
     def lowest(self, count: int) -> ModalBasis:
-        """The modes of lowest frequency alone: the modal reduction."""
+        """The modes of lowest frequency: modal reduction."""
         return ModalBasis(self.omega[:count], self.vectors[:, :count])
 
     def like(self, other: ModalBasis, Mff: Array) -> ModalBasis:
-        """Those of these modes that are nearest to the modes of a body little different, in their order and signs.
+        """Those of these modes that are nearest to the modes of a slightly different body, in their order and signs.
 
         Frequencies may cross as a body changes, and eigenvectors have no sign: told by overlap, modes change smoothly.
 
@@ -49,7 +49,7 @@ class ModalBasis:
 
 
 def modal_basis(body: ShapeIntegrals) -> ModalBasis:
-    """Diagonalise a body's flexible coordinates; all modes kept is the identical model."""
+    """Diagonalise a body's flexible coordinates; with all modes kept the model is the same."""
     if body.nf == 0:
         return ModalBasis(omega=np.zeros(0), vectors=np.zeros((0, 0)))
     squares, vectors = eigenpairs(body.K, body.Mff)

@@ -1,4 +1,4 @@
-"""Reference conditions: how the floating frame is fixed to the deforming beam.
+"""Reference conditions: how the floating frame is attached to the deforming beam.
 
 Each is a basis of the same space, the nodal coordinates without the three rigid-body motions and without the
 curvature of the last node (zero in the paper's Eq. 9, and in truth unless a moment of inertia sits there). A beam of
@@ -21,7 +21,7 @@ N_RIGID = 3
 
 
 class ReferenceCondition(Enum):
-    """Where the body frame sits on the deformed beam.
+    """Place of the body frame on the deformed beam.
 
     CANTILEVER (the paper's Eq. 9)
         at the first node, x along the tangent there.

@@ -16,6 +16,7 @@ from paraflex.files.schema import (
     ModelTable,
     RigidTable,
 )
+from paraflex.limits import SHAPE_FUNCTIONS, at_most
 from paraflex.mechanism import (
     AssumedModesBeam,
     Body,
@@ -167,4 +168,5 @@ def _damping(table: DampingTable | None, name: str) -> Damping | None:
 def _functions(sines: int, polynomials: list[list[float]], field: str) -> tuple[ShapeFunction, ...]:
     if sines < 0:
         raise InputError("must not be negative", field=field, value=sines, remedy="say 2")
+    at_most(sines, SHAPE_FUNCTIONS, field)
     return (*(Sine(n) for n in range(1, sines + 1)), *(Polynomial(tuple(row)) for row in polynomials))

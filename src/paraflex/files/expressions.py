@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
 from paraflex.files.jets import FUNCTIONS, Jet
+from paraflex.limits import EXPRESSION_LETTERS, PARAMETER_CHAIN
 
-# Longer ones are no lengths of links; parsing them would only take time.
-_LONGEST = 200
 _CONSTANTS = {"pi": math.pi}
 # The name of time in an expression of it.
 TIME = "t"
@@ -111,6 +110,9 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
         if name in open_names:
             circle = " -> ".join([*open_names[open_names.index(name) :], name])
             raise ExpressionError(f"a circle of parameters, {circle}", "give one of them a number")
+        if len(open_names) >= PARAMETER_CHAIN:
+            remedy = f"at most {PARAMETER_CHAIN}; give one of them a number"
+            raise ExpressionError("a chain of too many parameters", remedy)
         entry = table[name]
         if isinstance(entry, str):
             values[name] = _evaluate(entry, lambda other: value_of(other, (*open_names, name)))
@@ -163,8 +165,9 @@ def _float(number: float) -> float:
 
 
 def _parse(text: str) -> ast.AST:
-    if len(text) > _LONGEST:
-        raise ExpressionError("too long for an expression", f"at most {_LONGEST} letters; name its parts as parameters")
+    if len(text) > EXPRESSION_LETTERS:
+        remedy = f"at most {EXPRESSION_LETTERS} letters; name its parts as parameters"
+        raise ExpressionError("too long for an expression", remedy)
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):

@@ -13,7 +13,7 @@ from paraflex.files.generators import generated_text, generator_names, is_genera
 from paraflex.files.library import library_file, library_names
 from paraflex.files.mechanism import read_mechanism, read_path
 from paraflex.files.merge import merged, same
-from paraflex.files.read import naming, parse_toml, read_text, read_toml, validate
+from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
 from paraflex.files.rows import with_names, with_rows
 from paraflex.files.schema import ModelTable, PathFile
 from paraflex.files.start import read_start
@@ -310,7 +310,7 @@ def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
         path, source = FilePath(str(library_file(text))), f"{text}.toml"
     else:
         path, source = FilePath(name_or_file), text
-        if not path.exists() and path.suffix != ".toml":
+        if path.suffix != ".toml" and not exists(path):
             raise InputError(
                 "neither a library mechanism nor a file",
                 field="mechanism",

@@ -13,12 +13,12 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, listed
 from paraflex.files.expressions import evaluate_parameters
+from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
 
-# A mechanism written by hand is some kilobytes; far more is a wrong file, and parsing it would only take long.
-_LARGEST_FILE = 5_000_000
-
+# A key of more parts than any has: the parser would take minutes for thousands of them.
+_DEEP_KEY = re.compile(rf"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{KEY_PARTS}}}""")
 # The field that says of which kind a table is, in every file.
 _TAG = "type"
 _NO_TABLE = ("dict_type", "model_type", "model_attributes_type")
@@ -37,17 +37,57 @@ def read_text(path: Path, source: str) -> str:
     Raises
     ------
     InputError
-        No such file, not readable, or not UTF-8.
+        See `text_of`.
+    """
+    with naming(source):
+        return text_of(path, "file", None, unread="check its name", wrong="name a TOML file")
+
+
+def text_of(path: Path, field: str, name: str | None, *, unread: str, wrong: str) -> str:
+    """The text of a file, of which no more is read than one of ours may have; with or without a mark at its start.
+
+    Parameters
+    ----------
+    path : Path
+    field, name : str
+        Of errors: what names the file, and how.
+    unread, wrong : str
+        Remedies where the file cannot be read, and where it is no such text.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is no regular file, too large, or not UTF-8.
     """
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError("too large for a model file", field="file", remedy="name a TOML file", source=source)
-        return path.read_bytes().decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError("not a text file in UTF-8", field="file", remedy="name a TOML file", source=source) from error
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError(f"cannot be read ({reason})", field="file", remedy="check its name", source=source) from error
+        content = _content(path)
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        raise InputError(f"cannot be read ({reason})", field=field, value=name, remedy=unread) from None
+    if len(content) > FILE_BYTES:
+        remedy = f"{wrong}, of at most {FILE_BYTES // 10**6} MB"
+        raise InputError("too large a file", field=field, value=name, remedy=remedy)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("not a text file in UTF-8", field=field, value=name, remedy=wrong) from None
+
+
+def _content(path: Path) -> bytes:
+    """What is in a file, and hardly more than may be in one."""
+    # Opening a pipe would wait for who writes into it, and devices have no end.
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError("not a regular file")
+    with path.open("rb") as stream:
+        return stream.read(FILE_BYTES + 1)
+
+
+def exists(path: Path) -> bool:
+    """Whether there is such a file; of a name that none can have there is none."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
@@ -58,8 +98,13 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     InputError
         It is not TOML.
     """
+    if _DEEP_KEY.search(text):
+        raise InputError(
+            "not valid TOML: a name of too many parts", field="file", remedy=f"at most {KEY_PARTS} between dots",
+            source=source,
+        )  # fmt: skip
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _not_toml(str(error), source) from error
     except (ValueError, RecursionError):
@@ -69,6 +114,24 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
             remedy="name a model file",
             source=source,
         ) from None
+    _check_names(data, source)
+    return data
+
+
+def _check_names(data: dict[str, Any], source: str) -> None:
+    """Names are none too long, at whatever depth."""
+    left: list[tuple[str, Any]] = [("", data)]
+    while left:
+        table, value = left.pop()
+        inner = value.items() if isinstance(value, dict) else [("", each) for each in value]
+        for name, each in inner:
+            if len(name) > NAME_LETTERS:
+                raise InputError(
+                    f"a name of {len(name)} letters", field=table or "file", value=name,
+                    remedy=f"at most {NAME_LETTERS}", source=source,
+                )  # fmt: skip
+            if isinstance(each, dict | list):
+                left.append((f"{table}.{name}".strip("."), each))
 
 
 def _not_toml(reason: str, source: str) -> InputError:
@@ -113,7 +176,7 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
 
 def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
     problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
-    location = _fields(schema, problem)
+    location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)
     model, description = _look_up(schema, data, location)
     kind, value = problem["type"], problem.get("input")
@@ -122,7 +185,7 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
     if kind == "extra_forbidden":
         known = sorted(model.model_fields) if model is not None else []
         near = get_close_matches(str(location[-1]), known, n=1)
-        remedy = f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
+        remedy = f'did you mean "{near[0]}"?' if near else f"known here: {listed(known)}"
         return InputError("unknown field", field=field, value=value, remedy=remedy, source=source)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _tag_problem(_tags(schema, problem["loc"]), field, value, source)
@@ -168,11 +231,17 @@ def _tags(schema: type[BaseModel], location: tuple) -> list[str]:
     return [tag for kind in kinds for tag in typing.get_args(kind)]
 
 
-def _fields(schema: type[BaseModel], problem: Any) -> list:
-    """An error's location without the variants of unions in it."""
-    location = problem["loc"]
+def _fields(schema: type[BaseModel], data: Any, problem: Any) -> list:
+    """An error's location without the variants of unions in it, which are no names in the file."""
+    location, found = problem["loc"], []
     tag = _tag_position(schema, location[0]) if location else None
-    return [part for position, part in enumerate(location) if position != tag and not _is_variant(part)]
+    for position, part in enumerate(location):
+        named = isinstance(data, dict) and part in data
+        if position != tag and (named or not _is_variant(part)):
+            found.append(part)
+            within = named or (isinstance(data, list) and isinstance(part, int) and part < len(data))
+            data = data[part] if within else None
+    return found
 
 
 def _tag_position(schema: type[BaseModel], table: Any) -> int | None:
@@ -189,10 +258,10 @@ def _tag_position(schema: type[BaseModel], table: Any) -> int | None:
 
 def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
     """How well a problem explains itself: a misspelt name best, for it explains the missing one beside it."""
-    location = _fields(schema, problem)
+    location = _fields(schema, data, problem)
     model, _ = _look_up(schema, data, location)
     known = set(model.model_fields) if model is not None else set()
-    name = str(location[-1])
+    name = str(location[-1]) if location else ""
     if problem["type"] == "extra_forbidden":
         if name in known:  # said by another variant of a union than the one that is meant
             return 2

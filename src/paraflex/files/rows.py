@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError
+from paraflex.files.read import text_of
 
-# Millions of rows are no motion to prescribe; the file is a wrong one.
-_LARGEST_FILE = 5_000_000
 _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
 
 
@@ -55,18 +54,8 @@ def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
 
 
 def _read_rows(path: Path, name: str, field: str) -> list[list[float]]:
-    try:
-        size = path.stat().st_size
-        # Some spreadsheets put a mark before the first line.
-        lines = [] if size > _LARGEST_FILE else path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise InputError("not a text file in UTF-8", field=field, value=name, remedy="save it as CSV") from None
-    except (OSError, ValueError) as error:
-        reason = (getattr(error, "strerror", None) or str(error)).lower()
-        remedy = "name a file, seen from the model file's folder"
-        raise InputError(f"cannot be read ({reason})", field=field, value=name, remedy=remedy) from None
-    if size > _LARGEST_FILE:
-        raise InputError("too large a file", field=field, value=name, remedy="at most 5 MB of two columns")
+    unread, wrong = "name a file, seen from the model file's folder", "save two columns as CSV"
+    lines = text_of(path, field, name, unread=unread, wrong=wrong).splitlines()
     rows: list[list[float]] = []
     headed = False
     for number, line in enumerate(lines, start=1):

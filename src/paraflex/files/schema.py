@@ -6,11 +6,11 @@ checked once, in `mechanism.checks` and by the paths themselves.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import MISSING, fields
 from enum import Enum
 from functools import reduce
+from math import inf
 from operator import or_
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args, get_origin, get_type_hints
@@ -19,6 +19,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Fiel
 from pydantic_core import PydanticCustomError
 
 from paraflex.files.expressions import ExpressionError, check_in_time, evaluate
+from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
 from paraflex.mechanism.quantities import joint_pair
 
@@ -44,8 +45,8 @@ def _function(value: Any, info: ValidationInfo) -> Any:
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise _refused("neither a number nor an expression", example)
-    if not abs(value) <= sys.float_info.max:
-        raise _refused("not a finite number", example)
+    if not abs(value) <= LARGEST:
+        raise _refused("not a finite number" if value != value or abs(value) == inf else "too large a number", example)
     return float(value)
 
 
@@ -59,12 +60,14 @@ def _refused(problem: str, remedy: str) -> PydanticCustomError:
 
 # A number, or an expression of parameters in quotes.
 Number = Annotated[
-    float, Field(strict=True, allow_inf_nan=False), BeforeValidator(_number, json_schema_input_type=float | str)
+    float,
+    Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST),
+    BeforeValidator(_number, json_schema_input_type=float | str),
 ]
 # A number, or an expression of parameters and the time t in quotes.
 FunctionOfTime = Annotated[Any, BeforeValidator(_function, json_schema_input_type=float | str)]
-Count = Annotated[int, Field(strict=True)]
-Text = Annotated[str, Field(strict=True)]
+Count = Annotated[int, Field(strict=True, ge=-WHOLE, le=WHOLE)]
+Text = Annotated[str, Field(strict=True, max_length=TEXT_LETTERS)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 # Rows of two numbers; the name of a file stands for its rows, which `rows.with_rows` has put in its place.
 Rows = Annotated[list[Pair], BeforeValidator(lambda value: value, json_schema_input_type=list[Pair] | str)]

@@ -1,4 +1,4 @@
-"""Time integration: methods as objects, our own schemes as tableaux and numbers, SciPy's and SUNDIALS' as guests."""
+"""Time integration: methods as objects, own schemes by tableaux and coefficients, adapters to SciPy and SUNDIALS."""
 
 from paraflex.integrators.events import (
     DeflectionLimit as DeflectionLimit,
@@ -19,6 +19,7 @@ from paraflex.integrators.options import (
     IntegrationOptions as IntegrationOptions,
     check_times as check_times,
     choose as choose,
+    loose_tolerance as loose_tolerance,
 )
 from paraflex.integrators.run import make_problem as make_problem
 from paraflex.integrators.solution import Solution as Solution

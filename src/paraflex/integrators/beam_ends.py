@@ -1,4 +1,4 @@
-"""Points that slide along beams, at the ends of these: refused at the start, watched in a run, reported after it."""
+"""Points that reach the ends of their beams: refused at the start, detected in a run, reported after it."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from paraflex.mechanism import AtEnd
 
 @dataclass(frozen=True)
 class Leaving:
-    """A point that comes to the end of its beam, and when [s]."""
+    """A point that reaches the end of its beam, and the time [s]."""
 
     function: EventFunction
     time: float
 
 
 class BeamEnds:
-    """What a run looks for at the ends of beams, and which points have left theirs.
+    """Events of a run at the ends of beams, and the points that have left theirs.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class BeamEnds:
     def pass_over(
         self, crossing: Crossing, functions: Sequence[EventFunction]
     ) -> tuple[tuple[EventFunction, ...], Crossing | None]:
-        """What a run goes on to look at after a crossing, and the crossing that ends it in the same step, or None."""
+        """The events left after a crossing, and the crossing in the same step that ends the run, or None."""
         left, found = tuple(functions), crossing
         while found is not None and not found.function.ends_run:
             self._left.append(Leaving(found.function, found.t))
@@ -64,7 +64,7 @@ class BeamEnds:
         return left, found
 
     def findings(self, q: Array) -> tuple[Finding, ...]:
-        """One for each point that left its beam; samples q (k, n) say how far it came."""
+        """A finding for each point that left its beam; samples q (k, n) give its distance."""
         return tuple(_finding(one, one.function.value(q)) for one in self._left)
 
 
@@ -73,7 +73,7 @@ STAY_ON_BEAM = 'lengthen the beam, or let the run go on with at_end = "warn"'
 
 
 def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
-    """Findings of points that a motion at samples t, q, v takes off their beams, by cubics between samples.
+    """Findings of points that leave their beams in a motion at samples t, q, v, by cubics between samples.
 
     Raises
     ------
@@ -91,12 +91,12 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
 
 
 def beyond_ends(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
-    """Findings of points that go on where their beams end, in a motion at samples t, q, v."""
+    """Findings of points that continue beyond the ends of their beams, in a motion at samples t, q, v."""
     return _going_on(_leavings(system, t, q, v), q)
 
 
 def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Leaving | None:
-    """The point that ends a motion at samples t, q, v, since it comes to the end of its beam first; None for none.
+    """The first point to reach the end of its beam in a motion at samples t, q, v, if that ends it; else None.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def _going_on(leavings: Iterable[tuple[Leaving, int]], q: Array) -> tuple[Findin
 
 
 def _leavings(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Leaving, int]]:
-    """Points that a motion takes off their beams, each with the first sample outside."""
+    """Points that leave their beams in a motion, each with the first sample outside."""
     for function in beam_end_functions(system):
         outside = np.nonzero(function.inside(q) <= 0.0)[0]
         if outside.size:
@@ -124,7 +124,7 @@ def _leavings(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Le
 
 
 def _first_outside(function: EventFunction, t: Array, q: Array, v: Array, k: int) -> float:
-    """When a motion comes to a bound between its samples k - 1 and k."""
+    """Time at which a motion reaches a bound between its samples k - 1 and k."""
     path = scipy.interpolate.CubicHermiteSpline(t[k - 1 : k + 1], q[k - 1 : k + 1], v[k - 1 : k + 1])
 
     def inside(time: float) -> float:

@@ -1,4 +1,4 @@
-"""Marching to the first event: looked for within each step, found there, and the state at it."""
+"""March to the first event: detected within each step and located there, with the state at the event."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _FOUND = 1e-13
 
 @dataclass(frozen=True)
 class Crossing:
-    """An event on the way from one instant to the next.
+    """An event between two instants.
 
     Attributes
     ----------
@@ -47,22 +47,22 @@ class Crossing:
 
     @property
     def t(self) -> float:
-        """Of the event [s]."""
+        """Time of the event [s]."""
         return self.before.t + self.fraction * (self.after.t - self.before.t)
 
     @property
     def reached(self) -> str:
-        """What was reached."""
+        """The limit that was reached, in words."""
         return self.function.reached(_poses(self.before, self.after, self.fraction)[0])
 
     @property
     def message(self) -> str:
-        """What was reached and when."""
+        """The limit that was reached, and the time."""
         return f"{self.reached} at t = {self.t:.6g} s"
 
 
 def advance(run: Run, functions: Sequence[EventFunction], attempts: int) -> tuple[int, Crossing | None]:
-    """March by so many attempted steps, or to the first event among them; the code of the last one."""
+    """March by a number of attempted steps, or to the first event among them; the code of the last one."""
     if not functions:
         return run.march(attempts), None
     code, before = PAUSED, run.now()
@@ -86,7 +86,7 @@ def advance(run: Run, functions: Sequence[EventFunction], attempts: int) -> tupl
 
 
 def _inside(functions: Sequence[EventFunction], instant: Instant) -> Array:
-    """How far inside its bounds each function is."""
+    """Distance of each function from its bounds, positive inside."""
     return np.array([function.inside(instant.q[None])[0] for function in functions])
 
 
@@ -128,7 +128,7 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
 
 
 def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
-    """A run begun at a state: what its first sample holds, and the power there, follow from the state alone."""
+    """A run that starts from a state, from which alone its first sample and the power there follow."""
     here = replace(problem, initial=State(t, q, v), times=np.array([t]), stops=np.array([t + problem.span]))
     begun = native.prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))
     begun.start()
@@ -155,7 +155,7 @@ def _cubic(y0: Array, dy0: Array, y1: Array, dy1: Array, h: float, x: Array | fl
 
 
 def _root(function: EventFunction, before: Instant, after: Instant, first: float, last: float) -> float:
-    """The fraction of a step between two others, inside and outside, at which the bound is met."""
+    """The fraction of a step between two others, inside and outside, at which the bound is reached."""
 
     def inside(x: float) -> float:
         return float(function.inside(_poses(before, after, x))[0])

@@ -1,4 +1,4 @@
-"""What a run with events looks at: a number for each event, and the bounds it is to stay between."""
+"""Event functions: a number for each event, and its bounds."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _LINE = 3
 
 @dataclass(frozen=True)
 class EventFunction:
-    """What tells of an event: a value of the pose, and the bounds it is to stay between.
+    """A function of the pose that defines an event, and its bounds.
 
     Attributes
     ----------
@@ -56,12 +56,12 @@ class EventFunction:
         return not (isinstance(self.event, BeamEnd) and self.event.at_end is AtEnd.WARN)
 
     def inside(self, q: Array) -> Array:
-        """How far poses (k, n) are inside the bounds (k,): positive inside, zero at the event."""
+        """Distance of poses (k, n) from the bounds (k,): positive inside, zero at the event."""
         value = self.value(q)
         return np.minimum(value - self.low, self.high - value)
 
     def reached(self, q: Array) -> str:
-        """What is reached at a pose (n,), in words."""
+        """The limit that is reached at a pose (n,), in words."""
         event, value = self.event, float(self.value(q[None])[0])
         if isinstance(event, JointLimit):
             lower = value - self.low < self.high - value
@@ -79,7 +79,7 @@ class EventFunction:
 
 
 def event_functions(system: System, q: Array, events: Sequence[Event]) -> tuple[EventFunction, ...]:
-    """One for each event, for runs that start at q (n,).
+    """One function for each event, for runs that start at q (n,).
 
     Raises
     ------
@@ -101,7 +101,7 @@ def event_functions(system: System, q: Array, events: Sequence[Event]) -> tuple[
 
 
 def beam_end_functions(system: System) -> tuple[EventFunction, ...]:
-    """Those of the places where points slide along beams, from 0 to the length of the beam."""
+    """Functions for the places of points that slide along beams, from 0 to the length of the beam."""
     functions = []
     for end in beam_ends(system.mechanism):
         margin = _AT_END * end.length
@@ -151,7 +151,7 @@ def _deflection(system: System, name: str) -> Callable[[Array], Array]:
 
 
 def deflection_rows(body: BodyCoordinates) -> tuple[Array, Array, Callable[[Array], Array] | None]:
-    """Where a flexible body's deflection is looked at, and how these places move in the body frame.
+    """Places at which a flexible body's deflection is evaluated, and their displacement rows in the body frame.
 
     Of a beam its ends and quarters of its elements, of a bar of given shapes places along it, of a modal body its
     points: places undeformed (places, 2) [m], displacements per modal coordinate (places, 2, nf), and of second-order

@@ -1,4 +1,4 @@
-"""Events that end a run: a joint at its limit, a link bent too far, a singular position near."""
+"""Events that end a run: a joint at its limit, the deflection of a link at its limit, a singular position near."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from paraflex.mechanism.quantities import known
 
 @dataclass(frozen=True)
 class JointLimit(CheckedFields):
-    """A joint between stops: the run ends where its coordinate reaches one of them.
+    """Limits of a joint: the run ends when its coordinate reaches one of them.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class JointLimit(CheckedFields):
 
 @dataclass(frozen=True)
 class DeflectionLimit(CheckedFields):
-    """A link that must not bend further.
+    """A limit of the deflection of a link.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class DeflectionLimit(CheckedFields):
 
 @dataclass(frozen=True)
 class SingularDistance(CheckedFields):
-    """A singular position that must not come nearer.
+    """A limit of the distance from a singular position.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class SingularDistance(CheckedFields):
 
 @dataclass(frozen=True)
 class BeamEnd:
-    """The ends of the beam that a joint slides along: every run looks for them, unless the joint says otherwise.
+    """The ends of the beam along which a joint slides, an event of every run unless the joint ignores it.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ given_as("an event")(Event)
 
 
 def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:
-    """Ends of the beams that joints slide along, of those that do not ignore them."""
+    """Ends of the beams along which joints slide, without those that ignore them."""
     found = []
     for joint in mechanism.joints:
         if joint.at_end is not AtEnd.IGNORE:
@@ -135,7 +135,7 @@ def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:
 
 
 def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:
-    """Check that events are such as this mechanism can have.
+    """Check that a mechanism can have these events.
 
     Raises
     ------

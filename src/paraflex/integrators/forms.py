@@ -1,4 +1,4 @@
-"""The equations as solvers of others ask for them: functions of time and one vector, with Jacobian and tolerances.
+"""The equations of motion for external solvers: functions of time and one vector, with Jacobian and tolerances.
 
 An `OdeForm` has y = (q, v, work), multipliers eliminated; the two forms for DAE solvers add them as unknowns. The work
 done is integrated beside the motion, without a say in the steps.
@@ -32,7 +32,7 @@ _IGNORED = 1e20
 
 
 class Solved(NamedTuple):
-    """Accelerations (n,) and multipliers (m,) at an instant, and how many rows depend on others there."""
+    """Accelerations (n,) and multipliers (m,) at an instant, and the number of dependent rows there."""
 
     a: Array
     multipliers: Array
@@ -77,7 +77,7 @@ class OdeForm:
         return Solved(a, lam, dependent)
 
     def rates(self, t: float, y: Array) -> Array:
-        """Y' at (t, y), new."""
+        """Y' at (t, y), in a new array."""
         dy = np.empty(y.size)
         rates(
             self.system.packed, self.signals, t, self._weights, np.array(y), self._a, self._lam, self._torques,
@@ -87,7 +87,7 @@ class OdeForm:
         return dy
 
     def jacobian(self, t: float, y: Array) -> Array:
-        """Derivative of `rates` by y, new."""
+        """Derivative of `rates` by y, in a new array."""
         out = np.empty((y.size, y.size))
         self.rates(t, y)
         arguments = (self._a, self._lam, self._torques, self._ws, self._tangent, out)
@@ -141,7 +141,7 @@ class DescriptorForm(OdeForm):
 
     @property
     def algebraic(self) -> NDArray[np.int64]:
-        """Which unknowns have no derivative."""
+        """The unknowns without a derivative."""
         return np.arange(2 * self.system.n, self.size - 1)
 
     def residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
@@ -151,7 +151,7 @@ class DescriptorForm(OdeForm):
         self._count()
 
     def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
-        """Derivative of the residual by y, plus c times that by dy, new."""
+        """Derivative of the residual by y, plus c times that by dy, in a new array."""
         out = np.empty((self.size, self.size))
         self.residual(t, y, dy, np.empty(self.size))
         arguments = (c, self._dropped, self._torques, self._ws, self._tangent, out)
@@ -159,7 +159,7 @@ class DescriptorForm(OdeForm):
         return out
 
     def pack(self, t: float, q: Array, v: Array, work: float) -> Array:
-        """See `OdeForm`; multipliers are those of the instant."""
+        """See `OdeForm`; multipliers are those at the instant."""
         lam = self.solve(t, q, v).multipliers
         return np.concatenate([q, v, lam, np.zeros((self.multipliers - 1) * self.system.m), [work]])
 
@@ -199,7 +199,7 @@ class StabilisedForm(DescriptorForm):
 
 
 def diagonal_mass(system: System) -> Array:
-    """Mass (n,) that each coordinate moves: the body's, its moment of inertia, one for modes of unit mass."""
+    """Mass (n,) of each coordinate: the body's mass, its moment of inertia, one for modes of unit mass."""
     mass = np.ones(system.n)
     for body, packed in zip(system.bodies, system.packed.bodies, strict=True):
         mass[body.offset : body.offset + 3] = packed["m"], packed["m"], packed["I0"]

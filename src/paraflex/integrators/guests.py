@@ -1,4 +1,4 @@
-"""Methods of SciPy and SUNDIALS: what is known of each, and how its steps are taken."""
+"""Methods of SciPy and SUNDIALS: their properties and parameters, and the steppers that run them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from paraflex.integrators.method import INDEX_1, ODE, Family, Method, Treatment,
 
 
 class Guest(Method):
-    """A method that a solver of others runs.
+    """A method that an external solver runs.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Guest(Method):
 
 
 class SciPyMethod(Guest):
-    """One of `scipy.integrate`.
+    """A method of `scipy.integrate`.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Radau(SciPyMethod):
 
 
 class NDF(SciPyMethod):
-    """Numerical differentiation formulas of orders 1 to 5, which cannot be held at a lower one."""
+    """Numerical differentiation formulas of orders 1 to 5; the order cannot be limited."""
 
     name = "ndf"
     title = "NDF"
@@ -80,7 +80,7 @@ class NDF(SciPyMethod):
 
 
 class SundialsMethod(Guest):
-    """One of SUNDIALS, all of several orders."""
+    """A method of SUNDIALS, of variable order."""
 
     family = Family.SUNDIALS
     multistep = True
@@ -123,7 +123,7 @@ class BDF(SundialsMethod):
 
 @dataclass(frozen=True)
 class IDA(BDF):
-    """Backward difference formulas on the equations as they are, multipliers among the unknowns."""
+    """Backward difference formulas on the implicit equations, with multipliers among the unknowns."""
 
     name = "ida"
     title = "IDA"

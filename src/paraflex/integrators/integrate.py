@@ -1,4 +1,4 @@
-"""Integrate a system by any method: slices of steps, between which Python looks, reports and stops."""
+"""Integrate a system by any method, in slices of steps; between them events, interrupts and limits are checked."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
 from paraflex.integrators.method import NativeMethod
-from paraflex.integrators.options import IntegrationOptions
+from paraflex.integrators.options import IntegrationOptions, loose_tolerance, refuse_tolerance
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
@@ -109,11 +109,13 @@ def integrate(
         It cannot pass a singular position: the mechanism is driven beyond its reach there, or its method is one of
         the Newmark family.
     InputError
-        Times that do not ascend from the start; events that the mechanism cannot have, or a start beyond one, or off
-        the end of a beam.
+        A tolerance beyond the size of the mechanism; times that do not ascend from the start; events that the mechanism
+        cannot have, or a start beyond one, or off the end of a beam.
     """
     began = time.perf_counter()
     options = options or IntegrationOptions()
+    refuse_tolerance(options.tolerance, system.size)
+    loose = loose_tolerance(options.tolerance, system.size)
     problem = make_problem(system, signals, initial, times, knots)
     ends, crossing = BeamEnds(system, initial), None
     functions = (*event_functions(system, initial.q, options.events), *ends.functions)
@@ -146,7 +148,7 @@ def integrate(
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {run.now().t:.6g} s"
     solution = _solution(run, options, time.perf_counter() - began, status, message, crossing)
-    solution = replace(solution, findings=ends.findings(solution.q))
+    solution = replace(solution, findings=(*ends.findings(solution.q), *filter(None, [loose])))
     _refuse_beam_end(solution, crossing)
     if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution
@@ -166,13 +168,13 @@ def integrate(
 
 
 def _failed(error: IntegrationError) -> IntegrationError:
-    """An error whose partial solution says what it says."""
+    """An error with its partial solution, in which the message is that of the error."""
     error.partial = replace(error.partial, status="failed", message=str(error))
     return error
 
 
 def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
-    """Raise where a run ends at the end of a beam and its joint asks for an error."""
+    """Raise if a run ends at the end of a beam and its joint has `at_end` "error"."""
     if crossing is None or not (
         isinstance(crossing.function.event, BeamEnd) and crossing.function.event.at_end is AtEnd.ERROR
     ):
@@ -188,7 +190,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> Run:
 
 
 def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:
-    """Why a run ended with a code of the kernel, or has not ended after the most steps, and what to do."""
+    """Reason and remedy for a run that ended with an error code of the kernel, or has taken the most steps."""
     if code == PAUSED:
         remedy = "allow more steps (max_steps), or choose a coarser tolerance or a shorter duration"
         return Breakdown(f"the run has not ended after {most} steps,", remedy)

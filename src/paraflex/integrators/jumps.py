@@ -1,4 +1,4 @@
-"""Times at which something given jumps: a step that ends there must not see what follows."""
+"""Times at which torques or laws jump, where steps must end."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:
 
 
 def hidden_from(signals: Signals, time: float) -> Signals:
-    """The same signals, each going on after a time as it was before."""
+    """The same signals, each continued smoothly after a time."""
     return signals._replace(breaks=np.where(signals.breaks >= time, np.inf, signals.breaks))
 
 
@@ -50,7 +50,7 @@ def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
 
 
 def _derivative(coefficients: Array, order: int, x: float) -> float:
-    """Of a polynomial with coefficients of ascending powers."""
+    """Derivative of a polynomial with coefficients of ascending powers."""
     value = 0.0
     for power in range(coefficients.size - 1, order - 1, -1):
         value = value * x + perm(power, order) * float(coefficients[power])

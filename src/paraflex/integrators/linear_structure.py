@@ -1,4 +1,4 @@
-"""The Newmark family for linear structures whose constraints change in time, such as a mechanism pose by pose.
+"""The Newmark family for linear structures with constraints that change in time, such as a mechanism pose by pose.
 
     M x'' + K x + C(t)^T mu = f(t),    C(t) x = 0
 
@@ -25,7 +25,7 @@ _DEPENDENT = 1e-12
 
 
 class Block(NamedTuple):
-    """A body of the structure: which coordinates are its own, their mass and stiffness matrices."""
+    """A body of the structure: its coordinates, mass and stiffness matrix."""
 
     columns: slice
     mass: Array
@@ -47,7 +47,7 @@ def march(
     outside: Callable[[slice], tuple[Array, Array]],
     times: Array,
 ) -> Iterator[Response]:
-    """Step a structure from rest, undisplaced.
+    """Integrate a structure from rest without displacement.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def march(
 
 
 class _Condensed(NamedTuple):
-    """The structure at several instants: what makes a step from the prediction x*, in x = x* + b x''.
+    """The structure at several instants, with the matrices of a step from the prediction x*, in x = x* + b x''.
 
     x'' = free - react mu,    mu = close (free + x*/b),    free = load - A^-1 K x*,    A = M + b K
 
@@ -141,7 +141,7 @@ def _condense(blocks: Sequence[Block], inverses: Sequence[NDArray[np.floating]],
 
 
 def _pseudo_inverses(schur: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Inverses of symmetric matrices (k, m, m), dependent rows left out, and how many rows are not dependent."""
+    """Inverses of symmetric matrices (k, m, m) without dependent rows, and the number of independent rows."""
     # Rows in metres and in radians are brought to one size before their rank is judged.
     size = 1.0 / np.sqrt(np.diagonal(schur, axis1=1, axis2=2))
     scaled = size[:, :, None] * schur * size[:, None, :]
@@ -155,7 +155,7 @@ def _pseudo_inverses(schur: Array) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _regular(matrices: Array) -> NDArray[np.floating] | None:
-    """Inverses where none is near singular: several times cheaper than eigenvectors."""
+    """Inverses of matrices none of which is nearly singular: several times cheaper than eigenvectors."""
     try:
         inverse = np.linalg.inv(matrices)
     except np.linalg.LinAlgError:

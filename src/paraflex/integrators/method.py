@@ -1,4 +1,4 @@
-"""What a method of integration is: a frozen object that checks its own parameters and knows all that runs ask of it."""
+"""Methods of integration: frozen objects that check their parameters and have all properties that runs need."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from paraflex.kernel.run_state import Tableau
 
 
 class Family(Enum):
-    """Who runs a method."""
+    """Family of a method, by the code that runs it."""
 
     ESDIRK = "esdirk"
     NEWMARK = "newmark"
@@ -23,7 +23,7 @@ class Family(Enum):
 
 
 class Treatment(Enum):
-    """What keeps the constraints."""
+    """Treatment of the constraints."""
 
     BAUMGARTE = "baumgarte"
     PROJECTION = "projection"
@@ -36,7 +36,7 @@ INDEX_1, ODE, INDEX_3 = "index 1 (Eqs. 56-57)", "ODE (Eqs. 59-60)", "index 3 (Eq
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that a method takes: its default, the range in which the method is stable, what it does."""
+    """A parameter of a method: its default, the range in which the method is stable, its meaning."""
 
     default: float
     low: float
@@ -45,7 +45,7 @@ class Parameter:
 
 
 def parameter(default: float, low: float, high: float, meaning: str, *, follows: bool = False) -> Any:
-    """A field that is a parameter; where it follows from other parameters it is None until the method says what it is.
+    """A field for a parameter; None means that it follows from other parameters.
 
     A parameter whose default is an `int` is a whole number.
     """
@@ -108,22 +108,22 @@ class Method(CheckedFields, ABC):
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        """What it takes, by name."""
+        """Parameters by name."""
         return {each.name: each.metadata["is"] for each in fields(self)}
 
     @property
     def values(self) -> dict[str, float]:
-        """Its parameters as they are."""
+        """Values of the parameters."""
         return {name: getattr(self, name) for name in self.parameters}
 
     @property
     def explicit(self) -> bool:
-        """Whether stiffness limits its steps."""
+        """Whether the method is explicit, so that stiffness limits its steps."""
         return self.stability_limit is not None
 
     @property
     def highest_order(self) -> int:
-        """That it goes up to."""
+        """The highest order of a multistep method."""
         return int(self.values.get("max_order", self.order))
 
 
@@ -131,7 +131,7 @@ given_as("a method of integration", 'its name, such as "tr-bdf2", or an object o
 
 
 class NativeMethod(Method):
-    """A method of our own kernels.
+    """A method of the compiled kernels.
 
     Attributes
     ----------
@@ -146,4 +146,4 @@ class NativeMethod(Method):
     @property
     @abstractmethod
     def scheme(self) -> Tableau:
-        """As the kernel takes it."""
+        """The scheme as the kernel's tableau."""

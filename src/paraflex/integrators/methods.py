@@ -1,4 +1,4 @@
-"""All methods of integration: `METHODS` lists them, and is where names are looked up.
+"""All methods of integration: `METHODS` lists them, and `find_method` finds them by name.
 
 A method is an object with its own parameters: `GeneralisedAlpha(spectral_radius=0.8)`. Wherever one is asked for its
 name is taken as well, and stands for the method with its default parameters.
@@ -47,7 +47,7 @@ DEFAULT_METHOD = ESDIRK5.name
 
 
 def find_method(given: str | Method, parameters: Mapping[str, float] | None = None) -> Method:
-    """A method by its name, or itself; with parameters, as files and commands have them, one of that kind with these.
+    """A method by its name, or itself; with parameters, as files and commands give them, a new method of that kind.
 
     Raises
     ------
@@ -77,17 +77,17 @@ def find_method(given: str | Method, parameters: Mapping[str, float] | None = No
 
 
 def title_of(name: str) -> str:
-    """What figures and tables call a method; its name for one that is not listed here."""
+    """Title of a method in figures and tables; its name if it is not listed here."""
     return METHODS[name].title if name in METHODS else name
 
 
 def _whole(value: float) -> float:
-    """A whole number as such, which a command or a file may have as 2.0."""
+    """A whole number, which a command or a file may have as 2.0."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 class MethodField:
-    """A field of a dataclass that takes a method or its name, and holds the method; by default the default one."""
+    """A field of a dataclass that takes a method or its name, and holds the method."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._place = f"_{name}"

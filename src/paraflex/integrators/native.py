@@ -1,4 +1,4 @@
-"""Runs of our own schemes: the kernel's time loop in slices."""
+"""Runs of the compiled schemes: the kernel's time loop in slices."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _TREATMENTS = {
 
 @dataclass(frozen=True)
 class NativeRun:
-    """Everything the kernel's time loop works on: a `Run`."""
+    """All arrays of the kernel's time loop: a `Run`."""
 
     problem: Problem
     scheme: Tableau
@@ -155,7 +155,7 @@ class NativeRun:
         )
 
     def _resume(self) -> None:
-        """A first stage with what is given after a jump; energies go on counting from the run's start."""
+        """A first stage after a jump; energies and work continue."""
         kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
         arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
         start(*arguments, self.state, self.workspace, empty_samples(np.zeros(0), self.problem.system))
@@ -163,7 +163,7 @@ class NativeRun:
 
 
 def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
-    """Note the rows that follow from others at a pose; their number."""
+    """Mark the redundant rows at a pose; their number."""
     packed = system.packed
     count = int(factor_system(packed, 0.0, q, workspace))
     dependent = workspace.schur[packed.rows["start"] + np.arange(system.m) - packed.rows["first"]] == 0.0
@@ -172,7 +172,7 @@ def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
 
 
 def _least_step(problem: Problem) -> float:
-    """The smallest step of a run, however far from zero its clock starts [s]."""
+    """The smallest step of a run, however large its times [s]."""
     latest = max(abs(problem.initial.time), abs(float(problem.stops[-1])))
     return max(_LEAST * problem.span, _DIGITS * float(np.spacing(latest)))
 

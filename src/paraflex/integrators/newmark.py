@@ -1,4 +1,4 @@
-"""The Newmark family: sets of numbers, and how each method fills them."""
+"""The Newmark family: coefficients of its members, from the parameters of each method."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from paraflex.kernel.run_state import Tableau
 
 @dataclass(frozen=True)
 class NewmarkNumbers:
-    """What makes a member of the family.
+    """Coefficients of a member of the family.
 
     (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) v_1' + alpha_f v_0'
     q_1 = q_0 + h v_0 + h^2 ((1/2 - beta) a_0 + beta a_1),    v_1 = v_0 + h ((1 - gamma) a_0 + gamma a_1)
@@ -38,22 +38,22 @@ class NewmarkNumbers:
 
     @classmethod
     def damped(cls, alpha_m: float, alpha_f: float) -> NewmarkNumbers:
-        """Of second order, and with the beta that damps high frequencies most."""
+        """Coefficients of second order with the beta of the largest damping at high frequencies."""
         gamma = 0.5 + alpha_f - alpha_m
         return cls(alpha_m, alpha_f, 0.25 * (0.5 + gamma) ** 2, gamma)
 
     def weight(self, step: float) -> float:
-        """What a new position has of the new acceleration: b in q_1 = q* + b v_1' [s^2]."""
+        """Coefficient b of the new acceleration in q_1 = q* + b v_1' [s^2]."""
         return self.beta * step**2 * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
 
     @property
     def order(self) -> int:
-        """Two, or one for a method that damps at the cost of accuracy."""
+        """Order: two, or one for a method with numerical damping of first order."""
         return 2 if abs(self.gamma - 0.5 - self.alpha_f + self.alpha_m) < 1e-12 else 1
 
 
 class NewmarkMethod(NativeMethod):
-    """A member of the family, by its numbers."""
+    """A member of the family, given by its coefficients."""
 
     family = Family.NEWMARK
     form = INDEX_3
@@ -63,11 +63,11 @@ class NewmarkMethod(NativeMethod):
     @property
     @abstractmethod
     def numbers(self) -> NewmarkNumbers:
-        """What makes it a member."""
+        """Coefficients of the method."""
 
     @property
     def scheme(self) -> Tableau:
-        """As the kernel takes it."""
+        """The scheme as the kernel's tableau."""
         numbers = self.numbers
         return Tableau(
             A=np.array([[0.0, 0.0], [0.5, 0.5]]),
@@ -82,7 +82,7 @@ class NewmarkMethod(NativeMethod):
 
 @dataclass(frozen=True)
 class Newmark(NewmarkMethod):
-    """Newmark's method; beta, where it is not given, is the one that damps high frequencies most."""
+    """Newmark's method; by default beta is that of the largest damping at high frequencies."""
 
     name = "newmark"
     title = "Newmark"
@@ -105,13 +105,13 @@ class Newmark(NewmarkMethod):
 
     @property
     def numbers(self) -> NewmarkNumbers:
-        """What makes it a member."""
+        """Coefficients of the method."""
         return NewmarkNumbers(0.0, 0.0, self.values["beta"], self.gamma)
 
 
 @dataclass(frozen=True)
 class Wilson(NewmarkMethod):
-    """Acceleration linear up to theta h, where equilibrium is asked for."""
+    """Wilson's method: acceleration linear up to theta h, where equilibrium holds."""
 
     name = "wilson-theta"
     title = "Wilson theta"
@@ -122,13 +122,13 @@ class Wilson(NewmarkMethod):
 
     @property
     def numbers(self) -> NewmarkNumbers:
-        """What makes it a member."""
+        """Coefficients of the method."""
         return NewmarkNumbers(0.0, 0.0, 1.0 / 6.0, 0.5, self.theta)
 
 
 @dataclass(frozen=True)
 class HHT(NewmarkMethod):
-    """Forces of both ends of the step are mixed by alpha."""
+    """The method of Hilber, Hughes and Taylor: forces of both ends of the step are averaged with alpha."""
 
     name = "hht-alpha"
     title = "HHT alpha"
@@ -138,13 +138,13 @@ class HHT(NewmarkMethod):
 
     @property
     def numbers(self) -> NewmarkNumbers:
-        """What makes it a member."""
+        """Coefficients of the method."""
         return NewmarkNumbers.damped(0.0, -self.alpha)
 
 
 @dataclass(frozen=True)
 class GeneralisedAlpha(NewmarkMethod):
-    """Forces and accelerations are mixed so that low frequencies are damped least for a given radius."""
+    """The generalised-alpha method: least damping of low frequencies for a given spectral radius."""
 
     name = "generalised-alpha"
     title = "Generalised alpha"
@@ -154,6 +154,6 @@ class GeneralisedAlpha(NewmarkMethod):
 
     @property
     def numbers(self) -> NewmarkNumbers:
-        """What makes it a member."""
+        """Coefficients of the method."""
         radius = self.spectral_radius
         return NewmarkNumbers.damped((2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0))

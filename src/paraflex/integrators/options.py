@@ -1,4 +1,4 @@
-"""What a user chooses of an integration, checked."""
+"""Options of an integration, checked."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, as_enum
+from paraflex.findings import Finding
 from paraflex.integrators.events import Event
 from paraflex.integrators.methods import Method, MethodField, Treatment
+from paraflex.limits import SAMPLES, at_most
 
+# A tolerance beyond this part of the mechanism's size is doubted: at a fifth the five-bar's tracking error is half as
+# large again.
+LOOSE = 0.05
 _REMEDIES = {
     "tolerance": "give a length in metres, say 1e-5",
     "step": "give a time in seconds",
@@ -24,7 +29,7 @@ _REMEDIES = {
 @given_as("IntegrationOptions", "them, say IntegrationOptions(tolerance=1e-6)")
 @dataclass(frozen=True)
 class IntegrationOptions(CheckedFields):
-    """How to integrate.
+    """Method, tolerance and further options of an integration.
 
     Attributes
     ----------
@@ -95,7 +100,7 @@ class IntegrationOptions(CheckedFields):
 
     @property
     def treatment(self) -> Treatment:
-        """What keeps the constraints."""
+        """Treatment of the constraints."""
         return self.method.treatments[0] if self.constraints is None else Treatment(self.constraints)
 
     def to_dict(self) -> dict[str, str]:
@@ -130,8 +135,28 @@ class IntegrationOptions(CheckedFields):
             )  # fmt: skip
 
 
+def loose_tolerance(tolerance: float, size: float) -> Finding | None:
+    """The doubt about a tolerance of integration, if there is one, in a mechanism of that size [m]."""
+    if tolerance <= LOOSE * size:
+        return None
+    return Finding(
+        "tolerance-loose", "tolerance",
+        f"{tolerance:.3g} m, in a mechanism of about {size:.2g} m: positions may be off by as much",
+        f"it is in m: choose at most a thousandth of the size, {1e-3 * size:.0g}",
+    )  # fmt: skip
+
+
+def refuse_tolerance(tolerance: float, size: float) -> None:
+    """Raise an `InputError` for a tolerance beyond the size of the mechanism [m]: its steps would follow nothing."""
+    if tolerance > size:
+        raise InputError(
+            f"more than the mechanism is large, about {size:.2g} m", field="tolerance", value=tolerance,
+            remedy=f"it is in m: choose at most a thousandth of the size, {1e-3 * size:.0g}",
+        )  # fmt: skip
+
+
 def check_times(duration: float | None, samples: int | None) -> None:
-    """Check how long a run is to be [s] and how many samples of it are kept; None says nothing of it.
+    """Check the duration of a run [s] and the number of its samples; None skips a check.
 
     Raises
     ------
@@ -142,11 +167,12 @@ def check_times(duration: float | None, samples: int | None) -> None:
         raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
     if samples is not None and samples < 2:
         raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
+    at_most(samples or 0, SAMPLES, "samples", "too many samples")
 
 
 @checked_arguments()
 def choose(method: Method | str | None, options: IntegrationOptions | None) -> IntegrationOptions:
-    """The options, by default the default ones, with the method where one is named.
+    """The options, by default the default ones, with another method if one is given.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Runs by solvers of others: stops, samples, energies and figures around a `Stepper`."""
+"""Runs by external solvers: stops, samples, energies and counts around a `Stepper`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _PATIENCE = 0.1
 
 
 class OutsideRun:
-    """A run by a solver of others: a `Run`."""
+    """A run by an external solver: a `Run`."""
 
     def __init__(self, problem: Problem, options: IntegrationOptions, stepper: Stepper) -> None:
         self.problem = problem
@@ -66,7 +66,7 @@ class OutsideRun:
         warn_if_stiff(self._stepper.form, self.problem, self._options.method)
 
     def march(self, attempts: int) -> int:
-        """See `Run`; fewer steps where they take long."""
+        """See `Run`; fewer steps if they take long."""
         until, began = self.attempts + attempts, time.perf_counter()
         while self.attempts < until and time.perf_counter() - began < _PATIENCE:
             code = self._advance()
@@ -94,7 +94,7 @@ class OutsideRun:
         )
 
     def _begin(self, t: float, q: Array, v: Array, work: float) -> None:
-        """Start anew, with what acts from t on as far as the next jump."""
+        """Start again, with the signals from t up to the next jump."""
         problem, form = self.problem, self._stepper.form
         form.signals = problem.signals_from(t)
         solved = form.solve(t, q, v)
@@ -130,7 +130,7 @@ class OutsideRun:
         return np.array(stored_energy(packed, instant.q, instant.v, instant.multipliers, self._scratch))
 
     def _note(self, instant: Instant) -> None:
-        """Keep the largest violations of constraints and of the energy balance."""
+        """Record the largest violations of constraints and of the energy balance."""
         values = self.problem.system.constraints(self._stepper.form.signals, instant.t, instant.q, instant.v)
         largest = [np.max(np.abs(x), initial=0.0) for x in values]
         self._violation = np.maximum(self._violation, largest)
@@ -138,7 +138,7 @@ class OutsideRun:
         self._balance = max(self._balance, abs(change[0] + change[1] - change[2] - instant.work))
 
     def _note_passage(self, t0: float, t1: float) -> None:
-        """Keep from when to when a run is at a singular position; steps that touch are of one."""
+        """Record the interval of a singular position; adjacent steps are of one interval."""
         if self._passages and t0 <= self._passages[-1][1]:
             t0 = self._passages.pop()[0]
         self._passages.append((t0, t1))

@@ -1,4 +1,4 @@
-"""How fast a run gets on: where its steps shrink so far that it would hardly end, it is given up early."""
+"""Pace of a run: a run whose steps become so small that it would hardly end is given up early."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NEAR = 1e-2
 
 
 class Pace:
-    """Attempted steps against time reached, in a window of the last attempts.
+    """Attempted steps and times reached, in a window of the last attempts.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ class Pace:
 
     @property
     def expected(self) -> float:
-        """Steps of the whole run at the pace of the window; infinite where time stands still."""
+        """Steps of the whole run at the pace of the window; infinite if the time does not advance."""
         attempts, now = self._looks[-1]
         return attempts + (self._end - now) / self.step if self.step > 0.0 else math.inf
 
     def look(self, attempts: int, now: float) -> bool:
-        """Keep how far the run is; whether it should be given up."""
+        """Record the progress of the run; whether it should be given up."""
         self._looks.append((attempts, now))
         while attempts - self._looks[1][0] >= self._window:
             self._looks.popleft()
@@ -76,7 +76,7 @@ class Pace:
 
 
 def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace) -> Breakdown:
-    """Why a run is given up early: how small its steps are, what moves fastest, and what to do."""
+    """Reason for giving a run up early: size of its steps, the fastest body, and the remedy."""
     needed = f"about {pace.expected:.2g}" if math.isfinite(pace.expected) else "infinitely many"
     return Breakdown(
         f"steps are down to {pace.step:.2g} s, and at this pace the run would need {needed} of them: "
@@ -86,7 +86,7 @@ def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace) -> Bre
 
 
 def _fastest(system: System, now: Instant) -> str:
-    """The body that accelerates most, as it turns or as it moves by its size, and how fast it is."""
+    """The body with the largest acceleration, of its angle or of its place over its size, and its speed."""
     parts = [(i, j) for i in range(len(system.bodies)) for j in range(3)]
     columns = [system.bodies[i].offset + j for i, j in parts]
     worst = int(np.argmax(np.abs(now.a[columns]) / system.units[columns]))
@@ -99,6 +99,6 @@ def _fastest(system: System, now: Instant) -> str:
 
 
 def _singular(system: System, now: Instant, start: np.ndarray) -> str:
-    """How near a singular position of the constraints is, where it is near."""
+    """Remark on the distance from a singular position of the constraints, if one is near."""
     measure = float(SingularityMeasure(system, start)(now.q[None])[0])
     return f", {measure:.1g} from a singular position of the constraints" if measure < _NEAR else ""

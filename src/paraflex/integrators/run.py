@@ -1,4 +1,4 @@
-"""What every run is, whoever steps it: the problem, where it stands, what it took. `integrate` needs no more."""
+"""The interface of every run, by any stepper: its problem, state and counts, which is all that `integrate` uses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DEPENDENT_PART = 1e-7
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be integrated.
+    """The problem to be integrated.
 
     Attributes
     ----------
@@ -51,18 +51,18 @@ class Problem:
 
     @property
     def span(self) -> float:
-        """From the start to the end [s]."""
+        """Duration from the start to the end [s]."""
         return float(self.stops[-1] - self.initial.time)
 
     def signals_from(self, time: float) -> Signals:
-        """Signals as steps from a time on may see them: none of what follows the next jump."""
+        """Signals for steps from a time on: continued beyond the next jump without it."""
         ahead = self.jumps[self.jumps > time]
         return hidden_from(self.signals, ahead[0]) if ahead.size else self.signals
 
 
 @dataclass(frozen=True)
 class Instant:
-    """Where a run stands, between two steps; arrays of its own. Work [J] from the start, without that of weight."""
+    """State of a run between two steps, in new arrays. Work [J] from the start, without that of weight."""
 
     t: float
     q: Array
@@ -74,7 +74,7 @@ class Instant:
 
 @dataclass(frozen=True)
 class Figures:
-    """What a run took and left: see `Solution`. Passages (2, p) are from when to when rows were dependent."""
+    """Counts and residuals of a run: see `Solution`. Passages (2, p) are the intervals with dependent rows."""
 
     steps: int
     rejected: int
@@ -92,17 +92,17 @@ class Run(Protocol):
 
     @property
     def problem(self) -> Problem:
-        """What is integrated."""
+        """The problem."""
         ...
 
     @property
     def samples(self) -> Samples:
-        """Filled as far as it has come."""
+        """Samples, filled as far as the run has come."""
         ...
 
     @property
     def dependent_rows(self) -> int:
-        """Constraint rows that follow from others at the start."""
+        """Number of redundant constraint rows at the start."""
         ...
 
     def start(self) -> None:
@@ -110,30 +110,30 @@ class Run(Protocol):
         ...
 
     def march(self, attempts: int) -> int:
-        """Attempt so many steps; a code of `kernel.run_state`."""
+        """Attempt a number of steps; a code of `kernel.run_state`."""
         ...
 
     def now(self) -> Instant:
-        """Where it stands."""
+        """The state of the run."""
         ...
 
     @property
     def singular_ahead(self) -> float | None:
-        """Where an index-3 method is about to come to a singular position, when [s]."""
+        """Time at which an index-3 method is about to reach a singular position [s]."""
         ...
 
     @property
     def attempts(self) -> int:
-        """Steps attempted."""
+        """Number of attempted steps."""
         ...
 
     @property
     def reached(self) -> int:
-        """Samples taken."""
+        """Number of samples taken."""
         ...
 
     def figures(self) -> Figures:
-        """What it took until now."""
+        """Counts and residuals so far."""
         ...
 
 

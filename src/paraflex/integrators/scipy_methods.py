@@ -19,7 +19,7 @@ _RELATIVE = 1e-13
 
 
 class ScipyStepper:
-    """Steps by one of SciPy's solvers, the absolute tolerances given: see `Stepper`."""
+    """Steps by one of SciPy's solvers with given absolute tolerances: see `Stepper`."""
 
     def __init__(self, method: SciPyMethod, form: OdeForm, tolerances: Array, steps: Steps) -> None:
         # Loaded when one runs.

@@ -1,4 +1,4 @@
-"""Derivatives of a run by parameters: the run's own steps, solved to rounding and differentiated stage by stage."""
+"""Derivatives of a run by parameters: its steps are solved to rounding and differentiated stage by stage."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LARGEST_RESIDUAL = 1e-6
 
 
 class Direction(NamedTuple):
-    """How what a run is given changes with a parameter: derivatives, by the parameter as a part of its size.
+    """Derivatives of the inputs of a run by a parameter, relative to the parameter's size.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class RunDerivatives:
-    """A run solved to rounding in its own steps, and how it changes with parameters.
+    """A run solved to rounding with its own steps, and its derivatives by parameters.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ def check_differentiable(options: IntegrationOptions) -> None:
 
 
 def run_derivatives(problem: Problem, options: IntegrationOptions, directions: Sequence[Direction]) -> RunDerivatives:
-    """Derivatives of a run by parameters, its steps as they are.
+    """Derivatives of a run by parameters at constant steps.
 
     Steps keep their share of the interval between two stops: where a stop moves, they move with it.
 
@@ -164,7 +164,7 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
 
 
 def _check_on_beams(problem: Problem, motion: Motion) -> None:
-    """Raise where a sliding point is off its beam at a sample, and the run would not have gone on."""
+    """Raise if a sliding point is off its beam at a sample of a run that would have ended there."""
     for function in BeamEnds(problem.system, problem.initial).functions:
         outside = np.nonzero(function.inside(motion.q) <= 0.0)[0]
         if outside.size and function.ends_run:
@@ -174,7 +174,7 @@ def _check_on_beams(problem: Problem, motion: Motion) -> None:
 
 
 def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Array:
-    """Kinetic energy, strain energy with that of springs, and what gravity has done at samples (k, 3) [J].
+    """Kinetic energy, strain energy with that of springs, and work of gravity at samples (k, 3) [J].
 
     The last counts from where all mass lies at the origin of the ground frame.
     """
@@ -186,7 +186,7 @@ def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Ar
 
 @dataclass(frozen=True)
 class _Chunk:
-    """Accepted steps one after the other, under signals that do not jump."""
+    """Accepted steps in succession, under signals that do not jump."""
 
     history: History
     count: int
@@ -194,7 +194,7 @@ class _Chunk:
 
 
 def _chunks(run: NativeRun) -> Iterator[_Chunk]:
-    """The accepted steps of a run while it is marched, in one history that is filled again and again."""
+    """The accepted steps of a run as it is marched, in one history that is refilled."""
     problem, state, jumps = run.problem, run.state, run.problem.jumps
     history = make_history(_CHUNK, run.scheme.c.size, problem.system.n, problem.system.m)
     run.start()
@@ -223,7 +223,7 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
 
 
 class _Varied:
-    """A run solved to rounding, and its derivatives, as far as they have come."""
+    """A run solved to rounding and its derivatives, up to the present step."""
 
     def __init__(self, problem: Problem, run: NativeRun, directions: Sequence[Direction]) -> None:
         self.problem, self.run, self.directions, self.residual = problem, run, directions, 0.0
@@ -255,7 +255,7 @@ class _Varied:
 
     @property
     def work(self) -> Array:
-        """Without that of weight, which samples count from the origin of the ground frame."""
+        """Work without that of weight, which samples count from the origin of the ground frame."""
         samples = self.samples
         weight = energies(self.problem.system.packed, samples.q, samples.v, samples.lam)[:, 2]
         return samples.energy[:, 2] - weight
@@ -277,7 +277,7 @@ class _Varied:
             self._check(chunk, y.left)
 
     def _vary_times(self, chunk: _Chunk, y: Sensitivity, direction: Direction) -> None:
-        """Derivatives of when steps begin and of their lengths: they share those of the stops around them."""
+        """Derivatives of the begins and lengths of steps, interpolated between those of the stops around them."""
         stops = np.concatenate([[self.problem.initial.time], self.problem.stops])
         change = np.concatenate([[0.0], direction.stops])
         t, h = chunk.history.t[: chunk.count], chunk.history.h[: chunk.count]
@@ -299,7 +299,7 @@ class _Varied:
 
 
 def _moved(record, change: Array) -> tuple:
-    """A packed system or signals at the places of the kernel's differences."""
+    """A packed system or signals at the points of the kernel's differences."""
     numbers = numbers_of(record)
     return tuple(with_numbers(record, numbers + place * STEP * change) for place in PLACES)
 

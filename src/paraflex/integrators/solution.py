@@ -1,4 +1,4 @@
-"""What a run computed."""
+"""The solution of a run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from paraflex.findings import Finding
 
 @dataclass(frozen=True)
 class Solution:
-    """What a run computed, at the times asked for and reached.
+    """The solution of a run at the requested times that were reached.
 
     Attributes
     ----------
@@ -80,11 +80,11 @@ class Solution:
 
     @property
     def event_time(self) -> float:
-        """When the event was that stopped the run [s]; NaN for none."""
+        """Time of the event that stopped the run [s]; NaN if there was none."""
         return float(self.t[-1]) if self.event else math.nan
 
     def followed_by(self, other: Solution, samples: int, multipliers: Array, energy: float) -> Solution:
-        """One run of this one and of another that goes on from its last state, once brakes have taken energy.
+        """One run of this one and its continuation from its last state, after brakes have absorbed energy.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What each method does to x'' = -omega^2 x in steps of h: damping and period error over h omega.
+"""Numerical damping and period error of each method for x'' = -omega^2 x with steps of h, over h omega.
 
 A step takes a vector of values to a matrix (or, of several steps, a companion matrix) times that vector; its
 eigenvalues are the method's characteristic roots. The principal root is the one that follows exp(i h omega).
@@ -51,18 +51,18 @@ class Spectrum:
 
     @property
     def damping_ratio(self) -> Array:
-        """Of the free vibration that the steps describe (Hughes 1987, 9.1); the true one is zero."""
+        """Damping ratio of the vibration that the steps describe (Hughes 1987, 9.1); the exact one is zero."""
         with np.errstate(divide="ignore"):
             return -np.log(np.abs(self.principal)) / self.phase
 
     @property
     def amplitude_decay(self) -> Array:
-        """The part of the amplitude lost in a period."""
+        """The fraction of the amplitude lost in a period."""
         return 1.0 - np.exp(-2.0 * np.pi * self.damping_ratio)
 
     @property
     def period_error(self) -> Array:
-        """Of the free vibration's period, as a fraction of the true one; positive where it is too long."""
+        """Error of the vibration's period as a fraction of the exact one; positive if it is too long."""
         return self.frequency / self.phase - 1.0
 
 
@@ -104,7 +104,7 @@ def spectrum(method: Method | str, frequency: ArrayLike, *, order: int | None = 
 
 
 def _followed(roots: list[Roots], near: complex) -> Roots:
-    """Of each set of roots the one nearest to that of the set before."""
+    """From each set of roots the one nearest to that of the set before."""
     out = np.zeros(len(roots), dtype=complex)
     for k, candidates in enumerate(roots):
         near = out[k] = candidates[np.argmin(np.abs(candidates - near))]
@@ -150,12 +150,12 @@ def tableau_of(method: Method) -> tuple[Array, Array]:
 
 
 def stability(A: Array, b: Array, z: complex) -> complex:
-    """R(z) = 1 + z b (1 - z A)^-1 1 of a Runge-Kutta method: what a step makes of x' = z/h x."""
+    """R(z) = 1 + z b (1 - z A)^-1 1 of a Runge-Kutta method, the factor of a step for x' = z/h x."""
     return complex(1.0 + z * (b @ np.linalg.solve(np.eye(b.size) - z * A, np.ones(b.size))))
 
 
 def _collocation(*nodes: float) -> tuple[Array, Array]:
-    """Tableau of collocation at nodes of which the last is 1: integrals of Lagrange's polynomials."""
+    """Tableau of collocation at nodes of which the last is 1: integrals of Lagrange polynomials."""
     A = np.zeros((len(nodes), len(nodes)))
     for j, own in enumerate(nodes):
         others = [node for node in nodes if node != own]
@@ -176,7 +176,7 @@ def newmark_step(x: float, numbers: NewmarkNumbers) -> Array:
 
 
 def wilson_step(x: float, theta: float) -> Array:
-    """A step's matrix for (x, h x', h^2 x''): acceleration linear up to theta h, where balance is asked for."""
+    """A step's matrix for (x, h x', h^2 x''): acceleration linear up to theta h, where equilibrium holds."""
     stiffness = (x * theta) ** 2
     # theta^2 a_theta = -stiffness x_theta,  x_theta = x + theta x' + theta^2 (2 a + a_theta) / 6
     at_theta = -np.array([1.0, theta, theta**2 / 3.0]) * stiffness / (theta**2 * (1.0 + stiffness / 6.0))
@@ -191,7 +191,7 @@ def wilson_step(x: float, theta: float) -> Array:
 
 
 def highest_order(method: Method) -> int:
-    """Up to which a multistep method has formulas; a run may be held to fewer."""
+    """The highest order of a multistep method's formulas; a run may limit it further."""
     return int(method.parameters["max_order"].high) if "max_order" in method.parameters else method.order
 
 

@@ -1,4 +1,4 @@
-"""What a solver of others must do for a run: take one step at a time, stop where asked to, look back into the step."""
+"""The interface of an external solver: take one step at a time, stop at a time, interpolate within the step."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SAME = 1e-9
 
 
 class SolverCounts(NamedTuple):
-    """What steps took, as far as the solver tells or shows."""
+    """Counts of the steps, as far as the solver reports them."""
 
     evaluations: int
     rejected: int
@@ -23,12 +23,12 @@ class SolverCounts(NamedTuple):
     factorisations: int
 
     def __add__(self, other: SolverCounts) -> SolverCounts:  # type: ignore[override]
-        """Of both."""
+        """Sum of both."""
         return SolverCounts(*(a + b for a, b in zip(self, other, strict=True)))
 
 
 class Steps(NamedTuple):
-    """What steps a solver may take: the first and the longest [s], the highest order of a multistep method."""
+    """Limits of a solver's steps: the first and the longest [s], the highest order of a multistep method."""
 
     first: float
     longest: float
@@ -41,21 +41,21 @@ class Stepper(Protocol):
     form: OdeForm
 
     def begin(self, t: float, y: Array, stop: float) -> None:
-        """Forget what was, and start from y at t towards a stop."""
+        """Start again from y at t towards a stop."""
         ...
 
     def step(self, stop: float) -> int:
-        """Take one step, to the stop or before it: PAUSED, or why there is none."""
+        """Take one step, to the stop or before it: PAUSED, or the reason of a failure."""
         ...
 
     @property
     def t(self) -> float:
-        """Where it stands [s]."""
+        """The present time [s]."""
         ...
 
     @property
     def y(self) -> Array:
-        """The solution there."""
+        """The solution at the present time."""
         ...
 
     def at(self, time: float) -> Array:
@@ -63,12 +63,12 @@ class Stepper(Protocol):
         ...
 
     def counts(self) -> SolverCounts:
-        """Since the run began."""
+        """Counts since the run began."""
         ...
 
 
 def attempts(times: Sequence[float], start: float, places: int) -> int:
-    """How many steps were tried from the start, by the times at which equations were evaluated.
+    """Number of steps attempted from the start, by the times at which equations were evaluated.
 
     Parameters
     ----------

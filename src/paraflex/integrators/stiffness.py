@@ -1,4 +1,4 @@
-"""What an explicit method has to expect of a stiff mechanism."""
+"""Stiffness of a mechanism for explicit methods."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def largest_rate(form: OdeForm, problem: Problem) -> float:
 
 
 def warn_if_stiff(form: OdeForm, problem: Problem, method: Method) -> None:
-    """Say once how many steps stability alone will take, where these are many."""
+    """Warn once of the number of steps that stability requires, if there are many."""
     if not method.explicit or method.stability_limit is None:
         return
     rate = largest_rate(form, problem)

@@ -46,7 +46,7 @@ def load_sundials() -> ModuleType:
 
 
 class SundialsStepper:
-    """What CVODE and IDA have in common: see `Stepper`."""
+    """Common part of CVODE and IDA: see `Stepper`."""
 
     form: OdeForm
     t: float
@@ -97,7 +97,7 @@ class SundialsStepper:
         return self._call(time, "normal").y
 
     def counts(self) -> SolverCounts:
-        """See `Stepper`. Every evaluation is of an iteration; factorisations are those with a new Jacobian."""
+        """See `Stepper`. Every evaluation counts as an iteration; a factorisation is one with a new Jacobian."""
         return self._counts
 
     def _call(self, time: float, method: str) -> Any:

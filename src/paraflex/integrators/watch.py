@@ -1,4 +1,4 @@
-"""What a look at a run between slices of the time loop may find, and what is made of dependent rows at its end."""
+"""Checks of a run between slices of the time loop, and multipliers of dependent rows at its end."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _SAME_FORCES = 1e-9
 
 
 class Breakdown(NamedTuple):
-    """Why a run cannot go on, and what to do about it."""
+    """Reason why a run cannot continue, and the remedy."""
 
     cause: str
     remedy: str
 
 
 def bent_too_far(system: System, q: Array) -> Breakdown | None:
-    """Which beam is bent beyond what the theory can describe, and how far; None for none."""
+    """The beam whose slope exceeds the validity of the theory, and its slope; None if there is none."""
     for body in system.bodies:
         slope = float(np.max(np.abs(body.slopes(q)), initial=0.0))
         if slope > _LARGEST_SLOPE:
@@ -51,7 +51,7 @@ def come_apart(
     tolerance: float,
     treatment: Treatment,
 ) -> Breakdown | None:
-    """Which constraints are left beyond what errors of integration explain, and how far; None for none.
+    """The constraints violated by more than errors of integration explain, and by how much; None if there are none.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def come_apart(
 
 
 def least_norm(system: System, q: Array, multipliers: Array, dependent: int) -> Array:
-    """Multipliers (k, m) at poses (k, n) with the least sum of squares, where so many rows are dependent.
+    """Multipliers (k, m) at poses (k, n) with the least sum of squares, if a number of rows is dependent.
 
     They exert the same forces. Near a singular position other rows nearly depend on one another too, and none of them
     can be told from the others: there multipliers stay as they are.

@@ -1,4 +1,4 @@
-"""Loops that slices would say in one sign, which Numba compiles sooner; and arrays with room around them.
+"""Loops in place of slice expressions, which Numba compiles sooner; and padded arrays.
 
 A compiled loop asks whether what it writes lies close to what it reads, and if so takes another way, which rounds
 differently. Small arrays lie close or not as it happens: runs would differ by rounding from one to the next.
@@ -19,7 +19,7 @@ ROOM = 128
 
 
 def apart(shape: int | tuple[int, ...], dtype: type = float) -> NDArray[Any]:
-    """Zeros of a shape, far from any other array."""
+    """Zeros of a shape, padded on both sides."""
     count = shape if isinstance(shape, int) else prod(shape)
     return np.zeros(count + 2 * ROOM, dtype)[ROOM : ROOM + count].reshape(shape)
 

@@ -25,7 +25,7 @@ def axis_end(system, marker, x, y, q, v, a):
 
 @inlined
 def axis_frame(system, axis, q, v, a):
-    """Of an axis: d and its two derivatives, the angle theta and its two, and R s of both ends."""
+    """Geometry of an axis: d and its two derivatives, the angle theta and its two, and R s of both ends."""
     pax, pay, vax, vay, aax, aay, rax, ray = axis_end(system, axis.a, axis.ax, axis.ay, q, v, a)
     pbx, pby, vbx, vby, abx, aby, rbx, rby = axis_end(system, axis.b, axis.bx, axis.by, q, v, a)
     theta, w, dw = axis.angle, 0.0, 0.0
@@ -49,7 +49,7 @@ def component(ex, ey, d, w, dw):
 
 @routine
 def axis_motion(system, k, q, v, a):
-    """Of axis k: value, rate and acceleration, e, n . d, R s of both ends, and where a point slides on its track.
+    """Motion of axis k: value, rate and acceleration, e, n . d, R s of both ends, and the place on its track.
 
     On a track the value is that of the normal less the deflection W(x) u where the point stands: to first order
     e becomes e + (W' u) E e, and the flexible coordinates take -W.
@@ -75,7 +75,7 @@ def axis_motion(system, k, q, v, a):
 
 @inlined
 def track_piece(system, track, x):
-    """Which piece of a track x lies on, and how far from the piece's start; the end pieces reach beyond the ends."""
+    """The piece of a track at x, and the distance from the piece's start; the end pieces extend beyond the ends."""
     piece = 0
     while piece < track.pieces - 1 and x > system.track_breaks[track.first + piece + 1]:
         piece += 1
@@ -180,7 +180,7 @@ def fill_axis_rows(system, q, jacobian):
 
 @routine
 def turn_axes(system, q, axes):
-    """Direction and lever of every axis at q, for the iteration matrix, and where sliding points stand."""
+    """Direction and lever of every axis at q, for the iteration matrix, and places of sliding points."""
     for k in range(system.axes.size):
         _, _, _, ex, ey, lever, _, _, _, _, x = axis_motion(system, k, q, q, q)
         axes[k, 0], axes[k, 1], axes[k, 2], axes[k, 3] = ex, ey, lever, x

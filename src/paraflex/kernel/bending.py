@@ -1,4 +1,4 @@
-"""Bodies of second-order geometry: sums over mass points. Dense iteration matrices, of these and of coupled damping.
+"""Bodies of second-order geometry: sums over mass points. Dense iteration matrices, also those of coupled damping.
 
 A mass point stands at s = x0 + N u - 1/2 e_x f, f = sum_j W_j (N2'_j u)^2 over the Gauss points j that it reaches, and
 its forces on (r, phi, u) are m p'', m (R E s).p'', m (ds/du)^T R^T p'' with the p'' of any point. The mass matrix is
@@ -62,7 +62,7 @@ def second_order_equations(system, i, q, v, a, f, points):
 
 @inlined
 def shortened(system, i, block, points):
-    """Eight mass points' s_x with two derivatives in the body frame, less what bending takes, by their sums."""
+    """S_x of eight mass points with two derivatives in the body frame, less the shortening, by their sums."""
     body = system.bodies[i]
     pitch = body.pitch
     sx = add_scaled(load(system.inertias, body.inertias + block), load(points.q, block), 1.0)
@@ -79,7 +79,7 @@ def shortened(system, i, block, points):
 
 @routine
 def second_order_shortening(system, i, q, points):
-    """Sum of m f/2 over the mass points of body i: by how much bending shifts its first moment along it."""
+    """Sum of m f/2 over the mass points of body i: shift of its first moment by bending."""
     body = system.bodies[i]
     pitch, total = body.pitch, 0.0
     place_sums(system, i, q, q, q, points)
@@ -200,7 +200,7 @@ def second_order_mass_row(system, i, l, mass, points):
 
 @routine
 def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
-    """Geometric stiffness of body i into work.geometric: of its inertia forces and of its joints' forces along it.
+    """Geometric stiffness of body i into work.geometric: from its inertia forces and its joints' axial forces.
 
     `points` and `geometric` are those of work.
     """
@@ -258,7 +258,7 @@ def subtract_geometric(system, i, geometric, scale, u, x):
 
 @routine
 def linear_mass(system, i, work):
-    """Mass matrix of body i of linear geometry into work.mass, by what `factor.factor_body` noted."""
+    """Mass matrix of body i of linear geometry into work.mass, from the data of `factor.factor_body`."""
     body = system.bodies[i]
     n, k, width, at = body.nf, body.flex, 3 + body.nf, body.dense
     sx, sy, inertia = work.frame[i, 2], work.frame[i, 3], work.frame[i, 4]
@@ -277,7 +277,7 @@ def linear_mass(system, i, work):
 
 @routine
 def factor_dense_body(system, i, b, q, work, dense):
-    """Mass matrix of body i and Cholesky factor of M + g D + b (K + K_g), g^2 = b; without K_g if that is not definite.
+    """Mass matrix of body i and Cholesky factor of M + g D + b (K + K_g), g^2 = b; without K_g if not definite.
 
     Diagonals of the factor hold reciprocals. Returns whether the body's matrix is dense; `dense` is work.dense, None
     where no body's is.

@@ -18,7 +18,7 @@ from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 @inlined
 def linear_terms(system, i, q, v, a, f, scratch):
-    """M q'' + h + D u' + K u of body i by its sums, but for the shares: see `begin_body`."""
+    """M q'' + h + D u' + K u of body i by its sums, without the shares: see `begin_body`."""
     body = system.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
@@ -57,7 +57,7 @@ def linear_terms(system, i, q, v, a, f, scratch):
 
 @inlined
 def begin_body(system, i, q, v, a, f, scratch, points):
-    """M q'' + h + D u' + K u of body i, less its weight, into f, but for the shares in scratch.
+    """M q'' + h + D u' + K u of body i, less its weight, into f, without the shares in scratch.
 
     Joints and motors add theirs, and `sums.hand_on` ends it. `points` is scratch.points, None for linear geometry.
     """
@@ -74,7 +74,7 @@ def begin_body(system, i, q, v, a, f, scratch, points):
 
 @inlined
 def add_coupled_damping(system, i, v, f, scratch):
-    """Add D u' of body i to f, without the diagonal of D, which `linear_terms` and `second_order_equations` take."""
+    """Add the off-diagonal part of D u' of body i to f."""
     body = system.bodies[i]
     if body.damping < 0:
         return
@@ -112,13 +112,13 @@ def motion_forces(system, q, v, a, f, scratch):
 
 @kernel
 def weight_work(system, q, scratch):
-    """What gravity has done since all mass lay at the origin of the ground frame: g . sum m p."""
+    """Work of gravity since all mass was at the origin of the ground frame: g . sum m p."""
     return add_weights(system, q, scratch.points)
 
 
 @inlined
 def add_weights(system, q, points):
-    """Of all bodies; `points` as for `begin_body`."""
+    """Work of the weight of all bodies, as in `weight_work`; `points` as for `begin_body`."""
     total = 0.0
     if system.gravity[0] == 0.0 and system.gravity[1] == 0.0:
         return total

@@ -1,4 +1,4 @@
-"""Closure of a mechanism whose end-effector's motion is given: positions, velocities and accelerations."""
+"""Closure of a mechanism with a given motion of the end-effector: positions, velocities and accelerations."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ CLOSED, NO_CONVERGENCE, TOO_COARSE, SINGULAR = range(4)
 
 @by_reference
 class ClosureScratch(NamedTuple):
-    """What closing loops writes besides the motion."""
+    """Work arrays of the closure."""
 
     single: NDArray[np.float64]  # (n, 1) residual of positions, then what they move by; the same of accelerations
     right: NDArray[np.float64]  # (n, 1 + tasks) of velocities and the basis
@@ -59,7 +59,7 @@ class ClosureScratch(NamedTuple):
 
 
 def make_closure_scratch(system: PackedSystem, tasks: int, signals: int) -> ClosureScratch:
-    """Allocate what `close_path` needs."""
+    """Allocate the work arrays of `close_path`."""
     n, m = int(sum(3 + body["nf"] for body in system.bodies)), system.rows.size
     jacobian, before, factors, fresh, change = (apart((n, n)) for _ in range(5))
     order, fresh_order = apart(n, np.int64), apart(n, np.int64)
@@ -107,7 +107,7 @@ def closure_jacobian(system, marker, coordinates, q, jacobian):
 
 @routine
 def row_unit(system, coordinates, r):
-    """What row r is compared with: the size of the mechanism for a length, 1 for an angle."""
+    """Unit of row r: the size of the mechanism for a length, 1 for an angle."""
     if r < system.rows.size:
         return system.rows[r].unit
     return 1.0 if coordinates[r - system.rows.size] == 2 else system.size
@@ -152,7 +152,7 @@ def largest_shift(system, x):
 
 @routine
 def largest_turn(system, x):
-    """The largest turn of a body among changes of coordinates [rad]."""
+    """The largest rotation of a body among changes of coordinates [rad]."""
     turn = 0.0
     for i in range(system.bodies.size):
         turn = max(turn, abs(x[system.bodies[i].offset + 2]))
@@ -189,7 +189,7 @@ def relative_change(work):
 
 @routine
 def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
-    """Close the loops at one instant by Newton's method, from the pose in q; whether they close, and what gap is left.
+    """Close the loops at one instant by Newton's method, from the pose in q; whether they close, and the gap left.
 
     `known` says that work.factors hold those of a pose nearby, which serve as long as they do it quickly.
     """

@@ -1,4 +1,4 @@
-"""What is left of the equations of closed loops at a motion given: to differentiate what they determine."""
+"""Residuals of the equations of closed loops at a given motion, for derivatives."""
 
 from __future__ import annotations
 

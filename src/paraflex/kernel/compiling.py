@@ -1,4 +1,4 @@
-"""How kernels are compiled: cached on disk, free to reorder sums; by our own changes to Numba, or without them."""
+"""Compilation of kernels: cached on disk, free to reorder sums; with own changes to Numba, or without them."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ _INNER: dict[str, Any] = {"no_cpython_wrapper": True}
 
 
 def routine(function: Callable[..., Any]) -> Any:
-    """Make what is called from kernels only: called from Python it would crash the process."""
+    """Decorate a function that only kernels call: called from Python it would crash the process."""
     return compiled(function, **_OPTIONS, **_INNER)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Make what is called once a body in a hot loop, from kernels only."""
+    """Decorate a function that only kernels call, once per body in an inner loop."""
     return compiled(function, **_OPTIONS, **_INNER, forceinline=True)
 
 
 class Kernel:
-    """A function that Python calls, and other kernels may: compiled for each when it first does.
+    """A function for Python and other kernels, compiled at the first call of each.
 
     Attributes
     ----------
@@ -67,12 +67,12 @@ class Kernel:
 
     @property
     def signatures(self) -> list[Any]:
-        """What it has been compiled for."""
+        """Signatures for which it has been compiled."""
         return [*self.from_python.signatures, *self.inner.signatures]
 
     @property
     def cache_path(self) -> str:
-        """Where it is cached."""
+        """Folder of the cached machine code."""
         return str(self.from_python.stats.cache_path)
 
 
@@ -87,7 +87,7 @@ def kernel(function: Callable[..., Any]) -> Kernel:
 
 
 def releases_lock(function: Callable[..., Any]) -> Kernel:
-    """Make a kernel that lets other threads run meanwhile: of a function that takes long.
+    """Make a kernel of a long function, during which other threads can run.
 
     One that soon returns would have to wait for them.
     """
@@ -95,5 +95,5 @@ def releases_lock(function: Callable[..., Any]) -> Kernel:
 
 
 def unoptimised(function: Callable[..., Any]) -> Kernel:
-    """Make a kernel of what Python calls a few times a run: compiled in half the time, and not fast."""
+    """Make a kernel of a function that Python calls a few times per run: compiled in half the time, and slower."""
     return Kernel(function, quick=True)

@@ -1,4 +1,4 @@
-"""Constraints of the whole system: their values and Jacobian, and the rates and slopes of what is compliant."""
+"""Constraints of the whole system: their values and Jacobian, and rates and slopes of compliant rows."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def constraint_values(system, signals, t, q, v, scratch, phi, dphi):
 
 @unoptimised
 def fill_jacobian(system, q, jacobian):
-    """Phi_q into a dense (rows, n) array, zero in rows that are no constraints; not for the time loop."""
+    """Phi_q into a dense (rows, n) array, zero in rows that are not constraints; not for the time loop."""
     for r in range(system.rows.size):
         fill(jacobian[r], 0.0)
     for k in range(system.ports.size):
@@ -76,7 +76,7 @@ def fill_jacobian(system, q, jacobian):
 
 @inlined
 def damped(kind):
-    """Whether a row of that kind holds the rate of a joint."""
+    """Whether rows of a kind contain the rate of a joint."""
     return kind in (DAMPER, FRICTION)
 
 
@@ -103,7 +103,7 @@ def joint_rates(system, q, v, rates):
 
 @routine
 def dissipated_power(system, q, v, lam, rates):
-    """What dampers and friction take; `rates` is scratch (m,)."""
+    """Power of dampers and friction; `rates` is scratch (m,)."""
     power = 0.0
     if not joint_rates(system, q, v, rates):
         return power

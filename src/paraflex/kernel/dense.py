@@ -1,4 +1,4 @@
-"""Gaussian elimination of small dense systems. Compiled in a second where a LAPACK call takes eight."""
+"""Gaussian elimination of small dense systems, which compiles in a second instead of eight for a LAPACK call."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from paraflex.kernel.compiling import kernel
 
 @kernel
 def factor_dense(matrix, order):
-    """Factors of a matrix in its place, L below the diagonal and U, by elimination with partial pivoting.
+    """Factors L and U of a matrix, in place, by elimination with partial pivoting.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def factor_dense(matrix, order):
 
 @kernel
 def solve_factored(factors, order, right):
-    """Solve matrix x = right in place of right (n, k), with what `factor_dense` left: factors (n, n), order (n,)."""
+    """Solve matrix x = right in place of right (n, k), with the factors (n, n) and order (n,) of `factor_dense`."""
     n, columns = right.shape
     for i in range(n):
         pivot = order[i]

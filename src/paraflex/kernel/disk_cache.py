@@ -1,4 +1,4 @@
-"""Where kernels are kept on disk: machine code of one state of the sources, made by one compiler.
+"""Cache of kernels on disk: machine code of one state of the sources, made by one compiler.
 
 Numba looks at the file of a cached kernel, not at those of the kernels it calls. So each state of all kernels, of
 Numba, llvmlite and NumPy has a folder of its own, and what was compiled from another cannot be loaded. Files are
@@ -90,7 +90,7 @@ class KernelCache(FunctionCache):
 
 
 def make_folder(place: Path) -> Path:
-    """Make the folder of this state in a place for caches; where it is new, the oldest of the others go."""
+    """Make the folder of this state in a cache folder; if it is new, delete the oldest of the others."""
     folder = place / FOLDER
     if folder.exists():
         return folder

@@ -58,7 +58,7 @@ def history_error(h, march):
 
 @routine
 def filtered_error(system, g, gains, memory, march, work, slow):
-    """Mass norms [m] of the estimate in march.eq and march.ev: of position, and of what its velocity error does later.
+    """Mass norms [m] of the estimate in march.eq and march.ev: of position, and of the later effect of velocity.
 
     The velocity error is filtered once more, as if by a step as long as `memory`: what is left of it is the part that
     no elastic force turns round, and that moves the mechanism by memory times its size before the run ends.

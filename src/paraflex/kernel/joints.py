@@ -31,7 +31,7 @@ def marker_shape(system, marker, vector):
 
 @inlined
 def marker_shortening(system, bending, marker, q, v, a):
-    """Half of f, f' and f'' of a marker: how far bending moves it towards the beam's first end.
+    """Half of f, f' and f'' of a marker: displacement by bending towards the beam's first end.
 
     `bending` is p.bending, None for linear geometry.
     """
@@ -55,7 +55,7 @@ def marker_shortening(system, bending, marker, q, v, a):
 
 @inlined
 def marker_angle(system, marker, vector):
-    """The angle phi + N2' u of a marker, or its rate or acceleration, by the system vector given."""
+    """The angle phi + N2' u of a marker, or its rate or acceleration, depending on the system vector."""
     body = system.bodies[marker.body]
     e, k = body.offset + 3, marker.shape
     angle = vector[body.offset + 2]
@@ -75,7 +75,7 @@ def marker_motion(system, marker, q, v, a):
 
 @inlined
 def point_motion(system, marker, c, s, shapes, shortening, q, v, a):
-    """What `marker_motion` returns, by N u and its rates, halves of f and its, cosine and sine of the body's angle."""
+    """Result of `marker_motion`, by N u and its rates, halves of f and its, cosine and sine of the body's angle."""
     o = system.bodies[marker.body].offset
     w, dw = v[o + 2], a[o + 2]
     (sx, sy), (ux, uy), (bx, by) = shapes
@@ -135,7 +135,7 @@ def shorten(system, bending, marker, q, scale, x, at):
 
 @inlined
 def apply_torque(system, marker, torque, f):
-    """Add to f the generalised force of a torque at a marker: it works on phi and on the slope there."""
+    """Add to f the generalised force of a torque at a marker, which acts on phi and on the slope there."""
     body = system.bodies[marker.body]
     e, k = body.offset + 3, marker.shape
     f[body.offset + 2] += torque
@@ -145,7 +145,7 @@ def apply_torque(system, marker, torque, f):
 
 @kernel
 def start_rows(system, signals, t, weights, rows):
-    """Constraint rows before any body: what ground points and prescribed values contribute."""
+    """Contribution of ground points and prescribed values to the constraint rows."""
     weight_a, weight_v, weight_q = weights
     for r in range(system.rows.size):
         row = system.rows[r]
@@ -167,7 +167,7 @@ def start_compliant_rows(system, lam, rows):
 
 @routine
 def finish_friction(system, lam, compliance, rows):
-    """Turn what rows of friction hold, the rate of their joint, into their residual.
+    """Turn the rates of joints in rows of friction into their residuals.
 
     compliance (limit tanh(rate / speed) - lambda) has the slope 1 against the rate where `compliance` was noted.
     """
@@ -179,7 +179,7 @@ def finish_friction(system, lam, compliance, rows):
 
 @routine
 def spring_energy(system, lam):
-    """Energy of the springs by their torques."""
+    """Energy of the springs, from their torques."""
     energy = 0.0
     for r in range(system.rows.size):
         if system.rows[r].kind == SPRING:
@@ -189,7 +189,7 @@ def spring_energy(system, lam):
 
 @routine
 def modal_damping_power(system, v):
-    """What the damping of the flexible coordinates takes."""
+    """Power of the damping of the flexible coordinates."""
     power = 0.0
     for i in range(system.bodies.size):
         body = system.bodies[i]
@@ -224,7 +224,7 @@ def line_end(system, marker, x, y, q, v):
 
 @routine
 def line_state(system, k, q, v):
-    """Stretch, its rate, and the unit vector from a to b of line spring k; zero length has no direction."""
+    """Elongation, its rate, and the unit vector from a to b of line spring k; zero length has no direction."""
     line = system.lines[k]
     ax, ay, vax, vay, _, _ = line_end(system, line.a, line.ax, line.ay, q, v)
     bx, by, vbx, vby, _, _ = line_end(system, line.b, line.bx, line.by, q, v)
@@ -253,7 +253,7 @@ def apply_lines(system, q, v, f):
 
 @routine
 def line_energy(system, q, v):
-    """Energy of the springs between points, and the power their dampers take."""
+    """Energy of the springs between points, and power of their dampers."""
     energy, power = 0.0, 0.0
     for k in range(system.lines.size):
         stretch, rate, _, _ = line_state(system, k, q, v)
@@ -276,14 +276,14 @@ def load_power(system, q, v):
 
 @inlined
 def angle_row(system, marker, kind, weights, q, v, a):
-    """What a marker's angle and its rates give to a row of that kind; linear in q, v and a."""
+    """Contribution of a marker's angle and its rates to a row of a kind; linear in q, v and a."""
     angles = marker_angle(system, marker, q), marker_angle(system, marker, v), marker_angle(system, marker, a)
     return angle_part(kind, weights, angles)
 
 
 @inlined
 def angle_part(kind, weights, angles):
-    """What an angle and its rates give to a row of that kind."""
+    """Contribution of an angle and its rates to a row of a kind."""
     if kind == CONSTRAINT:
         return weights[0] * angles[2] + weights[1] * angles[1] + weights[2] * angles[0]
     return angles[0] if kind == SPRING else angles[1]
@@ -298,7 +298,7 @@ def angle_by_sums(system, marker, q, v, a, scratch):
 
 @inlined
 def motion_by_sums(system, marker, q, v, a, scratch):
-    """What `marker_motion` returns, by the sums of the marker's body."""
+    """Result of `marker_motion`, by the sums of the marker's body."""
     x = marker.column
     y = x + 1
     shapes = (scratch.q[x], scratch.q[y]), (scratch.v[x], scratch.v[y]), (scratch.a[x], scratch.a[y])
@@ -308,7 +308,7 @@ def motion_by_sums(system, marker, q, v, a, scratch):
 
 @inlined
 def shortening_by_products(system, bending, marker, q, v, a, points):
-    """What `marker_shortening` returns; bending u stays in points.B_q. Both are None for linear geometry."""
+    """Result of `marker_shortening`; bending u stays in points.B_q. Both are None for linear geometry."""
     f0, f1, f2 = 0.0, 0.0, 0.0
     if bending is None:
         return f0, f1, f2

@@ -1,4 +1,4 @@
-"""Stages whose corrections do not shrink: GMRES with the exact derivative of the residuals, preconditioned as a run is.
+"""Stages whose corrections do not converge: GMRES with the exact derivative, preconditioned as in a run.
 
 The iteration matrix of a run leaves out terms in velocities and, in linear geometry, those of axial forces. Where they
 outweigh what is kept, as beside an instability that grows within a step, corrections with it grow. The minimal residual
@@ -24,7 +24,7 @@ MOST_VECTORS, ENOUGH = 60, 1e-12
 
 @by_reference
 class Krylov(NamedTuple):
-    """Room for a basis, the least-squares problem in it, and where a stage began."""
+    """Arrays for a basis, the least-squares problem in it, and the start of a stage."""
 
     basis: NDArray[np.float64]  # (vectors + 1, n + m) orthonormal, multipliers scaled
     hessenberg: NDArray[np.float64]  # (vectors, vectors + 1) columns as rows, made triangular by rotations
@@ -36,7 +36,7 @@ class Krylov(NamedTuple):
 
 
 def make_krylov(n: int, m: int) -> Krylov:
-    """Room for systems of n accelerations and m multipliers."""
+    """Allocate arrays for systems of n accelerations and m multipliers."""
     most = min(MOST_VECTORS, n + m)
     small = apart((most, most + 1)), apart(most), apart(most), apart(most + 1)
     return Krylov(apart((most + 1, n + m)), *small, apart(n), apart(m))
@@ -75,7 +75,7 @@ def matrix_times(system, g, b, weights, scale, q, v, a, lam, torques, unit, x, d
 
 @inlined
 def rotate(space, k):
-    """Make column k of the least-squares problem triangular; what is left of the right-hand side."""
+    """Make column k of the least-squares problem triangular; the remaining right-hand side."""
     column = space.hessenberg[k]
     for i in range(k):
         c, s = space.cosines[i], space.sines[i]
@@ -90,7 +90,7 @@ def rotate(space, k):
 
 @inlined
 def orthogonalise(space, k):
-    """Make vector k + 1 orthogonal to those before it, twice, and of unit length; False where nothing is left."""
+    """Make vector k + 1 orthogonal to those before it, twice, and of unit length; False if it is zero."""
     new, column = space.basis[k + 1], space.hessenberg[k]
     fill(column, 0.0)
     for _ in range(2):
@@ -125,7 +125,7 @@ def combine(space, count, unit, work):
 
 @kernel
 def exact_correction(system, g, b, weights, q, v, a, lam, torques, unit, direction, space, work):
-    """Turn the correction of a run in work.x and work.mu to the one that the exact matrix asks for.
+    """Turn the correction of a run in work.x and work.mu into that of the exact matrix.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ INDEPENDENT = 1e-3
 
 @inlined
 def share(work, port, r, part, c, s):
-    """What one part of a port, in the body frame, gives to its constraint row r; c and s turn that frame."""
+    """Contribution of one part of a port, in the body frame, to its constraint row r; c and s rotate that frame."""
     if port.kind == ANGLE:
         return port.weight
     if port.kind == POINT:
@@ -45,14 +45,14 @@ def share(work, port, r, part, c, s):
 
 @inlined
 def add_entry(system, work, row, column, value):
-    """Add to an entry of the Schur complement, by its lower half."""
+    """Add to an entry of the Schur complement, in its lower half."""
     high, low = max(row, column), min(row, column)
     work.schur[system.rows[high].start + low - system.rows[high].first] += value
 
 
 @inlined
 def add_pair_entry(system, work, row, column, same, value):
-    """Add what two ports give to an entry; to a diagonal one two ports that are not the same give it both ways."""
+    """Add the contribution of two ports to an entry; to a diagonal one two different ports contribute twice."""
     add_entry(system, work, row, column, value if same or row != column else 2.0 * value)
 
 
@@ -156,7 +156,7 @@ def solve_schur(system, work, x):
 
 @inlined
 def row_scale(system, r, work, scale):
-    """What makes the iteration matrix symmetric: scale for a constraint, 1/b for a spring, else 1/g."""
+    """Factor that makes the iteration matrix symmetric: scale for a constraint, 1/b for a spring, else 1/g."""
     kind = system.rows[r].kind
     if kind == SPRING:
         return 1.0 / work.step[0]
@@ -218,7 +218,7 @@ def lanes_times(system, i, matrix, x, scratch):
 
 @inlined
 def add_lanes(system, i, work, scale, spring_scale, damper_scale, rows):
-    """Add what `lanes_times` found for the parts of body i's constraint rows to rows, times the scale of their kind."""
+    """Add the result of `lanes_times` for body i's constraint rows to rows, times the scale of their kind."""
     body = system.bodies[i]
     c, s, lanes = work.frame[i, 0], work.frame[i, 1], work.scratch.lanes
     for k in range(body.port, body.port_end):
@@ -245,7 +245,7 @@ def jacobian_times(system, i, work, x, scale, spring_scale, damper_scale, rows):
 
 @inlined
 def reactions(system, i, work, mu):
-    """What multipliers do to body i along the parts of its rows, less: -J^T mu by lanes, into scratch.lanes."""
+    """Forces of multipliers on body i along the parts of its rows, negative: -J^T mu by lanes, into scratch.lanes."""
     body = system.bodies[i]
     c, s, lanes = work.frame[i, 0], work.frame[i, 1], work.scratch.lanes
     for k in range(body.port, body.port_end):
@@ -265,7 +265,7 @@ def reactions(system, i, work, mu):
 
 @inlined
 def lanes_of(system, i, j, work):
-    """The sum of scratch.lanes as coordinate j of body i feels them."""
+    """The sum of scratch.lanes for coordinate j of body i."""
     body = system.bodies[i]
     return row_product(work.response, body.jac + j * body.lanes, body.lanes, work.scratch.lanes)
 

@@ -1,4 +1,4 @@
-"""What becomes machine code: a kernel that Python calls, with copies of all it calls that are its own.
+"""Machine code of kernels: one for each function that Python calls, with its own copies of all functions it calls.
 
 Numba makes machine code of every function and lets the first copy of a function that a process has loaded stand in for
 all others. But copies are fitted to where they are called, and sums may be reordered there: what a kernel computes
@@ -29,7 +29,7 @@ _LITTLE = 0
 
 
 class _Library(JITCodeLibrary):
-    """The code of a function: optimised and made machine code of only where Python calls it."""
+    """The code of a function: optimised and made machine code only if Python calls it."""
 
     called_from_python = True
 
@@ -44,7 +44,7 @@ class _Library(JITCodeLibrary):
         super()._finalize_final_module()
 
     def _divide(self) -> None:
-        """Part what other functions take copies of from what becomes machine code."""
+        """Separate the code that other functions copy from the code that becomes machine code."""
         module = self._final_module
         variables = [f'@"{each.name}" = common global ptr null' for each in module.global_variables if _is_kept(each)]
         if self.called_from_python:
@@ -59,7 +59,7 @@ class _Library(JITCodeLibrary):
 
 
 class _QuickLibrary(_Library):
-    """The code of a function that is made in less time than it takes to make it fast."""
+    """The code of a function, compiled in less time and slower."""
 
     def _optimize_final_module(self) -> None:
         manager, builder = self._codegen._module_pass_manager(opt=_LITTLE, loop_vectorize=False, slp_vectorize=False)
@@ -85,12 +85,12 @@ def _quick_machine(codegen: Any) -> binding.TargetMachine:
 
 
 class SeparateCode(CompilerBase):
-    """Numba's compiler, but for its passes and the libraries it makes."""
+    """Numba's compiler with other passes and libraries."""
 
     library = _Library
 
     def define_pipelines(self) -> list[PassManager]:
-        """The only way that a kernel is compiled."""
+        """The only pipeline of kernels."""
         return [kernel_passes()]
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
@@ -107,13 +107,13 @@ class SeparateCode(CompilerBase):
 
 
 class QuickCode(SeparateCode):
-    """For what is called so seldom that compiling it would take longer than all calls."""
+    """Compiler for functions with so few calls that optimised compilation would take longer."""
 
     library = _QuickLibrary
 
 
 class _Cache:
-    """Where a kernel is kept on disk, looked for when it is first asked for.
+    """Cache of a kernel on disk, read when the kernel is first needed.
 
     What is found there is loaded without all that Numba declares for compiling, which takes longer than loading.
     """
@@ -135,7 +135,7 @@ class _Cache:
 
 
 def compiled(function: Callable[..., Any], *, quick: bool = False, **options: Any) -> Any:
-    """A function compiled in this way; `quick` where compiling it would take longer than all calls."""
+    """A function compiled by `SeparateCode`; `quick` by `QuickCode`."""
     own = {"no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": QuickCode if quick else SeparateCode}
     found: Any = njit(**options, **own)(function)
     found._cache = _Cache(function)
@@ -153,7 +153,7 @@ def _is_entry(function: Any) -> bool:
 
 
 def _is_kept(variable: Any) -> bool:
-    """Whether Numba looks for it, be there code or not."""
+    """Whether Numba looks for it in the cache, which may be empty."""
     return variable.name.startswith("_ZN08NumbaEnv")
 
 

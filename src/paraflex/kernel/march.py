@@ -1,4 +1,4 @@
-"""The time loop: steps accepted or not, their size, energy, dense output."""
+"""The time loop: accepted and rejected steps, their size, energy, dense output."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def first_stage(system, signals, t, controls, march, work):
 
 @routine
 def enter(system, signals, t, controls, march, work):
-    """Where a run comes near a singular position: bring it back to the constraints, what is left of them would grow.
+    """Near a singular position: project the state onto the constraints, as residuals would grow.
 
     Where there is no place on them so near by the mechanism is driven beyond its reach, and cannot pass.
     """

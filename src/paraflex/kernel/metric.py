@@ -1,4 +1,4 @@
-"""The mass matrix at the factor's deformation: what it makes of a vector, and the norm it gives, in metres."""
+"""The mass matrix at the factor's deformation: its product with a vector, and its norm, in metres."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Near a singular position, where for an instant constraint rows depend on one another, and across it.
+"""Steps near and across a singular position, where constraint rows depend on one another for an instant.
 
 There motion is smooth but multipliers have a pole, and what is left of the constraints, Phi, moves the mechanism by
 Phi / root, with root^2 the part of its square that the row nearest to dependence has left when others are eliminated.
@@ -52,7 +52,7 @@ FAR = 10.0
 
 @routine
 def note_root(march, work):
-    """Keep how near to dependence constraint rows are at the start of a step, and how fast that changes."""
+    """Note how near to dependence constraint rows are at the start of a step, and the rate of change."""
     march.clock[WIDEST] = max(march.clock[WIDEST], work.least[0])
     if march.counts[ROOT_STEP] == march.counts[STEPS]:
         return
@@ -72,13 +72,13 @@ def comes_near(h, march):
 
 @routine
 def share_of_passage(h, march):
-    """The part that a step is of the way past a singular position."""
+    """The fraction of the passage of a singular position that a step covers."""
     return min(1.0, abs(march.clock[SLOPE]) * h / (NEAR_ROOT * sqrt(march.clock[WIDEST])))
 
 
 @routine
 def trust(weights, g, b, ahead, march):
-    """How far constraint rows are trusted near a singular position: `held` and `lag` of `hold_rows`.
+    """Weights of constraint rows near a singular position: `held` and `lag` of `hold_rows`.
 
     With root(t) what is left of a row, constraint rows w_a Phi'' + w_v Phi' + w_q Phi of a stage change with its
     acceleration along the opening direction by root (w_a + w_v g + w_q b) + root' (2 w_a g + w_v b): the matrix knows
@@ -93,7 +93,7 @@ def trust(weights, g, b, ahead, march):
 
 @routine
 def hold_rows(system, work, held, lag, rows, scratch):
-    """Right-hand sides of rows that nearly depend on others, as far as these rows are to be trusted.
+    """Right-hand sides of rows that nearly depend on others, reduced as by `trust`.
 
     A row whose part left has a root below `held` gets what follows from the others: the solution does not move along
     the direction in which it nearly depends on them. Of others the true derivative along that direction is the
@@ -119,7 +119,7 @@ def hold_rows(system, work, held, lag, rows, scratch):
 
 @routine
 def damp_rows(system, work, held, rows, scratch):
-    """Right-hand sides of rows such that those with a root below `held` count as if they had that much left."""
+    """Right-hand sides of rows, reduced as if roots below `held` were `held`."""
     for i in range(system.rows.size):
         first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
         follows, square = 0.0, 0.0
@@ -139,7 +139,7 @@ def damp_rows(system, work, held, rows, scratch):
 
 @routine
 def return_to_constraints(system, signals, t, held, march, work):
-    """Bring the end of a step near a singular position back to the constraints; how far it was from them [m].
+    """Project the end of a step near a singular position onto the constraints; the distance from them [m].
 
     Only as far as rows are trusted. Where they are not, what they are off by, and its rate times the time it takes to
     where they are, still tell of that distance.
@@ -169,7 +169,7 @@ def return_to_constraints(system, signals, t, held, march, work):
 
 @routine
 def damped_distance(system, rows, held, work):
-    """How far constraints of these values are from being met [m], rows not trusted counting as far as they are."""
+    """Distance from the constraints with these values [m], with nearly dependent rows reduced."""
     if largest_violation(system, rows) <= CLOSED:
         return 0.0
     damp_rows(system, work, held, rows, work.mu)
@@ -179,7 +179,7 @@ def damped_distance(system, rows, held, work):
 
 @routine
 def begin_near(system, march, work):
-    """Near a singular position: keep what opens the row that is nearest to dependence, at the start of the step."""
+    """Near a singular position: keep the direction that opens the row nearest to dependence, at the step's start."""
     march.counts[NEAR] = 1 + int(work.least[1])
     open_row(system, march.counts[NEAR] - 1, work)
     copy(work.x, march.opening)
@@ -196,7 +196,7 @@ def open_row(system, row, work):
 
 @routine
 def note_crossing(system, t, h, march, work):
-    """Keep when a step has straddled a singular position: what opens the row has changed sign, through infinity."""
+    """Note that a step has passed a singular position: the opening direction has changed sign, through infinity."""
     open_row(system, march.counts[NEAR] - 1, work)
     product, start, end = 0.0, 0.0, 0.0
     for j in range(work.x.size):
@@ -212,7 +212,7 @@ def note_crossing(system, t, h, march, work):
 
 @routine
 def note_position(at, t, h, march):
-    """Keep when a step from t was at a singular position, and as long before and after that as the step lasts."""
+    """Note that a step from t was at a singular position, with an interval of the step's length to both sides."""
     last, around = march.counts[PASSAGES] - 1, max(at - t, t + h - at)
     if last >= 0:
         if abs(0.5 * (march.passages[0, last] + march.passages[1, last]) - at) < SAME_POSITION * h:
@@ -224,7 +224,7 @@ def note_position(at, t, h, march):
 
 @routine
 def note_passage(t, h, march):
-    """Keep from when to when a run is at a singular position; steps that touch are of one."""
+    """Note the interval of a singular position; adjacent steps are of one interval."""
     last = march.counts[PASSAGES] - 1
     if last >= 0:
         if t <= march.passages[1, last]:

@@ -1,4 +1,4 @@
-"""A step of the Newmark family on the index-3 equations, with the algorithmic acceleration carried.
+"""A step of the Newmark family on the index-3 equations, with the algorithmic acceleration as a state.
 
     (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) v_1' + alpha_f v_0'
     q_1 = q_0 + h v_0 + h^2 ((1/2 - beta) a_0 + beta a_1),    v_1 = v_0 + h ((1 - gamma) a_0 + gamma a_1)
@@ -42,14 +42,14 @@ def newmark_start(numbers, t, h, march):
 
 @routine
 def shifted(where, h, march):
-    """What of the last step's change of acceleration to add where the step changes from that of the last one."""
+    """Fraction of the last step's change of acceleration to add if the size of the step changes."""
     last = march.clock[LAST_STEP]
     return where * (h - last) / last if last > 0.0 else 0.0
 
 
 @routine
 def restart_algorithmic(numbers, march):
-    """The algorithmic acceleration anew, from true ones: after steps cut short the carried one serves no more."""
+    """The algorithmic acceleration from true ones, after steps that were divided."""
     where = numbers[ALPHA_M] - numbers[ALPHA_F] if march.clock[LAST_STEP] > 0.0 else 0.0
     for j in range(march.q.size):
         a = march.stage_a[1, 0, j]
@@ -87,7 +87,7 @@ def carry(numbers, h, march):
 
 @routine
 def wilson_end(theta, h, march, work):
-    """From what was found at t + theta h to t + h, acceleration and multipliers being linear in time."""
+    """From the solution at t + theta h to t + h, acceleration and multipliers being linear in time."""
     a0, a1, found = march.algorithmic[0], march.algorithmic[1], march.stage_a[1, 1]
     for j in range(march.q.size):
         a1[j] = a0[j] + (found[j] - a0[j]) / theta
@@ -99,7 +99,7 @@ def wilson_end(theta, h, march, work):
 
 @routine
 def allow_acceleration(system, signals, t, a, march, work):
-    """Change an acceleration to the nearest one that the constraints allow at work.q and work.v."""
+    """Change an acceleration to the nearest one that satisfies the constraints at work.q and work.v."""
     equations(system, signals, t, INDEX_1, work.q, work.v, a, march.stage_lam[1], march.torques, work)
     for r in range(work.rows.size):
         if system.rows[r].kind != CONSTRAINT:

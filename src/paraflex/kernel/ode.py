@@ -1,4 +1,4 @@
-"""The equations as others integrate them: an ODE in (q, v), multipliers eliminated (Eqs. 59-60), with its Jacobian.
+"""The equations for external solvers: an ODE in (q, v), multipliers eliminated (Eqs. 59-60), with its Jacobian.
 
 A third part is added to (q, v), the work done so far: whoever integrates the motion integrates its power as well.
 """
@@ -68,7 +68,7 @@ def rates(system, signals, t, weights, y, a, lam, torques, work, dependent_part,
 
 @kernel
 def stored_energy(system, q, v, lam, scratch):
-    """Kinetic energy, strain energy with that of springs, and what gravity has done: see `bodies.weight_work`."""
+    """Kinetic energy, strain energy with that of springs, and work of gravity: see `bodies.weight_work`."""
     kinetic, strain = system_energy(system, q, v, scratch)
     strain += spring_energy(system, lam) + line_energy(system, q, v)[0]
     return kinetic, strain, weight_work(system, q, scratch)
@@ -167,7 +167,7 @@ def fill_column(direction, column, out):
 
 @routine
 def drop_rows(dropped, row, column, out):
-    """Where a row is dropped, from `row` on, let out say that its multiplier, from `column` on, is zero."""
+    """For dropped rows, from `row` on, write into out that the multiplier, from `column` on, is zero."""
     for r in range(dropped.size):
         if dropped[r]:
             fill(out[row + r], 0.0)

@@ -1,4 +1,4 @@
-"""Layout of what the kernels read (`PackedSystem`, `Signals`) and write (`Workspace`).
+"""Layout of the kernels' input (`PackedSystem`, `Signals`) and work arrays (`Workspace`).
 
 One record a body, port, marker, side of a motor and constraint row; flat arrays for what has a length of its own.
 A *marker* is a material point of a body with its shape rows; a constraint row is a weighted sum over *ports*, each an
@@ -220,7 +220,7 @@ class Signals(NamedTuple):
 
 @by_reference
 class PointScratch(NamedTuple):
-    """What the terms of one body of second-order geometry write besides, by mass point."""
+    """Additional work arrays of one body of second-order geometry, by mass point."""
 
     q: NDArray[np.float64]  # (3 pitch,) Nx u, Ny u and slopes
     v: NDArray[np.float64]
@@ -234,7 +234,7 @@ class PointScratch(NamedTuple):
 
 @by_reference
 class Scratch(NamedTuple):
-    """What the terms of one body write: sums of u, u' and u'' and what follows from them."""
+    """Work arrays for the terms of one body: sums of u, u' and u'' and results from them."""
 
     q: NDArray[np.float64]  # (widest,) sums of u
     v: NDArray[np.float64]
@@ -251,7 +251,7 @@ class Scratch(NamedTuple):
 
 @by_reference
 class Workspace(NamedTuple):
-    """Everything the kernels write, made once a run."""
+    """All work arrays of the kernels, made once per run."""
 
     f: NDArray[np.float64]  # (n,) residual of the equations of motion
     x: NDArray[np.float64]  # (n,) solution of a linear system
@@ -318,7 +318,7 @@ def make_workspace(system: PackedSystem) -> Workspace:
 
 
 def make_scratch(system: PackedSystem) -> Scratch:
-    """Allocate what the terms of one body need."""
+    """Allocate the work arrays for the terms of one body."""
     width, stride, lanes = (int(system.bodies[name].max(initial=0)) for name in ("width", "stride", "lanes"))
     points = None
     if system.bending is not None:

@@ -1,4 +1,4 @@
-"""What Numba does to a kernel before it is machine code, less what no kernel needs.
+"""Numba's passes for a kernel before it is machine code, without those that no kernel needs.
 
 Numba's own list of passes is for any Python function: closures, contexts, parallel loops, rewritten array expressions.
 And it looks for the type of every sum and product anew, among dozens of candidates from strings to dates.
@@ -35,7 +35,7 @@ _found: dict[Any, Any] = {}
 
 @contextmanager
 def remembered_signatures() -> Iterator[None]:
-    """Meanwhile Numba's look-up of what an operator or a built-in function makes of given types remembers."""
+    """Context in which Numba remembers the signatures of operators and built-in functions by types."""
     functions: Any = types.Function
     look_up = functions.get_call_type
 
@@ -59,7 +59,7 @@ def remembered_signatures() -> Iterator[None]:
 
 
 class _Manager(PassManager):
-    """Without bookkeeping after each pass; `IRLegalization` does it once before code is made."""
+    """Pass manager without bookkeeping after each pass; `IRLegalization` does it once before code is made."""
 
     _ENFORCING = False
 
@@ -81,7 +81,7 @@ _PASSES = (
 
 
 def kernel_passes() -> PassManager:
-    """All that is done to a kernel, in order."""
+    """All passes for a kernel, in order."""
     manager = _Manager("kernel")
     for each in _PASSES:
         manager.add_pass(each, each.__name__)

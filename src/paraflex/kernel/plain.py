@@ -1,4 +1,4 @@
-"""Kernels compiled as Numba does it for everybody: slower to compile, the same results but for rounding.
+"""Kernels compiled by plain Numba: slower to compile, the same results but for rounding.
 
 What changes Numba (`machine_code`, `passes`, `records`, `disk_cache`) rests on interfaces that it does not promise to
 keep. None of it is loaded where the environment sets `PARAFLEX_PLAIN_NUMBA=1`, nor with a release of Numba that it has
@@ -26,7 +26,7 @@ TESTED = ("0.62", "0.68")
 
 
 def choose(release: str, environment: MutableMapping[str, str] = os.environ) -> bool:
-    """Whether kernels are compiled plainly; for a release that is not tested this is said once, and handed on."""
+    """Whether kernels are compiled by plain Numba; an untested release is announced once, by the parent process."""
     if not environment.get(VARIABLE):
         if _numbers(TESTED[0]) <= _numbers(release) <= _numbers(TESTED[1]):
             return False
@@ -42,7 +42,7 @@ def _numbers(release: str) -> tuple[int, ...]:
 
 
 def state_of_kernels() -> str:
-    """A digest of what the machine code of any kernel may depend on, but for the processor: Numba tells these apart."""
+    """Digest of everything that machine code of kernels depends on but the processor, which Numba checks."""
     digest = sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(sha256(source.read_bytes()).digest())
@@ -55,7 +55,7 @@ PLAIN = choose(numba.__version__)
 
 
 def compiled(function: Callable[..., Any], *, nogil: bool = False, **options: Any) -> Any:
-    """A function compiled plainly; what concerns our own way alone is left out."""
+    """A function compiled by plain Numba; options of the own compiler are ignored."""
     # The cache goes by this name, and looks at no other function's source.
     function.__qualname__ = f"{function.__qualname__}_{STATE}"
     wanted = {name: options[name] for name in ("error_model", "fastmath")}
@@ -63,5 +63,5 @@ def compiled(function: Callable[..., Any], *, nogil: bool = False, **options: An
 
 
 def by_reference(record: type) -> type:
-    """Numba takes named tuples apart into their fields."""
+    """Leave a named tuple as it is: Numba passes it as its fields."""
     return record

@@ -1,4 +1,4 @@
-"""Back onto the constraints: positions, then velocities, the least change in the metric of the factor.
+"""Projection onto the constraints: positions, then velocities, by the least change in the metric of the factor.
 
 That metric is M + b K, the mass matrix and the stiffness as a step of g^2 = b feels it (Cuadrado, Cardenal and
 Bayo 1997): with the mass alone a correction would ring in the stiffest modes.

@@ -79,7 +79,7 @@ def _unbox(typ, obj, c):
 
 
 def _sealed(builder, place):
-    """The place, as something the compiler knows nothing of: it must not look for a field before all are stored."""
+    """The address, hidden from the compiler, which must not load a field before all are stored."""
     kind = ir.FunctionType(place.type, [place.type])
     return builder.asm(kind, "", "=r,0,~{memory}", [place], side_effect=True)
 
@@ -101,7 +101,7 @@ def _field(context, builder, typ, value, attr):
 
 
 def _load(builder, place):
-    """What stands at a place, which never changes."""
+    """The value at an address, which never changes."""
     kind = place.type.pointee
     if isinstance(kind, (ir.LiteralStructType, ir.ArrayType)):
         count = kind.count if isinstance(kind, ir.ArrayType) else len(kind.elements)

@@ -1,4 +1,4 @@
-"""Steps of a run solved once more, each to rounding: what derivatives are taken of."""
+"""Steps of a run solved again, each to rounding, as the base of derivatives."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NOTHING = 1e-6
 
 @by_reference
 class History(NamedTuple):
-    """Steps of a run, one after the other, with the motion at every stage.
+    """Steps of a run in order, with the motion at every stage.
 
     Until `solve_steps_to_rounding` has solved them accelerations and multipliers are guesses.
     """
@@ -52,7 +52,7 @@ class History(NamedTuple):
 
 
 def make_history(steps: int, stages: int, n: int, m: int) -> History:
-    """Room for so many steps."""
+    """Allocate a history for a number of steps."""
     q, v, a = (apart((steps, stages, n)) for _ in range(3))
     lam, power, restart = apart((steps, stages, m)), apart((steps, stages)), apart(steps, np.int64)
     return History(apart(steps), apart(steps), restart, q, v, a, lam, power, apart(steps), apart(2))
@@ -70,7 +70,7 @@ def baumgarte_weights(controls, alpha, beta, h):
 
 @routine
 def ended(change, previous, iteration):
-    """Whether corrections are down to rounding; relative ones, this and the last."""
+    """Whether corrections are down to rounding, from the last two relative ones."""
     if iteration == 0:
         return change <= ROUNDING
     return change * change <= ROUNDING * previous or (change < NEARLY and change > FALLING * previous)
@@ -78,7 +78,7 @@ def ended(change, previous, iteration):
 
 @inlined
 def relative(x, mu, a, lam, least_a, least_lam):
-    """Corrections of accelerations and multipliers as parts of these, or of the least that count."""
+    """Corrections of accelerations and multipliers relative to these, or to the least that count."""
     change, size = largest(x), max(largest(a), least_a)
     if size > 0.0:
         change /= size
@@ -100,7 +100,7 @@ def prepare_matrix(system, b, q, v, a, lam, dependent_part, work):
 
 @inlined
 def multiplier_unit(least):
-    """What multipliers are measured in beside accelerations: the ratio of the largest ones of a run."""
+    """Unit of multipliers relative to accelerations: the ratio of the largest ones of a run."""
     return least[1] / least[0] if least[0] > 0.0 and least[1] > 0.0 else 1.0
 
 
@@ -142,7 +142,7 @@ def solve_to_rounding(system, signals, t, g, b, weights, dependent_part, march, 
 
 @releases_lock
 def solve_steps_to_rounding(system, signals, tableau, controls, count, history, march, direction, space, work, out):
-    """Solve the first `count` steps of a history again, each to rounding, from where `march` stands; samples into out.
+    """Solve the first `count` steps of a history again to rounding, from the state in `march`; samples into out.
 
     march holds q, v and, unless the first step restarts, the accelerations and multipliers of its first stage.
     """
@@ -226,7 +226,7 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
 
 @kernel
 def sample_energies(system, q, v, lam, scratch, out):
-    """Kinetic energy, strain energy with that of springs, and what gravity has done at samples, into out.
+    """Kinetic energy, strain energy with that of springs, and work of gravity at samples, into out.
 
     q, v : (k, n) arrays; lam : (k, m) array; out : (k, 3) array.
     """

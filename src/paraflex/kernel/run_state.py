@@ -1,4 +1,4 @@
-"""What a run is made of for the time loop: its scheme, the user's controls, its state between calls, its samples."""
+"""Data of a run for the time loop: its scheme, the user's controls, its state between calls, its samples."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ALPHA_M, ALPHA_F, BETA, GAMMA, THETA = range(5)
 
 @by_reference
 class Tableau(NamedTuple):
-    """A scheme: of the ESDIRK family A, c and what else Runge-Kutta methods have; of the Newmark family its numbers.
+    """A scheme: data of a Runge-Kutta method for the ESDIRK family, coefficients for the Newmark family.
 
     A scheme of the Newmark family has the A and c of the trapezoidal rule, by which energy is counted.
     """
@@ -63,7 +63,7 @@ class Tableau(NamedTuple):
 
 @by_reference
 class Controls(NamedTuple):
-    """What the user chooses of a run.
+    """Settings of a run by the user.
 
     The tolerance is that of a whole run of duration T: local errors add up to it when each step's stays below
     tolerance h / T.
@@ -87,7 +87,7 @@ class Controls(NamedTuple):
 
 @by_reference
 class March(NamedTuple):
-    """The state of a run between calls, and its scratch."""
+    """The state of a run between calls, and its work arrays."""
 
     clock: NDArray[np.float64]
     counts: NDArray[np.int64]
@@ -115,7 +115,7 @@ class March(NamedTuple):
 
 @by_reference
 class Samples(NamedTuple):
-    """Dense output: times asked for and what stood there."""
+    """Dense output: requested times and the solution there."""
 
     times: NDArray[np.float64]
     q: NDArray[np.float64]  # (times, n)

@@ -1,4 +1,4 @@
-"""Derivatives of a run by its parameters: its steps solved to rounding, and the linear equations of each stage.
+"""Derivatives of a run by its parameters: steps solved to rounding, and the linear equations of each stage.
 
 With the steps of a run as they are, the stages of a scheme are smooth functions of whatever the equations hold. Along
 a parameter s stage i of a step changes by
@@ -39,14 +39,14 @@ from paraflex.kernel.tangent import note_slopes, residual_tangent
 
 
 def make_piece(signals: Signals) -> Signals:
-    """Room for one piece of every signal."""
+    """Allocate one piece of every signal."""
     count = signals.start.size - 1
     return Signals(2 * np.arange(count + 1), apart(2 * count), apart((2 * count, signals.coefficients.shape[1])))
 
 
 @routine
 def take_pieces(signals, t, moved, pieces):
-    """The piece of every signal at a time alone, from moved signals: near a break no place may see the next piece."""
+    """The piece of every signal at a time, from moved signals, as no point of the difference may see the next piece."""
     for k in range(signals.start.size - 1):
         at = piece_at(signals, k, t)
         for e in range(4):
@@ -125,7 +125,7 @@ def respond_to_parameter(
 
 @inlined
 def moved_power(system, signals, t, place, i, q, v, lam, torques, sensitivity, work):
-    """Power of the motors and all else at one place of the difference."""
+    """Power of the motors and all other forces at one point of the difference."""
     for j in range(q.size):
         sensitivity.moved_q[j] = q[j] + place * STEP * sensitivity.q[i, j]
         sensitivity.moved_v[j] = v[j] + place * STEP * sensitivity.v[i, j]

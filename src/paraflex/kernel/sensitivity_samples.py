@@ -1,4 +1,4 @@
-"""Derivatives of a run at its samples, within a step: those of what `march.write_samples` finds."""
+"""Derivatives of a run at its samples within a step: those of the results of `march.write_samples`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PLACES, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, 
 
 @by_reference
 class Sensitivity(NamedTuple):
-    """Derivatives of the motion by one parameter: what it moves, where the motion stands, and samples."""
+    """Derivatives of the motion by one parameter: derivatives of the inputs, of the state, and of the samples."""
 
     t: NDArray[np.float64]  # (steps,) of when steps begin
     h: NDArray[np.float64]  # and of their lengths
@@ -48,7 +48,7 @@ class Sensitivity(NamedTuple):
 def make_sensitivity(
     steps: int, stages: int, n: int, m: int, times: NDArray[np.float64], sample_times: NDArray[np.float64]
 ) -> Sensitivity:
-    """Room for the derivatives by one parameter; zero."""
+    """Allocate the derivatives by one parameter; zero."""
     k = times.size
     return Sensitivity(
         t=apart(steps),
@@ -110,7 +110,7 @@ def multiplier_sensitivity(tableau, k, fraction, d_fraction, history, sensitivit
 
 @routine
 def sensitivity_at_samples(tableau, k, history, sensitivity):
-    """Derivatives at every sample time within step k: those of what `march.write_samples` finds."""
+    """Derivatives at every sample time within step k: those of the results of `march.write_samples`."""
     t, h, last = history.t[k], history.h[k], tableau.c.size - 1
     piece, i = 0, sensitivity.taken[0]
     while i < sensitivity.times.size and sensitivity.times[i] <= t + h * (1.0 + 1e-12):

@@ -20,7 +20,7 @@ def piece_at(s, k, t):
 
 @kernel
 def evaluate_signal(s, k, t):
-    """Value, rate and acceleration of signal k at time t; held at its ends' pieces outside its range."""
+    """Value, rate and acceleration of signal k at time t; outside its range by the pieces at its ends."""
     piece = piece_at(s, k, t)
     c = s.coefficients[piece]
     x = t - s.breaks[piece]

@@ -72,7 +72,7 @@ def note_torques(signals, t, torques):
 
 @routine
 def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
-    """What `equations` find, with given torques."""
+    """Residuals as by `equations`, with given torques."""
     start_rows(system, signals, t, weights, work.rows)
     start_compliant_rows(system, lam, work.rows)
     for i in range(system.bodies.size):
@@ -165,7 +165,7 @@ def solve_stage(
 
 @inlined
 def place(qs, vs, g, b, a, shift, work):
-    """Q and v of a stage into work.q and work.v."""
+    """Positions and velocities of a stage into work.q and work.v."""
     for j in range(a.size):
         work.q[j] = qs[j] + b * a[j]
         work.v[j] = vs[j] + g * a[j]

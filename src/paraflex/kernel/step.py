@@ -1,4 +1,4 @@
-"""One step: its stages and its error, of a scheme that is data.
+"""One step of a scheme given as data: its stages and its error.
 
 A diagonally implicit scheme with explicit first stage and stiffly accurate last one: stage i stands at
 q_i = q_n + h sum_j A_ij v_j and v_i = v_n + h sum_j A_ij a_j, its own v_i and a_i among them, and the last stage is
@@ -70,7 +70,7 @@ SAME_TIME = 1e-6
 
 @routine
 def input_power(system, signals, t, q, v, lam, torques, work):
-    """Power of the motors, of prescribed motion and of loads, less what dampers, friction and damping take."""
+    """Power of the motors, of prescribed motion and of loads, less that of dampers, friction and damping."""
     total = load_power(system, q, v) + axis_power(system, q, v, torques) - line_energy(system, q, v)[1]
     total -= dissipated_power(system, q, v, lam, work.mu) + modal_damping_power(system, v)
     for k in range(system.motor_sides.size):
@@ -121,7 +121,7 @@ def renew_factor(system, b, march, work):
 
 @routine
 def note_excess(system, iterations, fresh, march):
-    """Count what a step took beyond the first one of its factor, and ask for a new factor once that has cost enough.
+    """Count the cost of a step beyond that of the first one of its factor, and request a new factor when it is large.
 
     Where already the second step of a factor did, the next ones get a new factor each.
     """
@@ -175,7 +175,7 @@ def constraint_weights(controls, h):
 
 @routine
 def attempt(system, signals, tableau, controls, t, h, march, work, slow):
-    """One step from t: all stages and the error estimate, relative to what is allowed.
+    """One step from t: all stages and the error estimate, relative to the allowed error.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Sums over the flexible coordinates of a body, all of them in one pass, and what they give back to each coordinate.
+"""Sums over the flexible coordinates of a body, all of them in one pass, and their transposes.
 
 Column k of `PackedSystem.columns` says what each coordinate of the body contributes to sum k: S2 u and so on, then N u
 and the slope N2' u of every marker on it. A force that works on sum k works on coordinate j with columns[j, k] times
@@ -53,7 +53,7 @@ def body_sums(system, i, q, v, a, scratch):
 
 @inlined
 def clear_shares(system, i, scratch):
-    """Nothing works on any sum of body i."""
+    """Set the generalised forces on all sums of body i to zero."""
     for block in range(0, system.bodies[i].width, LANES):
         store(scratch.shares, block, zeros())
 
@@ -79,7 +79,7 @@ def body_products(system, i, q, v, scratch):
 
 @inlined
 def hand_on(system, i, scratch, f):
-    """Add to f what the shares give to each flexible coordinate of body i."""
+    """Add to f the forces on each flexible coordinate that follow from the shares."""
     body = system.bodies[i]
     e, at = body.offset + 3, body.columns
     for j in range(body.nf):

@@ -25,7 +25,7 @@ from paraflex.kernel.tangent_points import end_tangent, force_tangent, marker_ta
 
 @by_reference
 class Tangent(NamedTuple):
-    """A direction and what changes along it."""
+    """A direction and the changes along it."""
 
     q: NDArray[np.float64]  # (n,) the direction
     v: NDArray[np.float64]
@@ -38,7 +38,7 @@ class Tangent(NamedTuple):
 
 
 def make_tangent(system: PackedSystem) -> Tangent:
-    """Allocate a direction, zero, and room for the changes along it."""
+    """Allocate a direction, zero, and the changes along it."""
     n, m = int(sum(3 + body["nf"] for body in system.bodies)), system.rows.size
     width = int((system.bodies["mass_end"] - system.bodies["mass"]).max(initial=0))
     points = None if system.bending is None else np.zeros((8, width))
@@ -130,7 +130,7 @@ def note_slopes(system, q, v, rates, compliance, direction):
 
 @routine
 def finish_rows(system, compliance, direction):
-    """Rows that are no constraints: their force takes part, and friction answers its rate with its slope."""
+    """Add the compliance and the friction slope to the changes of rows that are not constraints."""
     for r in range(system.rows.size):
         kind = system.rows[r].kind
         if kind == FRICTION:

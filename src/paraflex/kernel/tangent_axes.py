@@ -13,7 +13,7 @@ from paraflex.kernel.tangent_points import end_tangent, force_tangent
 
 @inlined
 def component_tangent(ex, ey, at, change, w, dw, turn, d_w, d_dw):
-    """Changes of what `axes.component` returns: `at` is d with its derivatives, `change` that of it, e turns by turn.
+    """Changes of the results of `axes.component`: `at` is d with its derivatives, `change` theirs; e turns by turn.
 
     e changes by turn E e, so that e . x changes by turn e x x + e . dx, and e x x by e x dx - turn e . x.
     """
@@ -71,7 +71,7 @@ def add_track_tangent(system, axis, x, d_x, force, d_force, direction):
 
 @routine
 def axis_tangent(system, k, q, v, a, direction):
-    """Of axis k: changes of value, rate and acceleration; e, its change; the lever, its change; x, its change.
+    """Changes for axis k: of value, rate and acceleration; e, its change; the lever, its change; x, its change.
 
     Then R s of both ends and its changes, four numbers each. On a track as in `axes.axis_motion`: e and lever are
     those of the normal to the deflected beam.

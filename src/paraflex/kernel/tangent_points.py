@@ -11,7 +11,7 @@ from paraflex.kernel.packed import NX, NY
 
 @inlined
 def shortening_tangent(system, bending, marker, q, v, a, direction):
-    """Changes of what `joints.marker_shortening` returns."""
+    """Changes of the results of `joints.marker_shortening`."""
     f0, f1, f2 = 0.0, 0.0, 0.0
     if bending is None:
         return f0, f1, f2
@@ -33,7 +33,7 @@ def shortening_tangent(system, bending, marker, q, v, a, direction):
 
 @routine
 def marker_tangent(system, marker, q, v, a, direction):
-    """Changes of what `joints.marker_motion` returns: of a marker's position, velocity, acceleration and R s."""
+    """Changes of the results of `joints.marker_motion`: a marker's position, velocity, acceleration and R s."""
     o = system.bodies[marker.body].offset
     c, s = cos(q[o + 2]), sin(q[o + 2])
     w, dw, turn = v[o + 2], a[o + 2], direction.q[o + 2]
@@ -107,7 +107,7 @@ def shorten_tangent(system, bending, marker, q, force, d_force, direction):
 
 @inlined
 def end_tangent(system, marker, q, v, a, direction):
-    """Changes of what `marker_motion` returns for one end of an axis or a line: zero on the ground."""
+    """Changes of the results of `marker_motion` for one end of an axis or a line: zero on the ground."""
     if marker < 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return marker_tangent(system, system.markers[marker], q, v, a, direction)

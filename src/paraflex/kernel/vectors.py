@@ -1,4 +1,4 @@
-"""Eight numbers at once: vectors for what a compiler does not find by itself.
+"""Vectors of eight numbers, for loops that compilers do not vectorise.
 
 Loops over the handful of flexible coordinates of a body are too short for it: they end before the vector units have
 begun. So arrays that such loops run over are laid out in groups of `LANES`, padded with zeros, and taken by these

@@ -27,6 +27,7 @@ from paraflex.kernel.closure import CLOSED, SINGULAR, close_path, make_closure_s
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.kinematics.reach import PoseSearch, Shortfall
+from paraflex.limits import solvable
 from paraflex.mechanism import Assembly, Mechanism, PointRef
 from paraflex.mechanism.members import TASK_COORDINATES
 
@@ -77,7 +78,7 @@ class RigidMotion:
 
     @property
     def desired(self) -> PathMotion:
-        """Of the end-effector at the times t: the path's, and its own where x or y is no task coordinate."""
+        """Desired motion of the end-effector at the times t: the path's, or its own if x or y is no task coordinate."""
         planned, effector = self.path.evaluate(self.t), self.mechanism.end_effector
         assert effector is not None
         given = [name in effector.coordinates for name in ("x", "y")]
@@ -88,6 +89,7 @@ class RigidMotion:
 
 
 @checked_arguments()
+@solvable("the motion along the path")
 def follow_path(
     mechanism: Mechanism,
     path: Path,
@@ -138,7 +140,7 @@ def path_follower(
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
 ) -> Callable[[Sequence[float] | Array], RigidMotion]:
-    """`follow_path` for several sets of times: what does not depend on them is made once.
+    """`follow_path` for several sets of times, with a common preparation.
 
     Parameters
     ----------
@@ -165,7 +167,7 @@ def path_follower(
 def _assembled(
     mechanism: Mechanism, path: Path, end: float, assembly: str | Assembly | None, orientation: float
 ) -> tuple[PathClosure, Array]:
-    """What closes loops along a path, and the pose of the assembly; errors as of `follow_path`."""
+    """The closure along a path, and the pose of the assembly; errors as of `follow_path`."""
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
     closure = PathClosure(mechanism.rigid(), orientation, end)
@@ -187,7 +189,7 @@ def reach_shortfall(
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
 ) -> Shortfall:
-    """How far a path lies from what the mechanism can reach: zero at every instant of a path within reach.
+    """Distance of a path from the workspace: zero at every instant of a path within it.
 
     The distance from a place wanted to the nearest pose that joints and prescribed motions allow, found from the pose
     of the assembly onwards along the path, and from others where these come nearer. A path within reach may still not
@@ -213,7 +215,7 @@ def reach_shortfall(
 
 
 def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Times and more between them where they are further apart than closure steps; which of them were there."""
+    """Times, with more between those further apart than closure steps; which of them were given."""
     pieces = np.maximum(1, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9))).astype(int)
     first = np.concatenate([[0], np.cumsum(pieces)])
     step = np.repeat(np.diff(times) / pieces, pieces)
@@ -225,7 +227,7 @@ def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 class PathClosure:
-    """The rigid system with its task marker: what closes its loops."""
+    """The rigid system with its task marker, whose loops are closed along a path."""
 
     packed: PackedSystem
     marker: int
@@ -246,7 +248,7 @@ class PathClosure:
         self.reach: PoseSearch = PoseSearch(self.system, effector.point, self.coordinates, self.signals)
 
     def check_degrees_of_freedom(self, assembly: Assembly) -> None:
-        """Raise unless there are as many task coordinates as degrees of freedom, and no row follows from others."""
+        """Raise unless there are as many task coordinates as degrees of freedom, and no redundant rows."""
         free, tasks, repeated = self.system.n - self.system.n_constraints, self.coordinates.size, []
         if free == tasks:
             return
@@ -254,10 +256,9 @@ class PathClosure:
             repeated = redundant_rows(self.system, self.assemble(assembly))
         if free + len(repeated) == tasks:
             raise InputError(
-                f"the mechanism holds itself twice ({', '.join(repeated)}), and joint motions along a path need each "
-                "motion held once",
+                f"redundant constraints ({', '.join(repeated)}): the joint motion along a path needs independent ones",
                 field="joint",
-                remedy="leave out the joint, the gear or the link that repeats what others do",
+                remedy="leave out the joint, gear or link whose constraints follow from the others",
             )
         raise InputError(
             f"the mechanism has {free + len(repeated)} degrees of freedom, its task {tasks} coordinate(s)",
@@ -271,7 +272,7 @@ class PathClosure:
         return project_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
     def task(self, q: Array) -> Array:
-        """Task coordinates of a pose."""
+        """Task coordinates at a pose."""
         zero, out = np.zeros_like(q), apart((3, self.coordinates.size))
         task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero, out)
         return out[0]
@@ -309,7 +310,7 @@ class PathClosure:
         return status, int(index), residual, (q, v, a, basis)
 
     def approach(self, path: Path, pose: Array, start: float, end: float) -> Array:
-        """Move the end-effector from where the assembly has it to the start of the path, staying in that assembly."""
+        """Move the end-effector from the assembly to the start of the path, staying in that assembly."""
         goal = self.target(path, np.array([start]))[0, 0]
         here = self.task(pose)
         reached = pose
@@ -328,7 +329,7 @@ class PathClosure:
         raise self._unreachable(cause, detail, found, start, 0, None)
 
     def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]) -> RigidMotion:
-        """The motion at the instants of the grid to keep, with more instants between where steps prove too long."""
+        """The motion at the instants of a grid, with more instants between them where steps are too long."""
         intervals = []
         while True:
             target = self.target(path, grid)
@@ -359,7 +360,7 @@ class PathClosure:
         raise self._unreachable(cause, detail, found, at, motion.t.size, motion)
 
     def shortfall(self, path: Path, start: float, end: float, pose: Array) -> Shortfall:
-        """How far a path lies from what can be reached, from a pose near its start onwards."""
+        """Distance of a path from the workspace, from a pose near its start onwards."""
         end = max(start, min(end, path.duration))
         knots = [knot for knot in path.knots if start < knot < end]
         times = np.unique([*np.linspace(start, end, _LOOKS), *knots])
@@ -383,7 +384,7 @@ class PathClosure:
     def _unreachable(
         self, cause: str, detail: str, found: Shortfall, at: float, step: int, partial: RigidMotion | None
     ) -> UnreachablePathError:
-        """The error of a path that cannot be followed: when, where, and how far its furthest point is out of reach."""
+        """The error of a path that cannot be followed: time, place, and distance of its furthest point."""
         lengths, k = self.coordinates != 2, found.furthest
         # A path that comes back to its start is as far there: said once.
         if found.out[k] and found.beyond(k) != found.beyond(0):
@@ -399,7 +400,7 @@ class PathClosure:
 
 
 def _turning(path: Path, t: Array) -> Array | None:
-    """How the end-effector turns at times t (3, k), where a path says so."""
+    """Angle of the end-effector and its derivatives at times t (3, k), if the path prescribes it."""
     says = getattr(path, "turning", None)
     return None if says is None else says(t)
 

@@ -31,18 +31,18 @@ class TrapezoidalLaw:
 
     @property
     def period(self) -> float:
-        """T [s]."""
+        """Period T [s]."""
         squared = pi * self.length / self.max_acceleration
         return np.sqrt(squared) if isinstance(squared, complex) else sqrt(squared)
 
     @property
     def duration(self) -> float:
-        """Of the motion, 3T/2 [s]."""
+        """Duration of the motion, 3T/2 [s]."""
         return 1.5 * self.period
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Where the third derivative jumps [s]."""
+        """Times at which the third derivative jumps [s]."""
         T = self.period
         return (0.0, 0.5 * T, T, 1.5 * T)
 

@@ -1,4 +1,4 @@
-"""What functions take in place of a mechanism: a model, which has one, and paths by name."""
+"""Base class of models, which functions take in place of a mechanism: a mechanism, and paths by name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ModelWithPaths(Protocol):
 
     @property
     def start(self) -> Start | None:
-        """Of a run without a path; None for a start undeformed and at rest."""
+        """The start of a run without a path; None for a start undeformed and at rest."""
         ...
 
     def path(self, name: str | None = None) -> Path:

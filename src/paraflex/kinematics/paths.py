@@ -35,7 +35,7 @@ class Path(Protocol):
 
     @property
     def duration(self) -> float:
-        """Of the motion before the dwell [s]."""
+        """Duration of the motion before the dwell [s]."""
         ...
 
     @property
@@ -102,7 +102,7 @@ class Polygon(CheckedFields):
 
     @property
     def duration(self) -> float:
-        """Of the motion [s]."""
+        """Duration of the motion [s]."""
         end = self._starts[-1]
         return end if np.iscomplexobj(end) else float(end)
 
@@ -185,7 +185,7 @@ class Circle(CheckedFields):
 
     @property
     def duration(self) -> float:
-        """Of the motion [s]."""
+        """Duration of the motion [s]."""
         return self._law.duration
 
     @property
@@ -245,12 +245,12 @@ class PointPath(CheckedFields):
 
     @property
     def duration(self) -> float:
-        """Of the motion [s]."""
+        """Duration of the motion [s]."""
         return self.motion_time
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """The spline is smooth between its ends [s]."""
+        """Start and end, between which the spline is smooth [s]."""
         return (0.0, self.motion_time)
 
     def evaluate(self, t: Array) -> PathMotion:
@@ -270,7 +270,7 @@ class PointPath(CheckedFields):
 
 @checked_arguments()
 def length_fraction(path: Path, end: float) -> float:
-    """How much of a path's length has been passed by a time [s]: from 0 to 1."""
+    """Fraction of a path's length passed by a time [s]: from 0 to 1."""
     if end >= path.duration:
         return 1.0
     return _length(path, end) / _length(path, path.duration)

@@ -1,4 +1,4 @@
-"""How far places of the end-effector lie from those that the mechanism can reach: the nearest pose to each."""
+"""Distances of places of the end-effector from the workspace: the nearest pose to each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _DEPENDENT = 1e-9
 
 
 class Nearest(NamedTuple):
-    """The pose nearest to a place wanted.
+    """The pose nearest to a desired place.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Nearest(NamedTuple):
 
 @dataclass(frozen=True)
 class Shortfall:
-    """How far a path lies from what the mechanism can reach.
+    """Distance of a path from the workspace.
 
     Attributes
     ----------
@@ -76,21 +76,21 @@ class Shortfall:
 
     @property
     def out(self) -> NDArray[np.bool_]:
-        """Where no pose reaches (k,)."""
+        """Instants at which no pose reaches the place (k,)."""
         return (self.distance > 0.0) | (self.turn > 0.0)
 
     @property
     def elsewhere(self) -> NDArray[np.bool_]:
-        """Where poses reach, but none near those before (k,)."""
+        """Instants at which poses reach the place, but none near the pose before (k,)."""
         return ~self.out & (self.own > 0.0)
 
     @property
     def furthest(self) -> int:
-        """The instant of the largest distance, or where there is none of the largest turn."""
+        """The instant of the largest distance or, if all are zero, of the largest turn."""
         return int(np.argmax(self.distance if np.any(self.distance) else self.turn))
 
     def beyond(self, k: int) -> str:
-        """How far the k-th place lies from the nearest pose, with units; empty where it is reached."""
+        """Distance of the k-th place from the nearest pose, with units; empty if it is reached."""
         parts = [
             f"{self.distance[k]:.3g} m" if self.distance[k] else "",
             f"{self.turn[k]:.3g} rad" if self.turn[k] else "",
@@ -98,7 +98,7 @@ class Shortfall:
         return " and ".join(filter(None, parts))
 
     def joined(self, more: Shortfall) -> Shortfall:
-        """With other instants, in order of time."""
+        """These instants and others, in order of time."""
         order = np.argsort(np.concatenate([self.t, more.t]), kind="stable")
         names = ("t", "desired", "distance", "turn", "own")
         return Shortfall(*(np.concatenate([getattr(self, name), getattr(more, name)])[order] for name in names))
@@ -106,7 +106,7 @@ class Shortfall:
 
 @dataclass(frozen=True)
 class PoseSearch:
-    """The poses of a rigid mechanism and how near they bring its end-effector to places.
+    """Search for the poses of a rigid mechanism that bring its end-effector nearest to places.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ class PoseSearch:
         return Nearest(q, float(np.linalg.norm(off[~angle])), float(np.linalg.norm(off[angle])), part)
 
     def closed(self, t: float, q: Array) -> Array | None:
-        """The pose with loops closed from there by least changes; None where they do not close."""
+        """The pose with loops closed by least changes; None if they do not close."""
         system = self.system
         pose, phi = assemble(system, self.signals, t, q, self._change_at, longest=_LONGEST)
         return pose if closed(system, pose, phi) else None
@@ -169,7 +169,7 @@ class PoseSearch:
         return found
 
     def shortfall(self, times: Array, goals: Array, q: Array, others: Sequence[Array] = ()) -> Shortfall:
-        """How far goals (k, tasks) at times (k,) lie from the nearest pose, from a pose q onwards along them.
+        """Distances of goals (k, tasks) at times (k,) from the nearest poses, from a pose q onwards along them.
 
         Where other poses, or such from bodies turned at random, come nearer to the furthest goal these count too.
         """
@@ -187,7 +187,7 @@ class PoseSearch:
         return Shortfall(np.asarray(times, dtype=float), goals, distance, turn, own)
 
     def scattered(self, t: float, q: Array, count: int) -> Iterator[Array]:
-        """Closed poses from bodies turned at random: other ways to put the mechanism together, as far as they close."""
+        """Closed poses found from bodies turned at random, as far as they close: other assemblies."""
         random, angles = np.random.default_rng(0), [body.angle for body in self.system.bodies]
         for _ in range(count):
             turned = q.copy()
@@ -198,7 +198,7 @@ class PoseSearch:
 
     @property
     def _units(self) -> Array:
-        """What task coordinates are compared with: the size of the mechanism, 1 for an angle."""
+        """Units of the task coordinates: the size of the mechanism, 1 for an angle."""
         return np.where(self.coordinates == 2, 1.0, self.system.size)
 
     def _task(self, q: Array) -> tuple[Array, Array]:
@@ -216,7 +216,7 @@ class PoseSearch:
         return float(off @ off)
 
     def _change_at(self, q: Array) -> LeastChange:
-        """The change without dimension that is least; dense, for a search closes thousands of poses."""
+        """The least change without dimension; dense, as a search closes thousands of poses."""
         jacobian, units, row_units = self._jacobian(q), self.system.units, self.system.row_units
         return lambda phi: units * np.linalg.lstsq(jacobian, phi / row_units, rcond=_DEPENDENT)[0]
 
@@ -225,14 +225,14 @@ class PoseSearch:
         return self.system.jacobian(q) * self.system.units / self.system.row_units[:, None]
 
     def _slope(self, q: Array, goal: Array, multipliers: Array | None = None) -> tuple[Array, Array]:
-        """Gradient of half the square, with multipliers that of the Lagrangian; and Phi_q."""
+        """Gradient of half the squared distance, with multipliers that of the Lagrangian; and Phi_q."""
         values, rows = self._task(q)
         jacobian = self._jacobian(q)
         slope = (rows * self.system.units / self._units[:, None]).T @ ((values - goal) / self._units)
         return (slope if multipliers is None else slope + jacobian.T @ multipliers), jacobian
 
     def _step(self, goal: Array, q: Array, longest: float) -> Array:
-        """A step towards the nearest pose, along what the constraints allow, without dimension."""
+        """A step towards the nearest pose within the null space of the constraints, without dimension."""
         slope, jacobian = self._slope(q, goal)
         left, sizes, right = np.linalg.svd(jacobian)
         rank = int(np.sum(sizes > _DEPENDENT * np.max(sizes, initial=0.0)))

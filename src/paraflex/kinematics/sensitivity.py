@@ -1,4 +1,4 @@
-"""How the motion along a path changes with a mechanism: the equations of closed loops, differentiated."""
+"""Derivatives of the motion along a path by parameters: the equations of closed loops, differentiated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from paraflex.kinematics.closure import PathClosure, RigidMotion
 
 
 class Nearby(NamedTuple):
-    """What closes loops at one place of a difference.
+    """The closure at one point of a difference.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class MotionChange(NamedTuple):
 
 
 def motion_sensitivity(closure: PathClosure, motion: RigidMotion, nearby: Sequence[Nearby]) -> MotionChange:
-    """Derivatives of the motion of closed loops by a parameter, exact but for rounding.
+    """Derivatives of the motion of closed loops by a parameter, exact to rounding.
 
     F(x, s) = 0 gives dx = -F_x^-1 F_s for positions, then for velocities, the basis and the accelerations, in each of
     which those before stand along their derivatives. F_s is a difference: F is smooth, and nothing is iterated.
@@ -75,7 +75,7 @@ def motion_sensitivity(closure: PathClosure, motion: RigidMotion, nearby: Sequen
 
 
 def _solved(jacobians: Array, right: Array) -> Array:
-    """With one correction: rows of metres and of turns lie apart."""
+    """Solution with one correction by iterative refinement, as rows of metres and of angles differ in scale."""
     x = np.linalg.solve(jacobians, right)
     return x + np.linalg.solve(jacobians, right - jacobians @ x)
 

@@ -1,4 +1,4 @@
-"""What the user means: frozen descriptions of bodies, joints, motors and the mechanism they form."""
+"""Frozen descriptions of bodies, joints, motors and the mechanism they form."""
 
 from paraflex.fem import Polynomial as Polynomial, ShapeFunction as ShapeFunction, Sine as Sine
 from paraflex.mechanism.actuation_modes import (

@@ -65,7 +65,7 @@ class Material(CheckedFields):
 
 
 class Curvature(Enum):
-    """What becomes of a beam's curvature at a node with a lumped moment of inertia, where the true one jumps.
+    """Continuity of a beam's curvature at a node with a lumped moment of inertia, where the true one jumps.
 
     SHARED
         The paper's element: one value for both sides, zero at the tip. Converges with the first power of the element
@@ -81,7 +81,7 @@ class Curvature(Enum):
 
 @dataclass(frozen=True)
 class LumpedMass(CheckedFields):
-    """A mass [kg] and moment of inertia [kg m^2] sitting on a named point of a beam."""
+    """A mass [kg] and moment of inertia [kg m^2] at a named point of a beam."""
 
     _table = "lump"
 
@@ -126,7 +126,7 @@ class FlexibleBeam(CheckedFields):
     length : float
         [m]
     section : Section or tuple of Section
-        One for the whole beam, or one a span between neighbouring points and ends.
+        One for the whole beam, or one per span between neighbouring points and ends.
     material : Material or tuple of Material
         Likewise.
     points : mapping
@@ -170,7 +170,7 @@ class FlexibleBeam(CheckedFields):
 
     @cached_property
     def mesh(self) -> BeamMesh:
-        """Its elements and nodes.
+        """Elements and nodes of the beam.
 
         Raises
         ------
@@ -203,7 +203,7 @@ class FlexibleBeam(CheckedFields):
         return tuple(map(span_properties, sections, materials))
 
     def as_rigid(self) -> FlexibleBeam:
-        """The same beam with its flexibility switched off."""
+        """The same beam without flexibility."""
         return replace(self, flexible=False)
 
 
@@ -224,14 +224,14 @@ def _per_span(value: T | tuple[T, ...], count: int, field: str) -> tuple[T, ...]
             f"the beam has {count} span(s) between its points and ends",
             field=field,
             value=len(value),
-            remedy=f"give one {field} for all spans or one a span",
+            remedy=f"give one {field} for all spans or one per span",
         )
     return value
 
 
 @dataclass(frozen=True)
 class AssumedModesBeam(CheckedFields):
-    """A straight bar along the x axis of its body frame that deforms in shape functions of the user's choice.
+    """A straight bar along the x axis of its body frame with shape functions of the user's choice.
 
     The functions fix the frame: they must contain no rigid motion of the bar. Its geometry is linear, whatever that of
     the mechanism.
@@ -274,12 +274,12 @@ class AssumedModesBeam(CheckedFields):
 
     @property
     def shapes(self) -> AssumedShapes:
-        """Its shape functions."""
+        """Shape functions of the bar."""
         return AssumedShapes(self.length, self.transverse, self.axial)
 
     @property
     def integrals(self) -> ShapeIntegrals:
-        """Its shape integrals.
+        """Shape integrals of the bar.
 
         Raises
         ------
@@ -295,7 +295,7 @@ class AssumedModesBeam(CheckedFields):
         return self.shapes.count
 
     def as_rigid(self) -> AssumedModesBeam:
-        """The same bar with its flexibility switched off."""
+        """The same bar without flexibility."""
         return replace(self, flexible=False)
 
 
@@ -304,5 +304,5 @@ given_as("a body")(Body)
 
 
 def given_shapes(bodies: Iterable[Body]) -> list[str]:
-    """Names of the flexible bodies whose shapes are the user's own: no mesh of ours can be made finer."""
+    """Names of the flexible bodies with shapes given by the user, which have no mesh to refine."""
     return [body.name for body in bodies if isinstance(body, AssumedModesBeam | ModalBody) and body.flexible]

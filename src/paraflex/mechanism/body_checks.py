@@ -1,4 +1,4 @@
-"""Checks of one body: numbers that make sense, points on it, shapes that can be integrated."""
+"""Checks of one body: plausible numbers, points on the body, shapes that can be integrated."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 def check_body(body: Body) -> None:
-    """Masses, lengths and stiffnesses are numbers that make sense; lumps sit on points that exist.
+    """Check masses, lengths and stiffnesses, and that lumps are at points that exist.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def check_body(body: Body) -> None:
 
 
 def check_damping(damping: Damping | None, field: str) -> None:
-    """Damping is of a known kind, its coefficients are not negative."""
+    """Check the kind of damping, and that its coefficients are not negative."""
     if damping is not None and not isinstance(damping, Damping):
         raise InputError(
             "not a damping", field=field, value=damping, remedy="give RayleighDamping or ModalDamping, or leave it out"
@@ -73,7 +73,7 @@ def check_damping(damping: Damping | None, field: str) -> None:
 
 
 def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
-    """Length, sections, materials, points and lumps."""
+    """Check length, sections, materials, points and lumps of a bar."""
     positive(body.length, f"{field}.length", "m")
     for where, section in _each(body.section, f"{field}.section"):
         positive(section.area, f"{where}.area", "m^2")
@@ -97,7 +97,7 @@ def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
 
 
 def _each(value: T | tuple[T, ...], field: str) -> Iterator[tuple[str, T]]:
-    """A beam's section or material, or those of its spans, each with its field's name."""
+    """Sections or materials of a beam, one per span, each with the name of its field."""
     if isinstance(value, tuple):
         yield from ((f"{field}.{k}", each) for k, each in enumerate(value))
     else:
@@ -126,7 +126,7 @@ def _check_modal(body: ModalBody, field: str) -> None:
 
 @contextmanager
 def _within(field: str) -> Iterator[None]:
-    """Name the body in front of the field an error names."""
+    """Add the body to the field that an error names."""
     try:
         yield
     except InputError as error:

@@ -36,7 +36,7 @@ def check_mechanism(mechanism: Members) -> None:
 
 
 def check_names(mechanism: Members) -> None:
-    """Every body, joint, motor, assembly and mode has a name of its own, and "ground" is taken."""
+    """Check that names of bodies, joints, motors, assemblies and modes are unique, and that none is "ground"."""
     for group, members in grouped(mechanism):
         counts = Counter(member.name for member in members)
         for name, count in counts.items():
@@ -51,13 +51,13 @@ def check_names(mechanism: Members) -> None:
 
 
 def check_ground(mechanism: Members) -> None:
-    """Ground points are finite."""
+    """Check that ground points are finite."""
     for name, position in mechanism.ground.items():
         finite(position, f"ground.{name}")
 
 
 def check_joints(mechanism: Members) -> None:
-    """Joints hold points that exist, of two bodies."""
+    """Check that joints name existing points of two bodies."""
     for joint in mechanism.joints:
         field = f"joint.{joint.name}"
         _two_bodies(mechanism, joint.a, joint.b, field, "a joint", "one side must lie on another body or on the ground")
@@ -74,7 +74,7 @@ def check_joints(mechanism: Members) -> None:
 
 
 def check_members_at_joints(mechanism: Members) -> None:
-    """Motors, prescribed motions, springs, dampers and friction are at joints that move; modes name motors."""
+    """Check that members at joints name joints that move, and that modes name motors."""
     joints = {joint.name: joint for joint in mechanism.joints}
     for group, members in grouped(mechanism):
         for member in members:
@@ -88,7 +88,7 @@ def check_members_at_joints(mechanism: Members) -> None:
 
 
 def check_relations(mechanism: Members) -> None:
-    """Gears and the like relate two different joints."""
+    """Check that gears and the like relate two different joints."""
     for group, members in grouped(mechanism):
         for one in members if group.relates else ():
             if one.first_joint == one.second_joint:
@@ -99,7 +99,7 @@ def check_relations(mechanism: Members) -> None:
 
 
 def check_assemblies(mechanism: Members) -> None:
-    """Assemblies name bodies and points of bodies, and place every body."""
+    """Check that assemblies name bodies and points of bodies, and place every body."""
     bodies = [body.name for body in mechanism.bodies]
     for assembly in mechanism.assemblies:
         for name, angle in assembly.angles.items():
@@ -115,7 +115,7 @@ def check_assemblies(mechanism: Members) -> None:
 
 
 def check_connected(mechanism: Members) -> None:
-    """Where there is a ground joint, joints lead from the ground to every body. Free-floating: all hang together."""
+    """Check that joints connect every body with the ground, or without ground joints all bodies with one another."""
     start = GROUND if mechanism.joints_at[GROUND] else mechanism.bodies[0].name
     reached = mechanism.reached(start)
     lost = [body.name for body in mechanism.bodies if body.name not in reached]
@@ -129,7 +129,7 @@ def check_connected(mechanism: Members) -> None:
 
 
 def check_task(mechanism: Members) -> None:
-    """The end-effector is a point of a body."""
+    """Check that the end-effector is a point of a body."""
     if mechanism.end_effector is not None:
         point, field = mechanism.end_effector.point, "end_effector.point"
         _known_point(mechanism, point, field)
@@ -137,7 +137,7 @@ def check_task(mechanism: Members) -> None:
 
 
 def check_loads(mechanism: Members) -> None:
-    """What acts is finite and acts on bodies; so does gravity."""
+    """Check that loads and gravity are finite, and that loads act on bodies."""
     finite(mechanism.gravity, "gravity")
     for group, members in grouped(mechanism):
         for member in members if group.kinds else ():

@@ -31,13 +31,13 @@ class RayleighDamping(CheckedFields):
     stiffness: float = 0.0
 
     def coefficients(self, omega: Array) -> Array:
-        """Of the body's mass-normalised modes of these angular frequencies, as its joints hold it [1/s]."""
+        """Damping coefficients of the body's mass-normalised modes, as held by its joints, by frequency [1/s]."""
         return self.mass + self.stiffness * omega**2
 
 
 @dataclass(frozen=True)
 class ModalDamping(CheckedFields):
-    """Damping by a ratio for each mode of the body as its joints hold it, whatever its reference condition.
+    """Damping by a ratio for each mode of the body with its joints held, whatever its reference condition.
 
     The modes are those of the body alone, ascending in frequency, with what its joints hold of it held still: see
     `dynamics.damping`.
@@ -84,7 +84,7 @@ class LossFactor(CheckedFields):
         return self.loss_factor / (2.0 * np.pi * self.frequency)
 
     def coefficients(self, omega: Array) -> Array:
-        """Of the body's mass-normalised modes of these angular frequencies [1/s]."""
+        """Damping coefficients of the body's mass-normalised modes, by their angular frequencies [1/s]."""
         return self.stiffness * omega**2
 
 
@@ -93,7 +93,7 @@ given_as("a damping")(Damping)
 
 
 def stiffness_proportional(damping: Damping) -> float | None:
-    """The coefficient beta of D = beta K [s], or None where damping is not in proportion to stiffness alone."""
+    """The coefficient beta of D = beta K [s], or None if damping is not proportional to stiffness alone."""
     if isinstance(damping, LossFactor):
         return damping.stiffness
     if isinstance(damping, RayleighDamping) and damping.mass == 0.0:

@@ -1,4 +1,4 @@
-"""Gears and what else there is of relations: one joint's coordinate follows another's."""
+"""Gears and other relations, in which one joint's coordinate follows another's."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ class Relation(CheckedFields):
 
     @property
     def transmission(self) -> float:
-        """What the second joint's coordinate grows by with the first's: without unit, in m/rad or in rad/m."""
+        """Derivative of the second joint's coordinate by the first's: without unit, in m/rad or in rad/m."""
         raise NotImplementedError
 
     @property
     def joints(self) -> tuple[str, str]:
-        """Names of the two, the first first."""
+        """Names of the first and the second joint."""
         return self.first_joint, self.second_joint
 
 

@@ -1,4 +1,4 @@
-"""Groups of members of a mechanism: what is known of each, said once where `Members` has it."""
+"""Groups of members of a mechanism: description of each group, given once in `Members`."""
 
 from __future__ import annotations
 
@@ -40,23 +40,23 @@ class Group:
 
     @property
     def relates(self) -> bool:
-        """Whether each of them is a relation between the coordinates of two joints."""
+        """Whether its members relate the coordinates of two joints."""
         return bool(self.kinds) and all(issubclass(kind, Relation) for kind in self.kinds)
 
     @property
     def words(self) -> str:
-        """What several of them are called."""
+        """The word for several members."""
         return self.plural or f"{self.word}s"
 
 
 def group(table: str, word: str, *kinds: type, **others: Any) -> Any:
-    """The field of `Members` that has the members of a group, none by default."""
+    """The field of `Members` with the members of a group, by default none."""
     return field(default=(), metadata={"group": Group(table, word, kinds, **others)})
 
 
 @cache
 def groups_of(members: type) -> dict[str, Group]:
-    """Groups of a mechanism by the fields that have them."""
+    """Groups of a mechanism by their fields."""
     return {each.name: each.metadata["group"] for each in fields(members) if "group" in each.metadata}
 
 

@@ -33,7 +33,7 @@ class PointRef(CheckedFields):
 
     @classmethod
     def taken_from(cls, given: object, field: str) -> PointRef | None:
-        """A point from "body.point", or from the two names; None from anything else."""
+        """A point from "body.point", or from the two names; None for anything else."""
         if isinstance(given, str):
             return cls.parse(given, str(field))
         if isinstance(given, tuple | list) and len(given) == 2:
@@ -65,7 +65,7 @@ class PointRef(CheckedFields):
 
 
 class AtEnd(Enum):
-    """What a run does where a point that slides along a beam comes to the beam's end.
+    """Action of a run when a point that slides along a beam reaches the beam's end.
 
     Error:
         It fails, with what was computed until then.
@@ -89,7 +89,7 @@ _SYMBOLS = {("points",): "pin", ("points", "angle"): "weld", ("axis", "angle"): 
 
 
 class _Directions:
-    """What joints without such a field have for it."""
+    """Default of joints without this field."""
 
     direction: float = 0.0
     angle: float = 0.0
@@ -145,7 +145,7 @@ class Joint(CheckedFields, _Directions):
         JOINT_KINDS[kind] = cls
 
     def check_moves(self, field: str, does: JointThat = "moves") -> None:
-        """Check that the joint has an angle or a travel that is free, or the one of them that is asked for.
+        """Check that the joint has a free angle or travel, or the one that is required.
 
         Raises
         ------
@@ -162,13 +162,13 @@ class Joint(CheckedFields, _Directions):
 
 
 def points_named(member: Any) -> dict[str, PointRef]:
-    """The points that a member of a mechanism is at, by its fields."""
+    """Points that the fields of a member name."""
     return {each.name: at for each in fields(member) if isinstance(at := getattr(member, each.name), PointRef)}
 
 
 @dataclass(frozen=True)
 class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
-    """Two points held together: p_b - p_a = 0.
+    """A joint at which two points coincide: p_b - p_a = 0.
 
     The joint's angle is that of body b relative to body a (or to the ground), each turned by the slope of its
     beam at the joint.
@@ -210,7 +210,7 @@ class SlotJoint(Joint, kind="slot", holds=("axis",)):
 
 @dataclass(frozen=True)
 class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", follows_beam=True):
-    """Point b slides along the centre line of a beam, bent as it is, and body b turns freely.
+    """Point b slides along the centre line of a deformed beam, and body b turns freely.
 
     Point a says which beam. The joint's coordinate is how far point b is beyond point a along the x axis of the beam's
     frame [m]. Deflections are taken where the point stands in the undeformed beam, as a linear theory does.
@@ -229,7 +229,7 @@ class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", fol
 
 @dataclass(frozen=True)
 class WeldJoint(Joint, kind="weld", holds=("points", "angle")):
-    """Two points held together, and body b at a constant angle [rad] against body a, slopes of beams included."""
+    """Two points coincide, and body b has a constant angle [rad] against body a, slopes of beams included."""
 
     angle: float = field(default=0.0, metadata=_ANGLE)
 
@@ -237,7 +237,7 @@ class WeldJoint(Joint, kind="weld", holds=("points", "angle")):
 @given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")
 @runtime_checkable
 class AngleLaw(Protocol):
-    """An angle given in time."""
+    """An angle as a function of time."""
 
     def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
         """Angle [rad], its rate [rad/s] and its acceleration [rad/s^2] at times t [s]."""

@@ -1,4 +1,4 @@
-"""Laws in time that a file can give: constant speed, pieces, a table."""
+"""Laws in time of model files: constant speed, pieces, a table."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ConstantSpeed(CheckedFields):
 
 @dataclass(frozen=True)
 class PiecewiseLaw(CheckedFields):
-    """Laws one after the other; their accelerations may jump where one takes over, nothing else may.
+    """Laws in succession, between which only the acceleration may jump.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class PiecewiseLaw(CheckedFields):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Where a piece takes over, and the knots of the pieces themselves [s]."""
+        """Ends of the pieces, and knots of the pieces themselves [s]."""
         starts, ends = (-np.inf, *self.ends), (*self.ends, np.inf)
         inner = [k for a, piece, b in zip(starts, self.pieces, ends, strict=True) for k in piece.knots if a < k < b]
         return tuple(sorted([*self.ends, *inner]))
@@ -146,7 +146,7 @@ class TabulatedLaw(CheckedFields):
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Times between which it is one polynomial of degree five at most [s]."""
+        """Times between which the law is one polynomial of degree five at most [s]."""
         return self.times
 
     def evaluate(self, t: Array) -> Values:

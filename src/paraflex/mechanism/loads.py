@@ -1,4 +1,4 @@
-"""What acts on a mechanism besides its motors: springs and dampers at joints, forces and torques."""
+"""Forces on a mechanism besides those of motors: springs and dampers at joints, forces and torques."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class PointForce(CheckedFields):
 
     @property
     def size(self) -> float:
-        """Of the force [N]."""
+        """Magnitude of the force [N]."""
         return math.hypot(*self.force)
 
 
@@ -127,7 +127,7 @@ class AppliedTorque(CheckedFields):
 
     @property
     def size(self) -> float:
-        """Of the torque [N m]."""
+        """Magnitude of the torque [N m]."""
         return abs(self.torque)
 
 

@@ -1,4 +1,4 @@
-"""Closed loops of a mechanism: which joints lead from a body, or the ground, back to it."""
+"""Closed loops of a mechanism, each a closed chain of joints."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from paraflex.mechanism.mechanism import Mechanism
 
 
 def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:
-    """Independent loops, each by the names of its joints in the order they come.
+    """Independent loops, each by the names of its joints in order.
 
     Bodies and the ground are nodes, joints edges. A tree of joints is grown outwards from the ground, nearest bodies
     first; every joint left over closes a loop with the ways back to where they meet. There are as many as joints less
@@ -30,7 +30,7 @@ def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:
 
 
 def _tree(mechanism: Mechanism) -> dict[str, tuple[str, str] | None]:
-    """For each body the joint and the body that lead towards the root, None for that."""
+    """For each body the joint and the body towards the root; None for the root."""
     parent: dict[str, tuple[str, str] | None] = {}
     for root in (GROUND, *(body.name for body in mechanism.bodies)):
         if root in parent:

@@ -1,4 +1,4 @@
-"""The mechanism: its members, checked when it is made, and the variants of it that differ in its bodies."""
+"""The mechanism: its members, checked when it is made, and variants with other bodies."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Mechanism(Members, Shown):
 
     @classmethod
     def made_of(cls, given: object) -> Mechanism:
-        """A mechanism, or that of a model.
+        """The mechanism of a model, or the mechanism itself.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class Mechanism(Members, Shown):
 
     @checked_arguments()
     def rigid(self, names: Sequence[str] | None = None) -> Mechanism:
-        """The mechanism with the named bodies rigid, or all of them: then it is the RDM of Remark 3.
+        """The mechanism with the named bodies rigid; with all of them it is the RDM of Remark 3.
 
         Raises
         ------
@@ -145,7 +145,7 @@ class Mechanism(Members, Shown):
 
     @checked_arguments()
     def refined(self, factor: int) -> Mechanism:
-        """The mechanism with so many times the elements on every span of its flexible beams.
+        """The mechanism with a multiple of the elements on every span of its flexible beams.
 
         Raises
         ------

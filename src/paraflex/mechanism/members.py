@@ -1,4 +1,4 @@
-"""What a mechanism is made of, by name: the members that its checks and its poses look at."""
+"""The members of a mechanism, found by name."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ class EndEffector(CheckedFields):
 
     @classmethod
     def taken_from(cls, given: object, field: str) -> EndEffector | None:
-        """That at a point; None of anything that is none."""
+        """The end-effector at a point; None for anything else."""
         return cls(PointRef.parse(given, str(field))) if isinstance(given, str) else None
 
 
 @dataclass(frozen=True)
 class Assembly(CheckedFields):
-    """One way of putting the mechanism together, given by an approximate angle [rad] of each body.
+    """One assembly of the mechanism, given by an approximate angle [rad] of each body.
 
     The solver closes the loops from there; several assemblies of one mechanism differ in their elbows.
 
@@ -96,7 +96,7 @@ given_as("an actuation mode", _MODE)(str | ActuationMode)
 
 
 class Geometry(Enum):
-    """How the shape of a beam follows from its flexible coordinates.
+    """Dependence of a beam's shape on its flexible coordinates.
 
     LINEAR
         As in the paper: displacements linear in the coordinates. A bent beam does not get shorter; where axial forces
@@ -113,7 +113,7 @@ class Geometry(Enum):
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Members(CheckedFields):
-    """The members of a mechanism and how they are found by name: see `Mechanism`, which they make once checked.
+    """The members of a mechanism, found by name: see `Mechanism`, which is made of them and checked.
 
     A field with a `group` is a group of members: files, checks, engines and tables go through these.
     """
@@ -141,7 +141,7 @@ class Members(CheckedFields):
 
     @classmethod
     def taken_from(cls, given: object, field: str = "mechanism") -> Self | None:
-        """The mechanism of a model; None of anything else, a task or a run among them."""
+        """The mechanism of a model; None for anything else, such as a task or a run."""
         paths, mechanism = getattr(given, "paths", None), getattr(given, "mechanism", None)
         return mechanism if isinstance(paths, Mapping) and isinstance(mechanism, cls) else None
 
@@ -191,7 +191,7 @@ class Members(CheckedFields):
         return used if self.end_effector is None else used | {self.end_effector.point}
 
     def reached(self, start: str, past: str = "") -> set[str]:
-        """A body or the ground, and all that joints lead to from there past another body."""
+        """A body or the ground, and all bodies that joints connect with it without passing another body."""
         seen, waiting = {start, past}, [start]
         while waiting:
             for joint in self.joints_at[waiting.pop()]:
@@ -201,11 +201,11 @@ class Members(CheckedFields):
         return seen - {past}
 
     def slides(self, joint: str) -> bool:
-        """Whether a joint, by its name, has a travel and not an angle."""
+        """Whether a joint, given by its name, has a travel and not an angle."""
         return self.joint(joint).slides
 
     def motor_units(self) -> tuple[str, ...]:
-        """What each motor's torque is counted in: N m, or N where its joint slides."""
+        """Units of the motors' torques: N m, or N where the joint slides."""
         return tuple("N" if self.slides(motor.joint) else "N m" for motor in self.motors)
 
     def assembly(self, name: str | None = None) -> Assembly:

@@ -1,4 +1,4 @@
-"""A flexible body by its own matrices: from any finite-element program, or worked out by hand."""
+"""A flexible body given by its matrices, from any finite-element program or by hand."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ModalPoint(CheckedFields):
 
 @dataclass(frozen=True)
 class ModalBody(CheckedFields):
-    """A flexible body whose constants are given, its displacement linear in nf flexible coordinates u of any kind.
+    """A flexible body given by its constants, with a displacement linear in nf flexible coordinates u of any kind.
 
     The symbols are those of the theory, with s0 the place of a mass element dm in the undeformed body and N its
     displacement per coordinate. Lumped moments of inertia count in `inertia`, `mass_matrix` and `G1`. Coordinates
@@ -118,7 +118,7 @@ class ModalBody(CheckedFields):
 
     @property
     def integrals(self) -> ShapeIntegrals:
-        """Its constants, checked.
+        """Constants of the body, checked.
 
         Raises
         ------
@@ -150,7 +150,7 @@ class ModalBody(CheckedFields):
         return integrals
 
     def as_rigid(self) -> ModalBody:
-        """The same body with its flexibility switched off."""
+        """The same body without flexibility."""
         return replace(self, flexible=False)
 
     def point(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -170,7 +170,7 @@ class ModalBody(CheckedFields):
 
 
 def _check_definite(s: ShapeIntegrals) -> None:
-    """Mass matrix of the whole undeformed body and its stiffness are positive definite, lumps take nothing away."""
+    """Check that the undeformed body's mass matrix, its stiffness and its Mff - I2 are positive (semi-)definite."""
     _definite(s.Mff, "mass_matrix", "check it for coordinates that others make up")
     _definite(s.K, "stiffness", "leave out coordinates that move the body as a whole: its frame does that")
     rigid = np.array([[s.m, 0.0, -s.S1[1]], [0.0, s.m, s.S1[0]], [-s.S1[1], s.S1[0], s.I0]])
@@ -196,7 +196,7 @@ def _definite(matrix: np.ndarray, field: str, remedy: str) -> None:
 
 
 def _symmetric(matrix: np.ndarray, field: str, sign: float = 1.0) -> np.ndarray:
-    """The symmetric part of a matrix that is so to within lost digits; with sign -1 the skew part."""
+    """The symmetric part of a matrix that is symmetric up to lost digits; with sign -1 the skew part."""
     other = sign * matrix.T
     if np.max(np.abs(matrix - other)) > _ASYMMETRY * np.max(np.abs(matrix)):
         raise InputError(

@@ -1,4 +1,4 @@
-"""Phases of gears and other relations that are as an assembly stands."""
+"""Phases of gears and other relations, by the first assembly."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def with_phases(mechanism: Members) -> dict[str, tuple[Relation, ...]]:
 
 
 def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
-    """A relation with its phase as the first assembly stands."""
+    """A relation with its phase in the first assembly."""
     field = f"{group.table}.{relation.name}.phase"
     if not mechanism.assemblies:
         raise InputError(
@@ -43,14 +43,14 @@ def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
     first, second = (_coordinate(mechanism, mechanism.joint(name), poses) for name in relation.joints)
     if first is None or second is None:
         raise InputError(
-            f"a {group.word}'s phase is not given, and assembly {assembly.name} does not tell where its joints stand",
+            f"a {group.word}'s phase is not given, and assembly {assembly.name} does not place its joints",
             field=field, remedy="give it, or places of points in the assembly",
         )  # fmt: skip
     return replace(relation, phase=second - relation.transmission * first)
 
 
 def _coordinate(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:
-    """A joint's angle or travel at approximate poses of the bodies; None where a place is not known."""
+    """A joint's angle or travel at approximate poses of the bodies; None if a place is not known."""
 
     def angle(ref: PointRef) -> float:
         return 0.0 if ref.on_ground else poses[ref.body].angle

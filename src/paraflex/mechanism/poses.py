@@ -1,4 +1,4 @@
-"""Approximate poses of bodies from what an assembly says: angles, places of points, and the joints between them."""
+"""Approximate poses of bodies from the angles and places of points of an assembly, and the joints between them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _APART = 1e-9
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a body is: its angle [rad], and the place of its frame's origin [m] where points tell it."""
+    """Angle of a body [rad], and the place of its frame's origin [m] if points determine it."""
 
     angle: float
     position: Place | None = None
@@ -28,7 +28,7 @@ class Pose:
 
 @checked_arguments()
 def approximate_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
-    """The pose of every body, undeformed: its angle as given, or from two of its points that are known.
+    """The pose of every undeformed body: its angle as given, or from two known points.
 
     Known are points on the ground, points the assembly gives, points joined to known ones, and all points of a body
     whose pose is known.
@@ -51,7 +51,7 @@ def approximate_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]
 
 
 def placed_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
-    """Poses with places of the bodies whose places follow from their angles, whatever the angles do not close.
+    """Poses with the places that follow from the angles, without closing loops.
 
     A slider that hangs on nothing else is where its axis begins.
 
@@ -65,7 +65,7 @@ def placed_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
 
 
 def _joined(mechanism: Members, body: str) -> str:
-    """Of a body that fewer than two joints hold, which: one may be missing."""
+    """Addition to an error on a body that fewer than two joints hold: one may be missing."""
     names = [joint.name for joint in mechanism.joints_at[body]]
     if not names:
         return "; no joint holds it: is one missing?"
@@ -134,7 +134,7 @@ def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | 
 
 
 def placed_in(pose: Pose, local: Place) -> Place:
-    """Where a place of the undeformed body is in the ground frame [m]."""
+    """Place of a point of the undeformed body in the ground frame [m]."""
     assert pose.position is not None
     c, s = cos(pose.angle), sin(pose.angle)
     return pose.position[0] + c * local[0] - s * local[1], pose.position[1] + s * local[0] + c * local[1]

@@ -1,4 +1,4 @@
-"""What members of a mechanism say of their fields, and checks of single numbers that those of bodies share."""
+"""Metadata of fields of members of a mechanism, and checks of single numbers."""
 
 from __future__ import annotations
 
@@ -9,47 +9,57 @@ from functools import partial
 from typing import Any, Literal, cast
 
 from paraflex.errors import InputError, suggestion
+from paraflex.limits import LARGEST, SMALLEST, of_size
 
 # What a joint that a member names does: it has an angle, a travel, or either.
 JointThat = Literal["moves", "turns", "slides"]
 
 
 def known(name: str, names: Collection[str], field: str, kind: str) -> None:
-    """Raise an `InputError`, with the nearest, unless a name is one of those there are."""
+    """Raise an `InputError` that names the nearest name, unless a name is a known one."""
     if not isinstance(name, str) or name not in names:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 
 def finite(values: float | Iterable[float], field: str) -> None:
-    """Raise an `InputError` unless a value, or each of several, is finite."""
+    """Raise an `InputError` unless a value, or each of several, is finite and of a size that is possible."""
     several = isinstance(values, Iterable) and getattr(values, "ndim", 1)
     for value in cast("Iterable[float]", values if several else (values,)):
-        if not math.isfinite(value):
-            raise InputError("not a finite number", field=field, value=value, remedy="give a number")
+        of_size(value, field)
 
 
 def positive(value: float, field: str, unit: str) -> None:
     """Raise an `InputError` unless a value is positive and finite."""
     if not (math.isfinite(value) and value > 0.0):
         raise InputError("must be positive", field=field, value=value, remedy=f"give it in {unit}")
+    _possible(value, field, unit)
 
 
 def not_negative(value: float, field: str, unit: str) -> None:
     """Raise an `InputError` unless a value is zero or positive and finite."""
     if not (math.isfinite(value) and value >= 0.0):
         raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")
+    if value:
+        _possible(value, field, unit)
 
 
 def not_zero(value: float, field: str, unit: str) -> None:
     """Raise an `InputError` unless a value is finite and not zero."""
     if not (math.isfinite(value) and value != 0.0):
         raise InputError("must be a finite number other than zero", field=field, value=value, remedy=f"give it {unit}")
+    _possible(value, field, unit.removeprefix("in "))
+
+
+def _possible(value: float, field: str, unit: str) -> None:
+    if not SMALLEST <= abs(value) <= LARGEST:
+        remedy = f"give it in {unit}, from {SMALLEST:g} to {LARGEST:g}"
+        raise InputError("beyond all proportion", field=field, value=value, remedy=remedy)
 
 
 def said(
     description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: JointThat | None = None
 ) -> dict[str, Any]:
-    """Metadata of a member's field: what model files, their schema and errors say of it, with the unit behind "in".
+    """Metadata of a member's field for model files, their schema and errors, with the unit behind "in".
 
     A number is checked, unless it is None, by `finite`, or with a unit to ask for by `positive`, `not_negative` or
     `not_zero`; a name may be that of a joint that moves, turns or slides.
@@ -62,7 +72,7 @@ AT_JOINT = said("the name of a joint", joint="moves")
 
 
 def check_numbers(member: Any, place: str) -> None:
-    """Check the numbers of a member, each as its field says."""
+    """Check the numbers of a member by the metadata of their fields."""
     for each in fields(member):
         check, value = each.metadata.get("check"), getattr(member, each.name)
         if check is not None and value is not None:
@@ -70,7 +80,7 @@ def check_numbers(member: Any, place: str) -> None:
 
 
 def joints_named(member: Any) -> Iterator[tuple[str, str, JointThat]]:
-    """Joints that a member names, each with what files call the field before it and what it must do behind."""
+    """Joints that a member names, each with its field in files and the motion that it must have."""
     together = joint_pair(member)
     for each in fields(member):
         if does := each.metadata.get("joint"):
@@ -78,6 +88,6 @@ def joints_named(member: Any) -> Iterator[tuple[str, str, JointThat]]:
 
 
 def joint_pair(member: Any) -> list[str]:
-    """Fields of a member, or of its class, that name two joints: `joints` in files. None where it names one."""
+    """Fields of a member, or of its class, that name two joints: `joints` in files. None if it names one."""
     named = [each.name for each in fields(member) if each.metadata.get("joint")]
     return named if len(named) > 1 else []

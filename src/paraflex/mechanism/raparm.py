@@ -32,7 +32,7 @@ def raparm_i(
     joint: tuple[float, float] = (0.130, 2.0e-5),
     end: tuple[float, float] = (0.225, 2.5e-5),
 ) -> Mechanism:
-    """Build RAParM-I as the paper models it; the defaults are the reference set, identified from the paper's results.
+    """Build RAParM-I as in the paper; the defaults are the reference set, identified from the paper's results.
 
     Linear geometry, cantilever frames, shared curvature. A better model of the same manipulator is
     `raparm_i().with_geometry("second-order").with_beams(reference=ReferenceCondition.PINNED,

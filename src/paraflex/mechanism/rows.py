@@ -1,4 +1,4 @@
-"""Rigid mechanisms of any size, made by a number: a row of four-bars side by side, and a hanging chain."""
+"""Rigid mechanisms of any size: a row of four-bars side by side, and a hanging chain."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ LAST_END = "_last"
 
 @dataclass(frozen=True)
 class Segmented:
-    """A mechanism of finite segments and where they lie.
+    """A mechanism of finite segments and their places on the beams.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Segmented:
 
 @checked_arguments()
 def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, int]:
-    """Numbers of segments of about one length: so many on the longest flexible beam, others by their length.
+    """Numbers of segments of similar length: a given number on the longest flexible beam, others in proportion.
 
     Eight make the paper's 56 segments of RAParM-I.
     """
@@ -159,7 +159,7 @@ def check_segmentable(mechanism: Mechanism) -> None:
 
 
 def _assembly(mechanism: Mechanism, assembly: Assembly, carriers: Mapping[str, tuple[str, float]]) -> Assembly:
-    """Segments lie as their beams do; angles that follow from points follow before beams are cut."""
+    """An assembly of the segments along the undeformed beams; angles that follow from points are found first."""
     poses = approximate_poses(mechanism, assembly)
     return replace(assembly, angles={name: poses[carrier].angle for name, (carrier, _) in carriers.items()}, points={})
 
@@ -183,7 +183,7 @@ def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, in
 
 
 def _stiffness_damping(beam: FlexibleBeam) -> float:
-    """Coefficient of stiffness-proportional damping [s]: all that hinges can have."""
+    """Coefficient of stiffness-proportional damping [s], the only damping of hinges."""
     if beam.damping is None:
         return 0.0
     coefficient = stiffness_proportional(beam.damping)
@@ -198,7 +198,7 @@ def _stiffness_damping(beam: FlexibleBeam) -> float:
 
 
 def _pieces(beam: FlexibleBeam, start: float, end: float) -> list[tuple[float, float, SpanProperties]]:
-    """Pieces of a beam between two places, each of one span: where it starts and ends [m], and what it is made of."""
+    """Pieces of a beam between two places, each within one span: start and end [m], properties of the span."""
     pieces = []
     for (a, b), span in zip(pairwise(beam.mesh.knots.tolist()), beam.spans, strict=True):
         if min(b, end) > max(a, start):
@@ -207,7 +207,7 @@ def _pieces(beam: FlexibleBeam, start: float, end: float) -> list[tuple[float, f
 
 
 def _stiffness(beam: FlexibleBeam, start: float, end: float) -> float:
-    """Of the spring that bends as the beam does between two places: its pieces are springs in series [N m/rad]."""
+    """Stiffness of the spring for the bending between two places: pieces are springs in series [N m/rad]."""
     return 1.0 / sum((b - a) / span.bending_stiffness for a, b, span in _pieces(beam, start, end))
 
 

@@ -1,4 +1,4 @@
-"""What is known of the start of a motion, by names: deflections, velocities, or all coordinates of bodies."""
+"""The start of a motion, by names: deflections, velocities, or all coordinates of bodies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from paraflex.mechanism.quantities import known
 
 @dataclass(frozen=True)
 class Deflection(CheckedFields):
-    """How far a point of a beam is off its place along the tangent at the first end; None leaves it to the others.
+    """Displacement of a point of a beam from the tangent at the first end; None leaves it to the others.
 
     Of a body of given shapes, off its place in the body frame.
 
@@ -57,7 +57,7 @@ class BodyValues(CheckedFields):
 
 @dataclass(frozen=True)
 class Start(CheckedFields):
-    """What is known of the start of a motion.
+    """The given part of the start of a motion.
 
     Attributes
     ----------
@@ -82,13 +82,13 @@ class Start(CheckedFields):
 
     @property
     def places(self) -> bool:
-        """Whether it says anything of coordinates, and not of velocities alone."""
+        """Whether it gives coordinates, and not velocities alone."""
         return bool(self.deflection or self.coordinates)
 
 
 @checked_arguments()
 def check_start(mechanism: Mechanism, start: Start) -> None:
-    """Check that a start speaks of bodies and points that exist, and says each thing once.
+    """Check that a start names bodies and points that exist, and gives each number once.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Figures of results, each a function from a dataset, or from figures read of a file, to a Matplotlib figure.
+"""Figures of results, each a function from a dataset, or from numbers read from a file, to a Matplotlib figure.
 
 What they have in common:
 

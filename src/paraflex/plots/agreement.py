@@ -1,4 +1,4 @@
-"""Several models of one mechanism, overlaid: links, end-effector, distances (Figs. 22, 23 and beyond)."""
+"""Several models of one mechanism in one figure: links, end-effector, distances (Figs. 22, 23 and beyond)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _MOST_NARROW = 6
 
 
 def printed(model: str) -> str:
-    """A model's name for legends."""
+    """Label of a model in legends."""
     return _PRINTED.get(model, model)
 
 
@@ -64,7 +64,7 @@ def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure
 
 @drawn
 def compared_deflections(data: xr.Dataset, mode: str) -> Figure:
-    """Transverse tip displacement of links in every model that has it, a panel a link.
+    """Transverse tip displacement of links in every model that has it, one panel per link.
 
     Those of the two links whose tips move most in the reference, twins of a symmetric mechanism counted once.
     """
@@ -96,7 +96,7 @@ def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnifica
 
 @drawn
 def model_distances(data: xr.Dataset) -> Figure:
-    """Distance of the end-effector from its desired place, and from where the reference has it, in every model."""
+    """Distance of the end-effector from its desired place, and from that of the reference, in every model."""
     reference = str(data.attrs["reference"])
     modes = names_of(data, "mode")
     time = data["time"].values

@@ -1,4 +1,4 @@
-"""The one list of figures: which there are of each kind of results, what they show, and where their functions are.
+"""The list of all figures by kind of results: what they show, and where their functions are.
 
 `paraflex plot`, the `save_...` functions and the gallery of the documentation read it. A figure more is a function in
 this folder and a line here.
@@ -22,7 +22,7 @@ Takes = Literal["results", "mode", "models", "run", "designs", "nothing"]
 
 @dataclass(frozen=True)
 class CatalogueFigure:
-    """A figure that can be drawn of some results.
+    """A figure of a kind of results.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class CatalogueFigure:
 
     @property
     def function(self) -> Callable[..., Figure]:
-        """What draws it; its module is imported now."""
+        """Function of the figure; its module is imported now."""
         return getattr(import_module(f"paraflex.plots.{self.module}"), self.name)
 
 
@@ -142,5 +142,5 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
 
 
 def homes() -> dict[str, str]:
-    """The module of `paraflex.plots` that each figure's function is in."""
+    """The module of `paraflex.plots` with each figure's function."""
     return {figure.name: figure.module for figures in CATALOGUE.values() for figure in figures}

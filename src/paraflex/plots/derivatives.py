@@ -1,4 +1,4 @@
-"""What moves the metrics of a run: elasticities as bars."""
+"""Derivatives of the metrics of a run: elasticities as bars."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _EM = STYLE["font.size"] / 72.0 * 25.4
 
 @drawn
 def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
-    """By how many per cent each metric changes with one per cent of each parameter: a group of bars a metric."""
+    """Change of each metric in per cent per per cent of each parameter: a group of bars per metric."""
     if not 0 <= run < len(figures["runs"]):
         raise InputError("no such run", field="run", value=run, remedy=f"name one from 0 to {len(figures['runs']) - 1}")
     shown = figures["runs"][run]
@@ -52,7 +52,7 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
 
 
 def _name_groups(panel: Any, places: Mapping[str, float]) -> None:
-    """Names of the metrics left of the panel, which gives them the room."""
+    """Names of the metrics left of the panel, which makes room for them."""
     left, bottom, width, height = panel.get_position().bounds
     room = _EM * (1.0 + max(len(name) for name in places) * (0.36 + _LETTER)) / (panel.figure.get_figwidth() / MM)
     panel.set_position((left + room, bottom, width - room, height))

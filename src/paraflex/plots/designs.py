@@ -1,4 +1,4 @@
-"""Many designs as a table: parameters, metrics, and how the runs ended, read from what a study wrote."""
+"""Many designs as a table of parameters, metrics and status, read from the files of a study."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class DesignTable:
 
     @cached_property
     def complete(self) -> NDArray[np.bool_]:
-        """Which runs are."""
+        """Whether each run is complete."""
         return self.status == "complete"
 
     def only(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> DesignTable:
@@ -78,7 +78,7 @@ class DesignTable:
         return {pair: done.only((done.path == pair[0]) & (done.mode == pair[1])) for pair in pairs}
 
     def judged_by(self, names: Sequence[str] | None, most: int) -> list[str]:
-        """The metrics asked for; else the first that vary and are no figures of the solver."""
+        """The metrics asked for; else the first that differ among runs and are not counts of the solver."""
         for name in names or ():
             if name not in self.metrics:
                 raise InputError(
@@ -96,7 +96,7 @@ class DesignTable:
 
     @property
     def judged(self) -> list[str]:
-        """The metrics that designs are chosen by; none where none varies."""
+        """The metrics by which designs are chosen; none if no metric differs among runs."""
         if not self.complete.any():
             return []
         try:
@@ -109,18 +109,18 @@ class DesignTable:
         return tuple(float(values[row]) for values in self.parameters.values())
 
     def label(self, row: int) -> str:
-        """What a run is called: its design's number, its mode, and its path where there are several."""
+        """Label of a run: its design's number, its mode, and its path if there are several."""
         several = len(set(self.path.tolist())) > 1
         return f"#{self.design[row]} {self.mode[row]}" + (f" {self.path[row]}" if several else "")
 
     @property
     def varied(self) -> list[str]:
-        """Parameters that differ among the runs; all of them where none does."""
+        """Parameters that differ among the runs; all of them if none does."""
         spread = [name for name, values in self.parameters.items() if np.unique(values).size > 1]
         return spread or list(self.parameters)
 
     def labelled(self, metric: str) -> tuple[str, float]:
-        """What an axis of a metric is called, and what its values are multiplied by."""
+        """Label of a metric's axis, and the factor of its values."""
         unit, factor = self.units.get(metric, ""), 1.0
         if unit == "m":
             unit, factor = display_unit("m", self.metrics[metric])
@@ -134,7 +134,7 @@ class DesignTable:
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
-    """The table of a study in order of its runs, from the files that `tables_of` its folder names."""
+    """The table of a study in order of its runs, from the files of its folder that `tables_of` finds."""
     import pyarrow as pa
 
     try:
@@ -167,7 +167,7 @@ def read_designs(files: Sequence[Path]) -> DesignTable:
 
 
 def in_conflict(table: DesignTable, judged: Sequence[str]) -> list[str]:
-    """The first of some metrics, and the one with which it makes the longest fronts; fewer where there are not two."""
+    """The first of some metrics, and the one with which it has the longest fronts; fewer if there are not two."""
     if len(judged) < 2:
         return list(judged)
     first, *others = judged
@@ -180,7 +180,7 @@ def in_conflict(table: DesignTable, judged: Sequence[str]) -> list[str]:
 
 
 def undominated(x: Array, y: Array) -> NDArray[np.intp]:
-    """Indices, in order of x, of the points that no other is below in one of two numbers without being above in one."""
+    """Indices, in order of x, of the points that no other point dominates in two numbers."""
     order = np.lexsort((y, x))
     least = np.minimum.accumulate(y[order])
     better = np.concatenate([[True], y[order][1:] < least[:-1]]) if order.size else np.zeros(0, dtype=bool)

@@ -1,4 +1,4 @@
-"""A mechanism drawn: links with their true or magnified deflections, joints, ground, springs, paths."""
+"""Drawings of a mechanism: links with actual or magnified deflections, joints, ground, springs, paths."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _SHORT = 2e-3
 
 
 class Sketch:
-    """A scene on Matplotlib's axes: what stays is drawn once, what moves is put in place picture by picture."""
+    """A scene on Matplotlib's axes: fixed parts are drawn once, moving parts are updated for each picture."""
 
     def __init__(self, axes: Axes, shown: Scene, limits: Limits, look: Theme, width: float = 1.0) -> None:
         self.scene = shown
@@ -70,12 +70,12 @@ class Sketch:
 
     @property
     def artists(self) -> list[Artist]:
-        """What moves."""
+        """Artists of the moving parts."""
         moving = [self._trail, self._stiff, self._plates, self.links, *self.marks.values(), self._head]
         return sorted(moving, key=lambda artist: artist.get_zorder())
 
     def show(self, i: int) -> None:
-        """Put everything where it is at the scene's time of that number."""
+        """Update all parts to the scene's time of a number."""
         bodies = {name: figure_of(places[i]) for name, places in self.scene.bodies.items()}
         # A body at a single place is a dot: a line so short that its round ends are all that is seen.
         dot = [[0.0, 0.0], [_SHORT * self.limits.size, 0.0]]
@@ -125,7 +125,7 @@ class Sketch:
 
 
 def bare(axes: Axes, limits: Limits) -> Axes:
-    """Axes that are the picture alone."""
+    """Axes without frame and ticks."""
     axes.set_xlim(limits.left, limits.right)
     axes.set_ylim(limits.bottom, limits.top)
     axes.set_axis_off()
@@ -146,7 +146,7 @@ def draw_scale_bar(
 
 
 def caption(shown: Scene) -> str:
-    """What is magnified."""
+    """Text on the magnification."""
     if shown.magnified == 1.0:
         return "true deflections"
     return "links drawn stiff" if shown.magnified == 0.0 else f"deflections × {shown.magnified:g}"

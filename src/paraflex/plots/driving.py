@@ -1,4 +1,4 @@
-"""What the modes of a study ask of the motors, and how near they come to a singularity."""
+"""Efforts of the motors in the modes of a study, and their distance from a singularity."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def mode_comparison(data: xr.Dataset) -> Figure:
 
 @drawn
 def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Worst condition number of the actuation matrix along a path, a bar a mode; those that cannot drive it are pale.
+    """Worst condition number of the actuation matrix along a path, one bar per mode; pale if it cannot drive it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Energies of a run, and whether they balance."""
+"""Energies of a run, and their balance."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ENERGIES = {"kinetic_energy": "kinetic energy", "strain_energy": "strain energy"
 
 @drawn
 def energies(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Kinetic and strain energy and the work done on the mechanism; strain energy alone; how far they do not balance.
+    """Kinetic and strain energy and the work done on the mechanism; strain energy alone; imbalance of energy.
 
     The imbalance is |kinetic + strain energy - those at the start - work|, at the samples.
     """

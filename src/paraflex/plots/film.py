@@ -31,7 +31,7 @@ _ELSEWHERE = "choose another place"
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """How a film is made.
+    """Options of a film.
 
     Attributes
     ----------
@@ -73,19 +73,19 @@ class Film:
 
     @property
     def caption(self) -> str:
-        """What is magnified, and how fast it plays."""
+        """Text on the magnification and the speed."""
         return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "")
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Of the run in each picture [s]."""
+        """Time of the run in each picture [s]."""
         return self.scenes[0].time
 
 
 def plan_film(
     data: xr.Dataset, modes: Sequence[str] = (), options: FilmOptions | None = None, kind: str = ".mp4"
 ) -> Film:
-    """What a film shows, and when.
+    """Scenes of a film, and their times.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def animate(
 
 
 def film_kind(file: Path) -> str:
-    """The kind of film that a name asks for: its ending, or nothing of a folder of pictures."""
+    """The kind of film by the suffix of a name; a name without a suffix is a folder of pictures."""
     kind = file.suffix.lower()
     if kind in FORMATS or kind == "":
         return kind

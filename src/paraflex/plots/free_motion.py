@@ -1,4 +1,4 @@
-"""Of a run without a path: angles, speeds and energies at a glance, its coordinates, and where its points go."""
+"""Figures of a run without a path: overview of angles, speeds and energies, coordinates, paths of points."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def coordinates(data: xr.Dataset) -> Figure:
 
 @drawn
 def point_paths(data: xr.Dataset) -> Figure:
-    """Where named points go in the plane; of more than seven those that go furthest."""
+    """Paths of named points in the plane; if there are more than seven, those of the longest."""
     places = 1e3 * data["point_position"].transpose("time", "point", "axis").values
     names = names_of(data, "point")
     travel = np.nan_to_num(np.nanmax(places, axis=0) - np.nanmin(places, axis=0)).max(axis=1)

@@ -1,4 +1,4 @@
-"""What figures are drawn of: results, or the folder or file they were written to; and of which kind they must be."""
+"""Arguments of figures: results, or their folder or file, of the right kind."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ P = ParamSpec("P")
 
 
 def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate[D | str | Path, P], Figure]:
-    """Make the function of a figure: in this style, of results or of the folder or file that holds them."""
+    """Decorate the function of a figure: it gets the common style, and takes results or their folder or file."""
     take: Callable[..., Figure] = checked_arguments(
         figures="give what the study's result has as plain numbers, or the folder it was written to",
         table="give the folder of a study of many runs",
@@ -44,7 +44,7 @@ def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate
 
 
 def _drawn(data: Any, field: str, draw: Callable[[], Figure]) -> Figure:
-    """A figure; of numbers that lack what it shows, an error that says so."""
+    """A figure; an error if the results lack what it shows."""
     try:
         return draw()
     except KeyError as error:
@@ -55,7 +55,7 @@ def _drawn(data: Any, field: str, draw: Callable[[], Figure]) -> Figure:
 
 
 def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
-    """Results, or what a folder or file holds, of one of some kinds, each with what of it is taken."""
+    """Results, or those in a folder or file, of one of some kinds, each with its part for the figure."""
     if isinstance(data, xr.Dataset):
         if kind_of(data) not in kinds:
             raise wrong_kind(kind_of(data), kinds)
@@ -70,7 +70,7 @@ def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
 
 @cache
 def _kinds() -> dict[str, dict[str, str]]:
-    """Of every figure the kinds of results that it can be drawn of, each with what its function takes."""
+    """For every figure the kinds of its results, each with the part that its function takes."""
     found: dict[str, dict[str, str]] = {}
     for kind, figures in CATALOGUE.items():
         for figure in figures:

@@ -1,4 +1,4 @@
-"""Text and units of figures and pages: symbols of names, signs of modes, prefixes that suit a range."""
+"""Text and units of figures and pages: symbols of names, signs of modes, prefixes of units."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _GREEK = {
 
 
 class Quantity(NamedTuple):
-    """What an axis shows: its name, its symbol (empty where there is none) and its unit."""
+    """Quantity of an axis: its name, its symbol (empty if it has none) and its unit."""
 
     name: str
     symbol: str
@@ -71,19 +71,19 @@ def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", s
 
 
 def metric_name(metric: str) -> str:
-    """What a metric is called in print: "RMS tracking error"; "peak torque of tau1" of one motor's."""
+    """Label of a metric: "RMS tracking error"; "peak torque of tau1" for a metric of one motor."""
     return plain(metric_label(metric))
 
 
 def effort_label(units: str) -> str:
-    """Motors that turn give torques, motors that slide forces."""
+    """Label of motors' efforts: torques, or forces of motors that slide."""
     if units in ("N m", "N"):
         return axis_label("torque" if units == "N m" else "force")
     return f"torque, force [{units}]"
 
 
 class DisplayUnit(NamedTuple):
-    """A unit to show values in: its name, and what values in SI are multiplied by."""
+    """A unit for display: its name, and the factor from SI."""
 
     name: str
     factor: float
@@ -96,7 +96,7 @@ _PREFIXES = {
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """The unit that shows the largest of lengths ("m") or angles ("rad") with few leading zeros; any other as it is."""
+    """The unit in which the largest of lengths ("m") or angles ("rad") has few digits; any other unit as it is."""
     largest, choices = peak(values), _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
     if largest == 0.0:
         return choices[0]
@@ -115,7 +115,7 @@ def three_digits(value: float) -> str:
 
 
 def power_of_ten(value: float) -> str:
-    """A power of ten as print shows it: "10⁻⁵"; anything else as a plain number."""
+    """A power of ten with superscripts, "10⁻⁵"; anything else as a plain number."""
     exponent = round(math.log10(value)) if value > 0.0 else 0
     if not math.isclose(value, 10.0**exponent, rel_tol=1e-9):
         return f"{value:g}"
@@ -123,12 +123,12 @@ def power_of_ten(value: float) -> str:
 
 
 def raised(exponent: int) -> str:
-    """An exponent as print shows it: "⁻⁵"."""
+    """An exponent in superscripts: "⁻⁵"."""
     return str(exponent).translate(_RAISED)
 
 
 def logarithmic_number(value: float) -> str:
-    """A number of a logarithmic axis: 0.001 to 5000 plainly, others as "10⁻⁵" or "2·10⁻⁵"."""
+    """A number of a logarithmic axis: 0.001 to 5000 as they are, others as "10⁻⁵" or "2·10⁻⁵"."""
     if value <= 0.0 or 0.999e-3 <= value < 0.999e4:
         return f"{value:g}"
     exponent = math.floor(math.log10(value) + 1e-9)
@@ -137,7 +137,7 @@ def logarithmic_number(value: float) -> str:
 
 
 def symbol(name: str) -> str:
-    """A name as figures show it: "A1" and "tau1" as symbols with a subscript, "link1" as "link 1", others unchanged."""
+    """A name in figures: "A1" and "tau1" as symbols with a subscript, "link1" as "link 1", others unchanged."""
     letters, number = _parted(name)
     if len(letters) != 1 and letters not in _GREEK:
         return plain(text_symbol(name))
@@ -146,7 +146,7 @@ def symbol(name: str) -> str:
 
 
 def text_symbol(name: str) -> str:
-    """A name as pages show it: "τ₁" for "tau1", "A₁" for "A1", "link 1" for "link1", others unchanged."""
+    """A name on pages: "τ₁" for "tau1", "A₁" for "A1", "link 1" for "link1", others unchanged."""
     letters, number = _parted(name)
     if len(letters) == 1 or letters in _GREEK:
         return _GREEK.get(letters, letters) + number.translate(_LOWERED)
@@ -154,23 +154,23 @@ def text_symbol(name: str) -> str:
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """Letters and number of a name; none where it is of another kind."""
+    """Letters and number of a name; none if it is of another kind."""
     parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
     return (parts[1], parts[2]) if parts else ("", "")
 
 
 def plain(name: str) -> str:
-    """A name that is not read as mathematics."""
+    """A name that Matplotlib does not read as mathematics."""
     return name.replace("$", r"\$")
 
 
 def mode_label(name: str) -> str:
-    """A mode's name; signs in circles, as the paper writes them, where it is a row of signs."""
+    """A mode's name; signs in circles, as in the paper, if it is a row of signs."""
     if is_signs(name):
         return name.replace("+", "⊕").replace("-", "⊖")
     return name.replace("$", r"\$")
 
 
 def is_signs(name: str) -> bool:
-    """Whether a mode is named by the signs of its motors ("+-+-")."""
+    """Whether the name of a mode is the signs of its motors ("+-+-")."""
     return bool(name) and set(name) <= {"+", "-"}

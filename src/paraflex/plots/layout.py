@@ -51,7 +51,7 @@ _width: ContextVar[float | None] = ContextVar("_width", default=None)
 
 @contextmanager
 def column_width(style: str | None) -> Iterator[None]:
-    """Draw figures as wide as one column of a journal, "single", or two, "double"; None: each as suits it."""
+    """Draw figures as wide as one column of a journal, "single", or two, "double"; None: at their own width."""
     if style is not None:
         known(style, COLUMNS, "style", "style")
     before = _width.set(None if style is None else COLUMNS[style])
@@ -62,7 +62,7 @@ def column_width(style: str | None) -> Iterator[None]:
 
 
 def page_width(width: float) -> float:
-    """The width that `column_width` asks for, else this one [mm]."""
+    """The width set by `column_width`, else the given one [mm]."""
     return _width.get() or width
 
 
@@ -74,12 +74,12 @@ def figure_width(panel: Axes) -> float:
 
 
 def is_narrow(width: float = TWO_COLUMNS) -> bool:
-    """Whether a figure that would take this width [mm] is to stand in one column."""
+    """Whether a figure of this width [mm] must be arranged in one column."""
     return page_width(width) < 0.75 * TWO_COLUMNS
 
 
 def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
-    """A figure of a width [mm] and its axes (rows, columns); `lay_out` gives them their places.
+    """A figure of a width [mm] and its axes (rows, columns); `lay_out` places them.
 
     In `column_width` the width is that asked for.
     """
@@ -89,7 +89,7 @@ def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figu
 
 
 def label_outer_time(axes: NDArray[Any]) -> None:
-    """Name the time axis below the lowest panel of each column and take its numbers off the others."""
+    """Name the time axis below the lowest panel of each column and remove its numbers from the others."""
     for column in arranged(axes).T:
         shown = [panel for panel in column if panel.get_visible()]
         for panel in shown[:-1]:
@@ -98,7 +98,7 @@ def label_outer_time(axes: NDArray[Any]) -> None:
 
 
 def arranged(axes: NDArray[Any]) -> NDArray[Any]:
-    """Panels as they stand: side by side, or in one column of print one below the other where they need the width."""
+    """Panels as placed: side by side, or below one another if a column of print is too narrow."""
     figure = axes[0, 0].figure
     width = figure.get_figwidth() / MM
     if axes.shape[1] == 1 or width > 0.75 * TWO_COLUMNS:
@@ -124,7 +124,7 @@ def _letters(text: str) -> int:
 
 
 def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figure:
-    """Put legend, panels and axis labels in their places and give the figure the height they need.
+    """Place legend, panels and axis labels, and set the height of the figure.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def _columns(axes: NDArray[Any], width: float) -> tuple[list[float], list[float]
 
 
 def _place_labels(panel: Axes, left: float, below: float) -> None:
-    """Put axis labels at these distances, as shares of the panel, and make the ticks while the style is in force."""
+    """Place axis labels at these distances, relative to the panel, and make the ticks in the current style."""
     panel.yaxis.set_label_coords(-left, 0.5)
     panel.xaxis.set_label_coords(0.5, -below)
     panel.xaxis.get_major_ticks()
@@ -203,7 +203,7 @@ def _number_width(axis: Axis) -> float:
 
 
 def _shared_legend(figure: Figure) -> int:
-    """One legend above all panels, each entry once, in the order of drawing; how many lines it takes."""
+    """One legend above all panels, each entry once, in the order of drawing; the number of its lines."""
     entries: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

@@ -1,4 +1,4 @@
-"""Symbols of a scene, in metres: supports, rails, blocks, pins, welds, springs and gears, and how each is drawn."""
+"""Symbols of a scene, in metres: supports, rails, blocks, pins, welds, springs and gears, and their looks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STILL = 1e-3
 
 
 class MarkLook(NamedTuple):
-    """How symbols are drawn: colours of a theme by what they are for, empty for none; width of lines, and if dashed."""
+    """Look of symbols: colours of a theme by use, empty for none; width of lines, and whether dashed."""
 
     fill: str
     stroke: str
@@ -77,13 +77,13 @@ def by_look(marks: Sequence[Mark]) -> dict[str, list[Mark]]:
 
 
 def _joined(pieces: Sequence[Array] | Array) -> Array:
-    """Lines one after the other, gaps between them."""
+    """Lines in succession, with gaps between them."""
     gap = np.full((1, 2), np.nan)
     return np.concatenate([part for piece in pieces for part in (piece, gap)])[:-1]
 
 
 def is_guide(joint: DrawnJoint, limits: Limits) -> bool:
-    """Whether what slides goes through a block that stays, instead of a block along a rail."""
+    """Whether a slider moves through a fixed block, instead of a block along a rail."""
     return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL * limits.size)
 
 
@@ -112,7 +112,7 @@ def support(place: Array, limits: Limits) -> tuple[list[Array], Array]:
 
 
 def ground_of(joint: DrawnJoint, limits: Limits) -> tuple[list[Array], Array]:
-    """Lines of a joint's ground, and its hatching (n, 2, 2): a rail where it slides, else a support."""
+    """Lines of a joint's ground, and its hatching (n, 2, 2): a rail if it slides, else a support."""
     size = limits.size
     if joint.slides and not is_guide(joint, limits):
         along = np.array([np.cos(joint.direction[0]), np.sin(joint.direction[0])])
@@ -131,7 +131,7 @@ def ground_of(joint: DrawnJoint, limits: Limits) -> tuple[list[Array], Array]:
 
 
 def block(joint: DrawnJoint, limits: Limits) -> Array:
-    """Corners (f, 5, 2) of what slides, or of the guide it slides through."""
+    """Corners (f, 5, 2) of a slider, or of the guide it slides through."""
     a, b = 0.5 * np.array(BLOCK) * limits.size
     corners = np.array([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]])
     c, s = np.cos(joint.direction)[:, None], np.sin(joint.direction)[:, None]

@@ -1,4 +1,4 @@
-"""A mechanism as notebooks show it: what it is made of, and a sketch."""
+"""A mechanism in notebooks: its members, and a sketch."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def mechanism_html(mechanism: Mechanism) -> str:
 
 
 def freedoms(mechanism: Mechanism) -> int:
-    """Degrees of freedom of the rigid mechanism as Grübler counts them: redundant constraints are not seen."""
+    """Degrees of freedom of the rigid mechanism by Grübler's count, which ignores redundant constraints."""
     return 3 * len(mechanism.bodies) - constraint_count(mechanism)
 
 
@@ -65,12 +65,12 @@ def _counted(mechanism: Mechanism) -> str:
 
 
 def _few(what: str, headings: tuple[str, ...], rows: list[tuple]) -> str:
-    """A table of the first rows, and how many more there are."""
+    """A table of the first rows, and the number of the others."""
     more = len(rows) - _MOST
     return table(headings, rows[:_MOST]) + (sentence(f"and {more} more {what}") if more > 0 else "")
 
 
 def _words(body: Body) -> str:
-    """The class of a body in words: "flexible beam"; of one held rigid with that."""
+    """The class of a body in words: "flexible beam"; held rigid, with a remark."""
     text = re.sub(r"(?<!^)(?=[A-Z])", " ", type(body).__name__).lower()
     return f"{text}, held rigid" if getattr(body, "flexible", True) is False else text

@@ -25,7 +25,7 @@ _FAMILIES: Mapping[str, dict[str, Any]] = {
 
 
 def method_look(family: str, number: int) -> dict[str, Any]:
-    """How a method is drawn: the so-manieth of its family."""
+    """Look of a method by its number in its family."""
     colours = [BLACK, *(colour for colour in COLOURS if colour != BLACK)]
     return {
         "color": colours[number % len(colours)],
@@ -63,7 +63,7 @@ def work_precision(figures: Mapping[str, Any]) -> Figure:
 
 
 def _lines(methods: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], list[dict[str, Any]]]]:
-    """Title, look and complete runs of each line, in order of error; a run exactly on the reference has no place."""
+    """Title, look and complete runs of each line, in order of error, without runs of zero error."""
     members: dict[str, int] = {}
     lines = []
     for method in methods.values():

@@ -75,7 +75,7 @@ def tracking_errors(data: xr.Dataset) -> Figure:
 
 
 def _outcome(run: xr.Dataset) -> str:
-    """RMS tracking error of a run, or when it stopped."""
+    """RMS tracking error of a run, or the time at which it stopped."""
     rms = float(headline(run)[0])
     if math.isfinite(rms):
         unit = display_unit("m", rms)
@@ -86,7 +86,7 @@ def _outcome(run: xr.Dataset) -> str:
 
 
 def _mode_panels(count: int) -> tuple[Figure, NDArray[Any]]:
-    """A panel for each mode, at most three beside one another; those left over are hidden."""
+    """A panel for each mode, at most three side by side; unused ones are hidden."""
     columns = 2 if count == 4 or (is_narrow() and count > 1) else min(count, 3)
     rows = math.ceil(count / columns)
     figure, axes = panels(rows, columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)

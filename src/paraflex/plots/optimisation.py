@@ -1,4 +1,4 @@
-"""How a search came down, what an identification reached, and which parameters a metric depends on."""
+"""Convergence of a search, targets of an identification, and Sobol indices of a metric."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HIGHEST = 3.0
 
 @drawn
 def convergence(figures: Mapping[str, Any]) -> Figure:
-    """The objective, or root mean square residual, of every design, and the least until then.
+    """The objective, or root mean square residual, of every design, and the least so far.
 
     Designs that do not run stand below the axis, those that pass a limit are crosses.
     """
@@ -57,7 +57,7 @@ def convergence(figures: Mapping[str, Any]) -> Figure:
 
 @drawn
 def targets_reached(figures: Mapping[str, Any]) -> Figure:
-    """Every target: what the start and the best design make of it, as a multiple of it."""
+    """Every target: values at the start and at the best design, relative to it."""
     targets = [each for each in figures["targets"] if each["value"] != 0.0]
     if not targets:
         raise InputError("no targets to compare with", field="figures", remedy="give figures of an identification")
@@ -78,7 +78,7 @@ def targets_reached(figures: Mapping[str, Any]) -> Figure:
 
 @drawn
 def sobol_bars(figures: Mapping[str, Any]) -> Figure:
-    """First-order and total indices of every parameter, intervals of 95 %; a panel a metric, path and mode."""
+    """First-order and total indices of every parameter, intervals of 95 %; one panel per metric, path and mode."""
     panels_of: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in figures["indices"]:
         if row["first"] is not None:
@@ -100,7 +100,7 @@ def sobol_bars(figures: Mapping[str, Any]) -> Figure:
 
 
 def _draw_best(panel: Axes, ran: list, last: int) -> None:
-    """The least of the designs that hold all limits, as a line of steps."""
+    """The least of the designs within all limits, as a line of steps."""
     numbers, least = [], []
     for number, value, held in ran:
         if held and (not least or value < least[-1]):
@@ -125,7 +125,7 @@ def _draw_bars(panel: Axes, rows: list[Mapping[str, Any]]) -> None:
 
 
 def _target_name(target: Mapping[str, Any], targets: list) -> str:
-    """What tells a target from the others: its mode, and path and metric where they differ."""
+    """Distinctive name of a target: its mode, and path and metric if they differ."""
     differing = [key for key in ("metric", "path") if len({each[key] for each in targets}) > 1]
     names = [metric_name(target[key]) if key == "metric" else target[key] for key in differing]
     return " ".join([mode_label(target["mode"]), *names])

@@ -1,4 +1,4 @@
-"""All numbers of every design at once, as lines over parallel axes."""
+"""All numbers of every design, as lines over parallel axes."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
 
 
 def _draw_designs(panel: Axes, places: Array, judged: Array, judge: str) -> None:
-    """A line a design, the least by the judging metric drawn last, and that one thick."""
+    """One line per design, that with the least of the judging metric last and thick."""
     order = np.argsort(-judged, kind="stable")
     shown = order[np.unique(np.linspace(0, order.size - 1, min(order.size, _LINES)).astype(int))]
     rows = np.arange(places.shape[1])
@@ -89,5 +89,5 @@ def _draw_axes(panel: Axes, labels: list[str], low: Array, high: Array) -> None:
 
 
 def _colours() -> Colormap:
-    """From dark to light, in grey as well."""
+    """Colours from dark to light, also in grey."""
     return ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, _LIGHTEST, 256)))

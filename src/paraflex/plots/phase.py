@@ -43,7 +43,7 @@ def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
 
 @drawn
 def link_phases(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Angular velocity over angle of every body, of at most eight of them."""
+    """Angular velocity over angle of every body, at most eight."""
     run = one_run(data, mode)
     bodies = names_of(run, "body")[:_MOST]
     columns = 2 if is_narrow() or len(bodies) in (2, 3, 4) else min(len(bodies), 4)

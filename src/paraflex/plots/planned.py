@@ -1,4 +1,4 @@
-"""Which figures can be drawn of some results, and each as it is to be drawn: of a mode, a run or many designs."""
+"""The figures that can be drawn of some results, one for each mode, run or metric as needed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PlannedFigure:
-    """A figure to be drawn: of which line of the catalogue, what tells it from others of that line, and how.
+    """A figure to be drawn: its line of the catalogue, its distinctive name, and its arguments.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class PlannedFigure:
 
     @property
     def stem(self) -> str:
-        """Of its files."""
+        """Stem of its files."""
         return f"{self.figure.name}_{self.of}" if self.of else self.figure.name
 
 
@@ -58,7 +58,7 @@ def figures_of(source: Source) -> list[CatalogueFigure]:
 
 
 def find_figure(source: Source, name: str) -> CatalogueFigure:
-    """A figure by its name, or by that of its file."""
+    """A figure by its name, or by the name of its file."""
     there = figures_of(source)
     for figure in there:
         if name in (figure.name, figure.written_as):
@@ -120,7 +120,7 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
 
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:
-    """The modes asked for, else all there are; none of results that have no modes."""
+    """The modes asked for, else all; none for results without modes."""
     if source.kind in ("tracking", "verification"):
         known = names_of(source.data, "mode")
     elif source.kind == "sensitivity":

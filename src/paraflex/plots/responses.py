@@ -1,4 +1,4 @@
-"""What designs do: metrics over parameters, and the best compromises between two metrics."""
+"""Responses of designs: metrics over parameters, and the Pareto front of two metrics."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _GROUPS = 12
 
 @drawn
 def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
-    """Metrics over parameters: a row a metric, a column a parameter, each run a mark, its path and mode by colour.
+    """Metrics over parameters: one row per metric, one column per parameter, a mark per run, coloured by path and mode.
 
     The runs of a study of one parameter are joined; of more the median over the others is, at each value, or in twelve
     groups of as many runs.
@@ -77,7 +77,7 @@ def _scale(values: Array) -> float:
 
 
 def _medians(x: Array, y: Array) -> tuple[Array, Array]:
-    """Medians of values in order of x: at each x, or in groups of as many."""
+    """Medians of values in order of x: at each x, or in groups of equal size."""
     values = np.unique(x)
     groups = [x == value for value in values] if values.size <= _GROUPS else None
     if groups is None:
@@ -87,7 +87,7 @@ def _medians(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _series_name(pair: tuple[str, str], table: DesignTable) -> str:
-    """What tells the runs of a path and mode from the others."""
+    """Distinctive name of the runs of a path and mode."""
     path, mode = pair
     several = len(set(table.path.tolist())) > 1
     return (f"{plain(path)}, " if several else "") + f"mode {mode_label(mode)}"
@@ -95,7 +95,7 @@ def _series_name(pair: tuple[str, str], table: DesignTable) -> str:
 
 @drawn
 def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
-    """Two metrics of every design, less of both being better, and the designs that no other is better than in both.
+    """Two metrics of every design, and the designs that no other design dominates.
 
     Parameters
     ----------

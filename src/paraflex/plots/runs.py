@@ -1,4 +1,4 @@
-"""How desired and actual curves of runs are drawn, and panels over time finished."""
+"""Curves of desired and actual motion, and panels over time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ END_EFFECTOR = (
 
 
 def draw_actual(axes: Axes, run: xr.Dataset, x: ArrayLike, y: ArrayLike, **look: Any) -> None:
-    """A curve of a run, with a mark at its end where the run did not get to the last sample.
+    """A curve of a run, with a mark at its end if the run ended before the last sample.
 
     Its label names the mode; `look` replaces that or any other of the line's properties.
     """
@@ -46,7 +46,7 @@ def draw_actual(axes: Axes, run: xr.Dataset, x: ArrayLike, y: ArrayLike, **look:
 
 
 def draw_curves(axes: Axes, run: xr.Dataset, curves: Mapping[str, NDArray[np.float64]], *, first: int = 0) -> None:
-    """Quantities (k,) of a run in time by their labels, each in colours and dashes of its own.
+    """Quantities (k,) of a run in time by their labels, each with its own colour and dashes.
 
     Those that are nowhere a number are left out. `first` is the number of the first look.
     """
@@ -64,7 +64,7 @@ def draw_desired(axes: Axes, x: ArrayLike, y: ArrayLike) -> None:
 
 
 def shade_rest(axes: Axes, data: xr.Dataset) -> None:
-    """Span all of the time axis and shade what follows the end of the desired motion."""
+    """Extend the time axis to the whole run and shade the time after the desired motion."""
     time = data["time"].values
     end = float(data.attrs.get("motion_end", time[-1]))
     axes.set_xlim(time[0], time[-1])
@@ -75,7 +75,7 @@ def shade_rest(axes: Axes, data: xr.Dataset) -> None:
 
 
 def finish_over_time(figure: Figure, axes: NDArray[Any], data: xr.Dataset, panel_height: float) -> Figure:
-    """Lay out panels over time [mm]: what follows the motion is shaded, and the time axis named once a column."""
+    """Lay out panels over time [mm], shade the time after the motion, and name the time axis once per column."""
     for panel in axes.flat:
         shade_rest(panel, data)
     label_outer_time(axes)
@@ -83,7 +83,7 @@ def finish_over_time(figure: Figure, axes: NDArray[Any], data: xr.Dataset, panel
 
 
 def largest_over_time(data: xr.Dataset, run: xr.Dataset, values: NDArray[np.float64], dim: str, label: str) -> Figure:
-    """One panel of quantities (time, dim) of a run; of more than can be told apart those with the largest peaks."""
+    """One panel of quantities (time, dim) of a run; if there are too many, those with the largest peaks."""
     peaks = np.array([peak(each) for each in values.T])
     largest = [k for k in np.argsort(-peaks, kind="stable")[:MOST_LINES] if peaks[k] > 0.0]
     names = names_of(run, dim)

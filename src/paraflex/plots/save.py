@@ -1,4 +1,4 @@
-"""Figures as files: those that a command writes with its results, and any of them again for print."""
+"""Figures as files: those written with the results of a command, and single ones for print."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FORMATS = tuple(_METADATA)
 
 @checked_arguments()
 def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mode: str | None = None) -> list[Path]:
-    """Write the figures that the command which makes such results writes beside them, as PNG (200 dpi) and SVG.
+    """Write the figures that a command adds to its results, as PNG (200 dpi) and SVG.
 
     Of a run along a path figures 11 to 18, named like `fig11_desired_path.png`; of a verification figures 22 and 23 of
     every mode and the distances of all models; of others see `paraflex plot --list`. There are none where nothing can

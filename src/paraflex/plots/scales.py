@@ -1,4 +1,4 @@
-"""Axes of numbers as powers of ten, and of names.
+"""Logarithmic axes with powers of ten, and axes of names.
 
 Numbers are plain text: the layout knows how wide digits are.
 """
@@ -19,7 +19,7 @@ LINE = 5.5
 
 
 def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y") -> None:
-    """Make an axis logarithmic, with numbers at powers of ten, or also at 2 and 5 where it spans few of them."""
+    """Make an axis logarithmic, with numbers at powers of ten, or also at 2 and 5 if it spans few of them."""
     axis = panel.yaxis if direction == "y" else panel.xaxis
     (panel.set_yscale if direction == "y" else panel.set_xscale)("log")
     low, high = axis.get_minpos(), axis.get_data_interval()[1]
@@ -30,13 +30,13 @@ def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y") -> None:
 
 
 def name_powers(axis: Axis) -> None:
-    """Number a logarithmic axis at powers of ten alone."""
+    """Number a logarithmic axis at powers of ten only."""
     axis.set_major_locator(LogLocator(numticks=12))
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
     axis.set_minor_formatter(NullFormatter())
 
 
 def list_lines(panel: Axes, names: Sequence[str]) -> None:
-    """Name the lines of a panel that is a list, from the top down."""
+    """Name the lines of a panel with a list, from the top down."""
     panel.set_yticks(range(len(names)), [plain(name) for name in names])
     panel.set_ylim(len(names) - 0.4, -0.6)

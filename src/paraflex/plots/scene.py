@@ -1,4 +1,4 @@
-"""The one description of a drawn mechanism, in metres: links, joints, ground, springs and paths at given times.
+"""Description of a drawn mechanism, in metres: links, joints, ground, springs and paths at given times.
 
 Matplotlib (`plots/drawing.py`), files of SVG (`plots/svg.py`) and the player of the reports (`report/film.py`) draw it.
 """
@@ -32,7 +32,7 @@ _MOST = (0.2, 99.8)
 
 
 class Limits(NamedTuple):
-    """What a picture shows [m]."""
+    """Limits of a picture [m]."""
 
     left: float
     right: float
@@ -45,7 +45,7 @@ class Limits(NamedTuple):
         return max(self.right - self.left, self.top - self.bottom)
 
     def fitted(self, ratio: float) -> Limits:
-        """As much more to either side as a panel of that width by height shows."""
+        """The limits extended to the proportions of a panel of that width by height."""
         width, height = self.right - self.left, self.top - self.bottom
         wide, high = max(ratio * height - width, 0.0) / 2.0, max(width / ratio - height, 0.0) / 2.0
         return Limits(self.left - wide, self.right + wide, self.bottom - high, self.top + high)
@@ -63,12 +63,12 @@ class DrawnJoint:
 
     @property
     def slides(self) -> bool:
-        """Whether it has an axis."""
+        """Whether the joint has an axis."""
         return bool(np.isfinite(self.direction).all())
 
 
 class DrawnGear(NamedTuple):
-    """A gear or the like at f times: pitch circles and lines (f, n, 2), or a line from joint to joint."""
+    """A gear or similar member at f times: pitch circles and lines (f, n, 2), or a line from joint to joint."""
 
     name: str
     lines: tuple[Array, ...]
@@ -125,7 +125,7 @@ class Scene:
 
 
 def run_times(data: xr.Dataset) -> tuple[float, float]:
-    """First time of a run and the last that any of its modes reached [s]."""
+    """First time of a run and the last time reached by any of its modes [s]."""
     check_shapes(data)
     kept = np.isfinite(data["shape"].values[..., 0, 0]).reshape(-1, data.sizes["time"]).any(axis=0)
     time = data["time"].values
@@ -133,7 +133,7 @@ def run_times(data: xr.Dataset) -> tuple[float, float]:
 
 
 def check_shapes(data: xr.Dataset) -> None:
-    """Nothing, if results hold what drawings are made from."""
+    """Check that results have the variables for drawings."""
     if "shape" not in data:
         raise InputError(
             "these results hold no shapes of links: they are of an earlier version", field="results",
@@ -174,7 +174,9 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
         1 is the truth, 0 draws links stiff.
     """
     if not (np.isfinite(magnify) and magnify >= 0.0):
-        raise InputError("must not be negative", field="magnify", value=magnify, remedy="1 is the truth, 50 shows more")
+        raise InputError(
+            "must not be negative", field="magnify", value=magnify, remedy="1 is the actual deflection, 50 magnifies it"
+        )
     kept = np.isfinite(run["shape"].values).any(axis=(1, 2))
     samples = int(np.argmin(kept)) if not kept.all() else kept.size
     if not samples:
@@ -217,7 +219,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
 
 
 class _Sampler:
-    """Values between samples, linearly; held beyond the last."""
+    """Linear interpolation between samples; constant beyond the last."""
 
     def __init__(self, time: Array, times: Array) -> None:
         self.first = np.clip(np.searchsorted(time, times, side="right") - 1, 0, max(time.size - 2, 0))
@@ -231,7 +233,7 @@ class _Sampler:
 
 
 def followed_station(run: xr.Dataset) -> int | None:
-    """The station whose trail is drawn: the end-effector's, or else of the point at no joint that goes farthest."""
+    """The station whose trail is drawn: the end-effector's, or that of the free point with the longest way."""
     points = names_of(run, "point")
     stations = run["point_station"].values
     if run.attrs.get("end_effector_point") in points:
@@ -264,7 +266,7 @@ def _springs(run: xr.Dataset, drawn: Array) -> dict[str, Array]:
 
 
 def _gears(run: xr.Dataset, joints: Array, directions: Array) -> tuple[DrawnGear, ...]:
-    """Gears between joints that stand at these places (f, joints, 2) in these directions (f, joints)."""
+    """Gears between joints at these places (f, joints, 2) in these directions (f, joints)."""
     if "gear_joint" not in run:
         return ()
     names, related = run["gear"].values, run["gear_joint"].values.astype(int)
@@ -275,7 +277,7 @@ def _gears(run: xr.Dataset, joints: Array, directions: Array) -> tuple[DrawnGear
 
 
 def pitch_lines(ends: Array, directions: Array, radii: Array) -> tuple[Array, ...]:
-    """Pitch circles (f, n, 2) of wheels and pitch lines of racks; where radii are NaN, a line from joint to joint.
+    """Pitch circles (f, n, 2) of wheels and pitch lines of racks; if radii are NaN, a line from joint to joint.
 
     Parameters
     ----------
@@ -303,7 +305,7 @@ def _pitch_line(ends: Array, directions: Array, radii: Array, rack: int) -> Arra
 
 
 def _with_rails(places: Array, joints: tuple[DrawnJoint, ...]) -> Array:
-    """Places, and where the rails of joints end."""
+    """Places, and the ends of the joints' rails."""
     size = limits_of(places).size
     rails = [
         joint.place + sign * 1.2 * BLOCK[0] * size * np.column_stack([np.cos(joint.direction), np.sin(joint.direction)])
@@ -315,7 +317,7 @@ def _with_rails(places: Array, joints: tuple[DrawnJoint, ...]) -> Array:
 
 
 def limits_of(places: Array) -> Limits:
-    """What shows all of these places, with room round them."""
+    """Limits that contain all of these places, with a margin."""
     places = places[np.isfinite(places).all(axis=1)]
     # A run that comes apart does not rule the picture.
     usual = np.percentile(places, _MOST, axis=0)
@@ -333,7 +335,7 @@ def limits_of(places: Array) -> Limits:
 
 
 def common_limits(scenes: list[Scene]) -> Limits:
-    """What shows all of several scenes."""
+    """Limits that contain several scenes."""
     left, right, bottom, top = np.array([one.limits for one in scenes]).T
     return Limits(float(left.min()), float(right.max()), float(bottom.min()), float(top.max()))
 
@@ -355,14 +357,14 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
 
 
 def figure_of(places: Array) -> Array:
-    """The stations (..., s, 2) of a body that are joined by lines: of a closed figure, up to where it closes."""
+    """The stations (..., s, 2) of a body that are joined by lines: for a closed figure, up to where it closes."""
     first = places.reshape(-1, *places.shape[-2:])[0]
     back = np.flatnonzero(np.all(first[1:] == first[0], axis=1))
     return places[..., : back[0] + 2, :] if back.size and back[0] > 1 else places
 
 
 def is_plate(places: Array) -> bool:
-    """Whether the stations (s, 2) that `figure_of` gives are a closed figure."""
+    """Whether the stations (s, 2) of `figure_of` are a closed figure."""
     return len(places) > 3 and bool(np.all(places[0] == places[-1]))
 
 

@@ -1,4 +1,4 @@
-"""Which of the runs of some results a figure shows: by mode, by model, or the one there is."""
+"""The runs of some results that a figure shows: by mode or by model."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def select_model(data: xr.Dataset, model: str) -> xr.Dataset:
 
 
 def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
-    """The floating frame's best model and the most independent other one, as Figs. 22 and 23 compare them."""
+    """The best floating-frame model and the most independent other one, as compared in Figs. 22 and 23."""
     names = names_of(data, "model")
     ours = next((name for name in ("second-order", "linear") if name in names), None)
     other = next((name for name in ("segments", "mujoco", "exudyn") if name in names), None)
@@ -46,13 +46,13 @@ def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
 
 
 def default_mode(data: xr.Dataset) -> str:
-    """The mode with most active motors where modes are named by their signs; else the first."""
+    """The mode with most active motors if modes are named by their signs; else the first."""
     names = names_of(data, "mode")
     return max(names, key=lambda name: name.count("+")) if all(map(is_signs, names)) else names[0]
 
 
 def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
-    """The run of a mode, by default of `default_mode`; of results without modes the one there is."""
+    """The run of a mode, by default of `default_mode`; for results without modes the only one."""
     if "mode" not in data.dims:
         if mode is not None:
             raise InputError(
@@ -63,12 +63,12 @@ def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
 
 
 def run_label(run: xr.Dataset) -> str:
-    """A run's mode for legends."""
+    """Label of a run's mode in legends."""
     return f"mode {mode_label(str(run['mode'].item()))}"
 
 
 def samples(run: xr.Dataset) -> int:
-    """How many samples of a run there are before the end or the first one it did not get to."""
+    """Number of samples of a run up to the last one that it reached."""
     moving = run["end_effector"] if "end_effector" in run else run["angle"]
     missing = ~np.isfinite(moving.values).all(axis=-1)
     return int(np.argmax(missing)) if missing.any() else missing.size

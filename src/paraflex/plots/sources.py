@@ -1,4 +1,4 @@
-"""Results on disk, recognised by what is in them: which command wrote them, and what figures are drawn from."""
+"""Results on disk, recognised by their content: kind of results, and data for figures."""
 
 from __future__ import annotations
 
@@ -100,12 +100,12 @@ def _json(file: Path) -> Source:
 
 
 def kind_of_numbers(found: Any) -> str:
-    """What kind of results plain numbers are; empty where of none that figures are drawn of."""
+    """Kind of results with these plain numbers; empty if no figures can be drawn of them."""
     return next((kind for kind, is_it in _JSON.items() if is_it(found)), "")
 
 
 def _designs(folder: Path) -> DesignTable | None:
-    """The table of a folder's runs; None where there are none."""
+    """The table of a folder's runs; None if there are none."""
     files = tables_of(folder)
     table = read_designs(files) if files else None
     return table if table is not None and table.complete.size else None

@@ -1,4 +1,4 @@
-"""What each method does to a free vibration: damping, period, and what becomes of high frequencies."""
+"""Numerical damping: damping ratio, period error and spectral radius of each method."""
 
 from __future__ import annotations
 
@@ -68,5 +68,5 @@ def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figu
 
 
 def _shown(found: Spectrum, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What a logarithmic axis can show: not what is zero, nor what grows, which is not what a vibration does."""
+    """Values that a logarithmic axis can show: neither zero nor growth."""
     return np.where((found.radius < 1.0 + 1e-9) & (values > 0.1 * _SHOWN[0]), values, np.nan)

@@ -1,4 +1,4 @@
-"""The look of every figure: fonts, and lines that stay apart in black and white."""
+"""Style of every figure: fonts, and lines that are distinguishable in black and white."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHADE = "0.92"
 
 
 def look_of(number: int) -> dict[str, Any]:
-    """Colour and dashes of the so-manieth of several lines: they differ in grey as well, up to 35 of them."""
+    """Colour and dashes of a line by its number: distinguishable in grey, up to 35 lines."""
     return {"color": COLOURS[number % len(COLOURS)], "linestyle": DASHES[number % len(DASHES)]}
 
 
@@ -73,13 +73,13 @@ _NOTHING = 1e-9
 
 @contextmanager
 def journal_style() -> Iterator[None]:
-    """Draw in this style, from Matplotlib's own defaults: nothing of the user's settings comes in or is changed."""
+    """Draw in this style, from Matplotlib's own defaults, without reading or changing the user's settings."""
     with matplotlib.style.context(STYLE, after_reset=True):
         yield
 
 
 def keep_flat(axes: Axes, scale: float, direction: Literal["x", "y"] = "y") -> None:
-    """Show what varies by less than a millionth of `scale` in a direction as constant, not as its rounding errors."""
+    """Show data that differ by less than a millionth of `scale` in a direction as constant, not as rounding errors."""
     axis, set_limits = (axes.xaxis, axes.set_xlim) if direction == "x" else (axes.yaxis, axes.set_ylim)
     low, high = axis.get_data_interval()
     if not high - low > max(1e-6 * scale, _NOTHING):  # also true of axes without data

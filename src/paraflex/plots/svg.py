@@ -1,4 +1,4 @@
-"""A scene as elements of SVG: still, or moving by itself in browsers, shapes as lists of values in time (SMIL)."""
+"""A scene as elements of SVG: still, or animated in browsers, shapes as lists of values in time (SMIL)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _LINK, _PIN, _TIP = 4.0, 3.2, 2.6
 
 @dataclass(frozen=True)
 class Pen:
-    """Where and how a scene is put on a page.
+    """Position and style of a scene on a page.
 
     Attributes
     ----------
@@ -49,12 +49,12 @@ class Pen:
     seconds: float = 0.0
 
     def pixels(self, places: Array) -> Array:
-        """Places on the page."""
+        """Places on the page, in pixels."""
         return places * [self.scale, -self.scale] + self.corner
 
 
 def sketch(mechanism: Mechanism) -> str:
-    """SVG of the first assembly in the colours of the page it is on; empty where places do not follow from it."""
+    """SVG of the first assembly in the colours of its page; empty if places do not follow from the assembly."""
     data = assembled_data(mechanism)
     if data is None:
         return ""
@@ -71,12 +71,12 @@ def sketch(mechanism: Mechanism) -> str:
 
 
 def still_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:
-    """The ground."""
+    """Elements of the ground."""
     return [_mark(mark, pen) for mark in still_marks(shown, limits)]
 
 
 def moving_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:
-    """All but the ground and the desired path, from the back to the front; at a single time they stand still."""
+    """Elements of all but the ground and the desired path, from the back to the front; at a single time still."""
     look, out = pen.look, []
     if shown.trail is not None:
         out.append(_trail(shown.trail, pen))
@@ -97,7 +97,7 @@ def moving_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:
 
 
 def animated(name: str, values: Sequence[str], seconds: float) -> str:
-    """An attribute that takes these values evenly in time, over and over; empty where it stays."""
+    """An attribute that takes these values evenly in time, repeatedly; empty if it is constant."""
     if len(set(values)) == 1:
         return ""
     return (
@@ -117,7 +117,7 @@ def _mark(mark: Mark, pen: Pen) -> str:
 
 
 def _line(places: Array, look: str, name: str, pen: Pen) -> str:
-    """A line; one with gaps, which does not move, as a path."""
+    """Element of a line; a still line with gaps is a path."""
     pixels = pen.pixels(places)
     if np.isnan(pixels).any():
         pieces = np.split(pixels[0], np.flatnonzero(np.isnan(pixels[0, :, 0])))
@@ -137,7 +137,7 @@ def _dot(places: Array, radius: float, look: str, name: str, pen: Pen) -> str:
 
 
 def _trail(places: Array, pen: Pen) -> str:
-    """The whole trail, uncovered as far as it is passed."""
+    """Element of the whole trail, uncovered with time."""
     pixels = pen.pixels(places)
     steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(pixels, axis=0), axis=1))])
     if steps[-1] < 0.5:
@@ -163,7 +163,7 @@ def _points(pixels: Array) -> list[str]:
 
 
 def _corners(pixels: Array) -> list[int]:
-    """The points of a line (f, s, 2) that it is not straight without, in one picture at least."""
+    """The points of a line (f, s, 2) at which it is not straight in at least one picture."""
     kept = [0]
     for last in range(2, pixels.shape[1]):
         start = pixels[:, kept[-1], None]

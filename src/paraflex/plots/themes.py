@@ -9,7 +9,7 @@ from paraflex.mechanism.quantities import known
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours by what they are for; those of links are told apart by colour-blind readers too."""
+    """Colours by use; those of links are distinguishable by colour-blind readers too."""
 
     ground: str
     ink: str
@@ -20,7 +20,7 @@ class Theme:
     links: tuple[str, ...]
 
     def link(self, number: int) -> str:
-        """Colour of the body of that number."""
+        """Colour of a body by its number."""
         return self.links[number % len(self.links)]
 
 

@@ -55,7 +55,7 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
 
 
 def most_deflected(run: xr.Dataset) -> list[str]:
-    """Two bodies, in the order of the mechanism: those with largest transverse tip displacement that are not alike."""
+    """Two bodies, in the order of the mechanism, with the largest transverse tip displacements that differ."""
     peaks = {str(name): peak(run["tip_transverse"].sel(body=name)) for name in run["body"].values}
     chosen: list[str] = []
     rest = dict(peaks)
@@ -84,7 +84,7 @@ def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 @drawn
 def joint_forces(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Magnitude of the force in every joint in time; of more than seven, in those with the largest."""
+    """Magnitude of the force in every joint in time; if there are more than seven, the largest."""
     run = one_run(data, mode)
     forces = np.linalg.norm(run["joint_force"].transpose("time", "joint", "axis").values, axis=2)
     return largest_over_time(data, run, forces, "joint", axis_label("force"))

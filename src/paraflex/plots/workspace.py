@@ -77,7 +77,7 @@ def deviated_paths(
 
 
 def round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
-    """Largest of 1, 2, 5, 10, ... at which the deviation [mm] stays small beside a path of this extent [mm]."""
+    """Largest of 1, 2, 5, 10, ... that keeps the deviation [mm] small against a path of this extent [mm]."""
     lengths = np.linalg.norm(deviation, axis=1)
     largest = peak(lengths)
     if not largest > 1e-9 * extent:
@@ -116,7 +116,7 @@ def _draw_direction(axes: Axes, path: NDArray[np.float64]) -> None:
 
 
 def finish_workspace(figure: Figure, axes: Axes) -> Figure:
-    """Frame what is drawn, with room round a path that is a line or a point, and lay the figure out."""
+    """Set the limits, with a margin for a path that is a line or a point, and lay the figure out."""
     box = axes.dataLim
     width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
     width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0

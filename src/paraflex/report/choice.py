@@ -1,4 +1,4 @@
-"""Which of many runs are looked at closely, and which are drawn at all."""
+"""The runs of many that a report shows in motion, and those that it draws."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _FRONTS = 8
 
 
 class Picked(NamedTuple):
-    """A run that is looked at closely, and what it is best in."""
+    """A run shown in motion, and the metrics in which it is best."""
 
     row: int
     why: tuple[str, ...]
 
 
 def best_runs(designs: DesignTable) -> list[Picked]:
-    """Runs to look at closely: best designs by the first metric, the best by each other, some of the front of two.
+    """Runs to show in motion: best designs by the first metric, the best by each other, some of the front of two.
 
     Three by the first metric, the best by it of each mode, up to two from the middle of the front, eight in all at
     most; less is better.
@@ -57,7 +57,7 @@ def best_runs(designs: DesignTable) -> list[Picked]:
 
 
 def drawn_rows(designs: DesignTable, kept: Sequence[int], most: int = MOST_ROWS) -> NDArray[np.intp]:
-    """Rows that are drawn: all complete ones, or where there are too many a part of them evenly chosen by lot.
+    """Rows that are drawn: all complete ones, or if there are too many a random sample.
 
     Kept whatever is left out are the rows named and the fronts of every two of the first metrics.
     """
@@ -77,7 +77,7 @@ def drawn_rows(designs: DesignTable, kept: Sequence[int], most: int = MOST_ROWS)
 
 
 def fronts(designs: DesignTable, across: str, up: str) -> list[NDArray[np.intp]]:
-    """Rows of each path and mode that no other is below in one metric without being above in the other."""
+    """Rows of each path and mode that no other row dominates in two metrics."""
     x, y = designs.metrics[across], designs.metrics[up]
     out = []
     for path, mode in designs.series:
@@ -97,7 +97,7 @@ def _least(designs: DesignTable, metric: str) -> list[int]:
 
 
 def _least_of_series(designs: DesignTable, metric: str) -> dict[str, int]:
-    """The row with the least of a metric of each path and mode, where there are several."""
+    """The row with the least of a metric for each path and mode, if there are several."""
     out = {}
     pairs = list(designs.series)
     for path, mode in pairs if len(pairs) > 1 else []:
@@ -112,7 +112,7 @@ def _least_of_series(designs: DesignTable, metric: str) -> dict[str, int]:
 
 
 def _knees(designs: DesignTable, across: str, up: str) -> list[int]:
-    """Of the front of all runs the ones nearest the corner of both least values, scaled by the front's extent."""
+    """The runs of the front nearest the corner of both least values, scaled by the front's extent."""
     x, y = (np.where(designs.complete, designs.metrics[name], np.nan) for name in (across, up))
     known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     front = known[undominated(x[known], y[known])]

@@ -30,40 +30,40 @@ TIPS = Chart(
 
 
 def look(k: int) -> Look:
-    """Colour and dash of the k-th of many curves: no two alike, and apart without colour where few."""
+    """Colour and dash of the k-th of many curves, all different; few differ in colour."""
     return Look(k % COLOURS, (k % COLOURS + k // COLOURS) % DASHES)
 
 
 def labelled(label: str, unit: str) -> str:
-    """The label of an axis with its unit, where it has one."""
+    """The label of an axis with its unit, if it has one."""
     return label if unit in ("1", "") else f"{label} [{unit}]"
 
 
 def largest(values: NDArray[np.float64]) -> float:
-    """Largest finite magnitude; NaN where there is none."""
+    """Largest finite magnitude; NaN if there is none."""
     magnitudes = np.abs(values[np.isfinite(values)])
     return float(magnitudes.max()) if magnitudes.size else float("nan")
 
 
 def errors(data: xr.Dataset) -> xr.DataArray:
-    """Distance of the end-effector from its desired place [m]; dimensions as those of the runs, time last."""
+    """Distance of the end-effector from its desired place [m]; dimensions like those of the runs, time last."""
     gaps = (data["end_effector"] - data["end_effector_desired"]).transpose(..., "axis")
     return gaps.reduce(np.linalg.norm, "axis").assign_attrs(units="m")
 
 
 def torque_unit(data: xr.Dataset) -> str:
-    """Of the motors: "N m", or "N" of those that slide."""
+    """Unit of the motors: "N m", or "N" for those that slide."""
     return str(data["torque"].attrs.get("units", "N m"))
 
 
 def torque_chart(data: xr.Dataset) -> Chart:
-    """The chart of what motors do, without its curves."""
+    """The chart of torques, without its curves."""
     quantity = "force" if torque_unit(data) == "N" else "torque"
     return Chart("torques", f"Motor {quantity}s", quantity, choosing="motor")
 
 
 def bending(data: xr.Dataset, name: str = "tip_transverse") -> xr.DataArray:
-    """Displacements of the ends of the links that bend."""
+    """Displacements of the ends of flexible links."""
     bent = [largest(data["tip_transverse"].sel(body=body).values) > 0.0 for body in data["body"].values]
     return data[name].isel(body=np.flatnonzero(bent))
 
@@ -76,7 +76,7 @@ def followed(
     desired: xr.DataArray | None = None,
     selecting: str = "mode",
 ) -> Chart:
-    """Curves over time of the selected run, one for each part; or those of one part in all runs, if there are more.
+    """Curves over time of the selected run, one for each part; or of one part in all runs, if there are more.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def compared(chart: Chart, values: xr.DataArray, runs: Sequence[str]) -> Chart:
 
 
 def plane_path(data: xr.Dataset, runs: Sequence[str], *, common: bool = True) -> Chart:
-    """Paths of the end-effector, deviations also magnified, and where it should go: in common, or each run its own."""
+    """Paths of the end-effector, deviations also magnified, and the desired path: common, or one per run."""
     actual, desired = (1e3 * data[name].values for name in ("end_effector", "end_effector_desired"))
     curves = []
     for r in range(len(runs)):
@@ -149,7 +149,7 @@ def energies(data: xr.Dataset, runs: Sequence[str]) -> Chart:
 
 
 def thinned(data: xr.Dataset) -> xr.Dataset:
-    """Every so manieth sample, where there are more than a chart can show."""
+    """Every n-th sample, if there are more than a chart can show."""
     return data.isel(time=slice(None, None, max(1, -(-data.sizes["time"] // MOST_SAMPLES))))
 
 

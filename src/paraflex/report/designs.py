@@ -1,4 +1,4 @@
-"""Runs of many designs: their numbers as columns of a page, why some failed."""
+"""Runs of many designs: their numbers as columns of a page, reasons of failures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WIDE, _WIDE_RANGE = 50.0, 10.0
 def columns(
     designs: DesignTable, rows: NDArray[np.intp], units: Mapping[str, str], logarithmic: Sequence[str]
 ) -> list[DesignColumn]:
-    """Parameters that vary and metrics of some rows, as the page draws them.
+    """Parameters that differ and metrics of some rows, for the page.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def columns(
 
 
 def shown_unit(unit: str, values: NDArray[np.float64]) -> tuple[str, float]:
-    """The unit that values are shown in, and what they are multiplied by; "" of those without one."""
+    """The unit for display, and the factor of values; "" for numbers without unit."""
     if unit in ("", "1"):
         return "", 1.0
     name, factor = display_unit(unit, values)
@@ -65,12 +65,12 @@ def shown_unit(unit: str, values: NDArray[np.float64]) -> tuple[str, float]:
 
 
 def metric_name(metric: str) -> str:
-    """What a metric is called: "RMS tracking error"; "peak torque of τ₁" of one motor's."""
+    """Label of a metric: "RMS tracking error"; "peak torque of τ₁" for a metric of one motor."""
     return metric_label(metric, text_symbol)
 
 
 def reasons(designs: DesignTable) -> list[tuple[str, str, int]]:
-    """Why runs are not complete: status, one of the reasons, and how many have one like it but for its numbers."""
+    """Reasons why runs are not complete: status, an example, and the number of reasons alike but for numbers."""
     groups: dict[tuple[str, str], list[str]] = {}
     for status, reason in zip(designs.status.tolist(), designs.reason.tolist(), strict=True):
         if status != _COMPLETE:

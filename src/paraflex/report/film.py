@@ -1,4 +1,4 @@
-"""The animation of a page: the scenes of all its runs as the player draws them, in some hundred frames."""
+"""The animation of a page: scenes of all its runs for the player, in some hundred frames."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Animation:
     path: Array | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """The animation as JSON holds it."""
+        """The animation in plain values for JSON."""
         known = [one for one in self.scenes if one is not None]
         limits = common_limits(known) if known else Limits(-1.0, 1.0, -1.0, 1.0)
         shown = next((k for k, one in enumerate(self.scenes) if one is not None), 0)
@@ -76,7 +76,7 @@ class Animation:
 
 
 def _marks(marks: list[Mark], frames: int) -> dict[str, Any]:
-    """Looks and names of symbols, the places each has among all of them, and these."""
+    """Looks and names of symbols, the indices of their places, and the places."""
     ends = np.cumsum([0, *(mark.places.shape[1] for mark in marks)]).tolist()
     pieces = [[mark.look, mark.name, first, end] for mark, first, end in zip(marks, ends, ends[1:], strict=False)]
     places = np.concatenate([np.zeros((frames, 0, 2)), *(mark.places for mark in marks)], axis=1)
@@ -84,7 +84,7 @@ def _marks(marks: list[Mark], frames: int) -> dict[str, Any]:
 
 
 def animation(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Animation | None:
-    """The animation of a dataset whose runs lie along these dimensions; None where it holds no shapes."""
+    """The animation of a dataset with runs along these dimensions; None if it has no shapes."""
     if any(name not in data for name in _SHAPES):
         return None
     few = data.isel(time=frames_of(data.sizes["time"]))
@@ -109,12 +109,12 @@ def animation(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Animation | 
 
 
 def frames_of(samples: int, most: int = MOST_FRAMES) -> NDArray[np.intp]:
-    """Indices of at most so many samples, the first and the last among them."""
+    """Indices of at most a number of samples, the first and the last among them."""
     return np.unique(np.rint(np.linspace(0, samples - 1, min(samples, most))).astype(np.intp))
 
 
 def _runs(values: xr.DataArray, dims: Sequence[str]) -> Array:
-    """Values (runs, ...): the dimensions of runs as one, which a single run does not have."""
+    """Values (runs, ...): the dimensions of runs merged into one, which a single run does not have."""
     rest = [dim for dim in values.dims if dim not in dims]
     array = np.asarray(values.transpose(*dims, *rest).values, dtype=float)
     return array.reshape(-1, *array.shape[len(dims) :])

@@ -1,4 +1,4 @@
-"""The report of a mechanism without a path, left to what acts on it."""
+"""The report of a run without a path."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:
 
 
 def _points(data: xr.Dataset) -> Chart | None:
-    """Paths of the points that move and that no joint made by the program holds."""
+    """Paths of the points that move, without those of joints made by the program."""
     places = data["point_position"].transpose("point", "time", "axis").values
     names = names_of(data, "point")
     moving = [
@@ -133,7 +133,7 @@ def _joint_forces(data: xr.Dataset) -> Chart:
 
 
 def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
-    """Coordinates of one body at a time: its frame's place and angle, and its flexible ones."""
+    """Coordinates of one body at a time: place and angle of its frame, and flexible coordinates."""
     names = names_of(data, "coordinate")
     values = data["coordinate_value"].transpose("coordinate", "time").values
     curves, choices = [], []

@@ -1,4 +1,4 @@
-"""Numbers in a page: small enough to send by mail, and NaN where there are none, which JSON cannot hold."""
+"""Numbers in a page: compressed, and with NaN, which JSON does not have."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DROPPED = 6
 
 @dataclass
 class Series:
-    """Rows of numbers that curves are drawn from, each kept once, in single precision.
+    """Rows of numbers for curves, each kept once, in single precision.
 
     Curves of many charts share their rows: time, and what is shown alone as well as beside other runs.
     """
@@ -27,7 +27,7 @@ class Series:
     _numbers: dict[bytes, int] = field(default_factory=dict)
 
     def add(self, values: ArrayLike, *, exact: bool = False) -> int:
-        """The number of a row with these values (k,); rounded to six digits or so unless they are to be exact."""
+        """The number of a row with these values (k,), rounded to about six digits unless they are to be exact."""
         with np.errstate(over="ignore"):
             row = np.array(values, dtype="<f4", ndmin=1, copy=True)
         if not exact:
@@ -40,13 +40,13 @@ class Series:
         return self._numbers[raw]
 
     def to_dict(self) -> dict[str, Any]:
-        """All rows as JSON holds them: their lengths, and their bytes."""
+        """All rows for JSON: their lengths, and their bytes."""
         joined = np.frombuffer(b"".join(self.rows), dtype=np.uint8)
         return {"lengths": [len(row) // 4 for row in self.rows], "data": _deflated(joined.reshape(-1, 4))}
 
 
 def packed(values: ArrayLike) -> dict[str, Any]:
-    """An array (runs, frames, ...) whose last axis is x, y as JSON holds it: 16 bits a number, differences in time.
+    """An array (runs, frames, ...) with last axis x, y for JSON: 16 bits per number, differences in time.
 
     A number is `offset + scale * integer`, with an offset for x and for y; NaN where the integer is MISSING.
     """
@@ -66,5 +66,5 @@ def packed(values: ArrayLike) -> dict[str, Any]:
 
 
 def _deflated(numbers: NDArray[np.uint8]) -> str:
-    """Bytes (numbers, bytes of each) in base64: all first bytes, all second ones and so on, which packs far better."""
+    """Bytes (numbers, bytes of each) in base64: all first bytes, all second ones and so on, which compresses better."""
     return base64.b64encode(zlib.compress(np.ascontiguousarray(numbers.T).tobytes(), 6)).decode("ascii")

@@ -1,4 +1,4 @@
-"""The page that every report is: one file with its style, its scripts, Plotly and the numbers; nothing is loaded."""
+"""The HTML page of every report: one file with its style, its scripts, Plotly and the numbers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
 
 
 class Look(NamedTuple):
-    """How a curve is drawn: one of the page's eight colours, or without one that of text, as desired curves are.
+    """Look of a curve: one of the page's eight colours, or without one that of text, as for desired curves.
 
     Dashes: 0 solid, 1 dashed, 2 dotted, 3 dash-dotted, 4 long dashes.
     """
@@ -73,7 +73,7 @@ class Curve:
 
 
 class Picker(NamedTuple):
-    """A choice of a chart of designs: what is chosen, among which columns, and which of them at first."""
+    """A choice of columns for a chart of designs, and the initial ones."""
 
     name: str
     columns: Sequence[int]
@@ -127,7 +127,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class DesignColumn:
-    """A number of every design.
+    """A column with a number of every design.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class DesignColumn:
 
 @dataclass(frozen=True)
 class Designs:
-    """Runs of many designs, which charts of the page draw.
+    """Runs of many designs for the charts of the page.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ class Panel:
 @given_as("a page", "what tracking_page or motion_page returns")
 @dataclass(frozen=True)
 class Page:
-    """What a report says.
+    """Content of a report.
 
     Attributes
     ----------
@@ -286,7 +286,7 @@ def save_page(page: Page, path: str | Path) -> None:
 
 @cache
 def plotly_script() -> str:
-    """Plotly's own script, from its Python package, which is not imported for it: that would take a second."""
+    """Plotly's script from its Python package, without importing it, which would take a second."""
     found = find_spec("plotly")
     for folder in (found.submodule_search_locations or []) if found else []:
         script = Path(folder) / "package_data" / "plotly.min.js"
@@ -299,7 +299,7 @@ def plotly_script() -> str:
 
 
 def _data(page: Page) -> dict[str, Any]:
-    """What the scripts are given."""
+    """Data for the scripts."""
     series = Series()
     time = series.add(page.time, exact=True)
 
@@ -320,7 +320,7 @@ def _data(page: Page) -> dict[str, Any]:
 
 
 def _fields(thing: Any, *left_out: str) -> dict[str, Any]:
-    """Fields of a dataclass as they are, but for some."""
+    """Fields of a dataclass, without some."""
     return {one.name: getattr(thing, one.name) for one in fields(thing) if one.name not in left_out}
 
 
@@ -360,7 +360,7 @@ def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
 
 
 def _command(command: str) -> str:
-    """The command, broken between its options only."""
+    """The command, with line breaks between its options only."""
     if not command:
         return ""
     parts = command.replace(" --", "\n--").split("\n")
@@ -368,7 +368,7 @@ def _command(command: str) -> str:
 
 
 def _script_json(data: Mapping[str, Any]) -> str:
-    """JSON that no name in it can break out of."""
+    """JSON with escapes, so that no name in it ends the script."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     for mark in "<>&\u2028\u2029":
         text = text.replace(mark, f"\\u{ord(mark):04x}")

@@ -1,4 +1,4 @@
-"""Where results come from: facts of a run, and the command that gives it again."""
+"""Origin of results: facts of a run, and the command that repeats it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _GIVEN = {name: f"--{name}" for name in _NAMED} | {"tolerance": "--tol"}
 
 
 def asked(data: xr.Dataset) -> dict[str, Any]:
-    """What was asked for; empty where it is not known."""
+    """The request; empty if it is not known."""
     try:
         return json.loads(data.attrs["parameters"]).get("run", {})
     except (KeyError, ValueError):
@@ -60,13 +60,13 @@ def common_facts(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def mechanism_argument(source: str) -> str:
-    """How a command names the mechanism of a file."""
+    """Argument of a command for the mechanism of a file."""
     name = source.removesuffix(".toml")
     return name if name in library_names() else source
 
 
 def run_command_line(run: dict[str, Any]) -> str:
-    """The `paraflex run` that was asked for so; empty where it is not known."""
+    """The `paraflex run` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
     words = ["paraflex", "run", "--mechanism", mechanism_argument(run["mechanism"])]
@@ -90,7 +90,7 @@ def run_command_line(run: dict[str, Any]) -> str:
 
 
 def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence[str]) -> str:
-    """The `paraflex verify` that was asked for so; empty where it is not known."""
+    """The `paraflex verify` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
     words = ["paraflex", "verify", "--mechanism", mechanism_argument(run["mechanism"]), "--path", run["path"]]

@@ -27,7 +27,7 @@ class Step(NamedTuple):
 def survey(
     designs: DesignTable, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], history: Sequence[Step]
 ) -> list[Panel]:
-    """What all designs do."""
+    """Charts of all designs."""
     parameters = [k for k, column in enumerate(drawn) if column.parameter]
     metrics = [k for k, column in enumerate(drawn) if not column.parameter]
     place = {column.identity: k for k, column in enumerate(drawn)}
@@ -58,7 +58,7 @@ def survey(
 
 
 def _responses(parameters: Sequence[int], metrics: Sequence[int]) -> list[Chart]:
-    """Two charts of the same kind to look at side by side: of the first two parameters, or metrics."""
+    """Two charts of the same kind side by side: of the first two parameters, or metrics."""
     note = "A mark a run; thick, the median over the other parameters." if len(parameters) > 1 else "A mark a run."
     starts = [(0, 0), (0, 1)] if len(parameters) > 1 else [(k, 0) for k in range(min(2, len(metrics)))]
     return [
@@ -81,7 +81,7 @@ def _drawn(designs: DesignTable, rows: NDArray[np.intp]) -> str:
 
 
 def _history(steps: Sequence[Step]) -> Chart:
-    """Objectives of a search in the order its designs were looked at, and the least until then."""
+    """Objectives of a search in the order of evaluation, and the least so far."""
     numbers = np.array([step.number for step in steps], dtype=float)
     values = np.array([step.objective for step in steps], dtype=float)
     allowed = np.array([step.allowed for step in steps], dtype=bool)
@@ -98,7 +98,7 @@ def _history(steps: Sequence[Step]) -> Chart:
 def drawn_designs(
     designs: DesignTable, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], shown: Mapping[int, int]
 ) -> Designs:
-    """Drawn rows as the page's charts take them; `shown` tells which of the page's runs a row is."""
+    """Drawn rows for the page's charts; `shown` gives the page's run of a row."""
     pairs = list(dict.fromkeys(zip(designs.path.tolist(), designs.mode.tolist(), strict=True)))
     several_paths, several_modes = (len({pair[k] for pair in pairs}) > 1 for k in (0, 1))
     names = [", ".join([mode] * several_modes + [path] * several_paths) or mode for path, mode in pairs]

@@ -1,4 +1,4 @@
-"""The report of a study of many designs: what was varied, what became of it, and the best designs in motion."""
+"""The report of a study of many designs: its parameters, its results, and the best designs in motion."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _COORDINATES = (
 
 
 class VariedParameter(NamedTuple):
-    """What was varied: fields of the mechanism's file, unit, lowest and highest value, how they are spread."""
+    """A parameter: fields of the mechanism's file, unit, lowest and highest value, distribution."""
 
     fields: tuple[str, ...]
     unit: str
@@ -58,7 +58,7 @@ class VariedParameter(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyAccount:
-    """What a report of a study tells besides its rows.
+    """Content of a study's report besides its rows.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
 
 
 def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Dataset:
-    """Runs of one mechanism with different numbers as one dataset, on the longest of their times; NaN after an end."""
+    """Runs of one mechanism with different numbers as one dataset, over the longest of their times; else NaN."""
     longest = max((one["time"].values for one in runs), key=lambda time: time[-1])
     parts = []
     for one in _with_as_many_stations(runs):
@@ -148,21 +148,21 @@ def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Datase
 
 
 def _of_one_kind(runs: Mapping[int, xr.Dataset]) -> tuple[dict[int, xr.Dataset], list[int]]:
-    """Runs with the bodies, joints, motors and springs of the first, and the rows of the others."""
+    """Runs with the bodies, joints, motors and springs of the first, and the other rows."""
     kinds = {row: _kind(one) for row, one in runs.items()}
     first = next(iter(kinds.values()), None)
     return {row: one for row, one in runs.items() if kinds[row] == first}, [r for r in runs if kinds[r] != first]
 
 
 def _kind(run: xr.Dataset) -> tuple:
-    """What two runs have in common that are drawn with the same links; how many stations each has may differ."""
+    """Common structure of runs that are drawn with the same links; numbers of stations may differ."""
     names = [tuple(map(str, run[dim].values)) for dim in ("body", "joint", "motor")]
     springs = run["spring_position"].shape[1:] if "spring_position" in run else ()
     return (*names, tuple(dict.fromkeys(map(str, _station_bodies(run)))), springs)
 
 
 def _with_as_many_stations(runs: Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    """Runs whose bodies are drawn by as many stations as in the run that has most: some stand twice, none is moved.
+    """Runs with the largest number of stations of each body; some stations are repeated, none is moved.
 
     A parameter that moves a point along a beam changes how many there are between its points.
     """
@@ -176,14 +176,14 @@ def _with_as_many_stations(runs: Sequence[xr.Dataset]) -> list[xr.Dataset]:
 
 
 def _taken(run: xr.Dataset, stations: NDArray[np.intp]) -> xr.Dataset:
-    """A run drawn by these stations, ascending; points and ends of springs are at the same ones as before."""
+    """A run with some stations only, ascending; points and ends of springs are at the same ones as before."""
     moved = {name: run[name].copy(data=np.where(run[name] < 0, -1, np.searchsorted(stations, run[name])))
              for name in _STATIONS if name in run}  # fmt: skip
     return run.isel(station=stations).assign(moved)
 
 
 def _spread(names: NDArray[np.str_], most: Mapping[str, int]) -> NDArray[np.intp]:
-    """Stations, each at least once, so that every body has as many as wanted."""
+    """Stations, each at least once, such that every body has a given number."""
     own = {name: np.flatnonzero(names == name) for name in most}
     return np.concatenate([
         places[np.rint(np.linspace(0, places.size - 1, most[name])).astype(np.intp)] for name, places in own.items()
@@ -223,7 +223,7 @@ def _tiles(designs: DesignTable, account: StudyAccount) -> list[tuple[str, str, 
 
 
 def _best_table(designs: DesignTable, picked: Sequence[Picked], shown: Sequence[int], units: Mapping[str, str]) -> str:
-    """The best designs: their numbers, metrics, and what they are best in."""
+    """The best designs: their numbers, metrics, and the metrics in which they are best."""
     named = [*((name, True) for name in designs.varied), *((name, False) for name in designs.judged)]
     heads, cells, keys = [("design", "")], {}, {}
     names = {row: designs.label(row) for row, _ in picked}
@@ -257,7 +257,7 @@ def _parameter_table(account: StudyAccount) -> str:
 
 
 def _trouble(designs: DesignTable) -> list[tuple[str, str]]:
-    """Why runs are not complete, alike ones together."""
+    """Reasons why runs are not complete, similar ones together."""
     found = reasons(designs)
     if not found:
         return []

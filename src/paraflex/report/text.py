@@ -17,7 +17,7 @@ _WORDS, _SORTABLE = ' class="words"', ' class="sortable"'
 
 
 def number(value: float | None, factor: float = 1.0) -> str:
-    """A value to three digits after multiplication by a factor: "0.377", "1.2 × 10⁻⁵"; a dash where there is none."""
+    """A value to three digits, times a factor: "0.377", "1.2 × 10⁻⁵"; a dash if there is none."""
     if value is None or not math.isfinite(value):
         return NOTHING
     value = factor * value
@@ -32,13 +32,13 @@ def number(value: float | None, factor: float = 1.0) -> str:
 
 
 def quantity(value: float, unit: str) -> str:
-    """A value in the unit that suits it: "0.377 mm"."""
+    """A value in a suitable unit: "0.377 mm"."""
     shown = display_unit(unit, value)
     return f"{number(value, shown.factor)} {shown.name}"
 
 
 def count(value: float | None) -> str:
-    """A whole number, thousands apart: "43 708"."""
+    """A whole number with thousands separated: "43 708"."""
     return NOTHING if value is None or not math.isfinite(value) else f"{int(value):,}".replace(",", "\u2009")
 
 
@@ -51,7 +51,7 @@ def table(
     runs: Mapping[str, int] | None = None,
     keys: Mapping[str, Sequence[float | str | None]] | None = None,
 ) -> str:
-    r"""An HTML table with a name before each row; it scrolls within the page where it is too wide.
+    r"""An HTML table with a name before each row, which scrolls within the page if it is too wide.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _small(text: str) -> str:
 
 
 def _row(name: str, cells: Sequence[str], run: int | None, keys: Sequence[float | str | None] | None) -> str:
-    """A row; one of a run of the page is a button, keys are what it is sorted by."""
+    """A row; that of a run of the page is a button, keys are for sorting."""
     about, head = "", escape(name)
     if run is not None:
         about, head = f' data-run="{run}"', f'<button type="button" class="pick">{head}</button>'
@@ -111,5 +111,5 @@ def _cell(text: str) -> str:
 
 
 def _is_words(text: str) -> bool:
-    """Words are read, numbers are compared."""
+    """Whether a text has words and is not a number."""
     return re.search(r"[A-Za-z]{2}", text.partition("\n")[0]) is not None

@@ -1,4 +1,4 @@
-"""The report of a tracking study: every mode, compared and one by one."""
+"""The report of a tracking study: comparison of all modes, and each mode."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
 
 
 def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
-    """What every mode came to."""
+    """Results of every mode."""
     runs = names_of(data, "mode")
     errors_rms, words = headline(data)
     gaps, deflections = errors(data).values, _deflections(data)
@@ -126,7 +126,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
 
 
 def _after(data: xr.Dataset) -> list[tuple[str, str]]:
-    """What the motors did after the motion, where runs went on after it."""
+    """Actions of the motors after the motion, if runs go on after it."""
     if data["time"].values[-1] <= data.attrs.get("motion_end", np.inf) or "after" not in data.attrs:
         return []
     if asked(data).get("ked"):
@@ -135,7 +135,7 @@ def _after(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _after_columns(data: xr.Dataset) -> list[tuple[str, str, NDArray[np.float64]]]:
-    """Name, unit and values of what is told of the time after the motion; none where runs end with it."""
+    """Name, unit and values of results after the motion; none if runs end with it."""
     columns = []
     for name, key, unit in (
         ("error after", "tracking_rms_after", "m"),
@@ -153,7 +153,7 @@ def _after_columns(data: xr.Dataset) -> list[tuple[str, str, NDArray[np.float64]
 
 
 def _deflections(data: xr.Dataset) -> NDArray[np.float64]:
-    """Of links from their chords (mode, time, body); of earlier results those of their ends."""
+    """Deflections of links from their chords (mode, time, body); for earlier results those of their ends."""
     name = "deflection" if "deflection" in data else "tip_transverse"
     return np.abs(data[name].transpose("mode", "time", "body").values)
 
@@ -193,7 +193,7 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
 
 
 def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
-    """Angular velocity over angle, which a link of a repeated motion goes round."""
+    """Angular velocity over angle, a closed curve for a periodic motion."""
     angle, rate = data["angle"].values, data["angular_velocity"].values
     way, pace = data["angle_desired"].values[0], data["angular_velocity_desired"].values[0]
     curves = []
@@ -210,7 +210,7 @@ def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
 
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    """The few numbers to see first."""
+    """The main numbers."""
     rms, words = headline(data)
     errors_rms = rms.values
     several = data.sizes["mode"] > 1
@@ -239,7 +239,7 @@ def _name(data: xr.Dataset, run: int) -> str:
 
 
 def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
-    """Why modes did not get to their ends."""
+    """Reasons why modes ended early."""
     out = [f"Mode {name} could not be run: {reason}" for name, reason in failed.items()]
     for r, name in enumerate(data["mode"].values):
         status = str(data["status"].values[r])
@@ -249,7 +249,7 @@ def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
 
 
 def _validity(data: xr.Dataset) -> list[str]:
-    """That the model holds, if it does."""
+    """A sentence that the model is valid, if it is."""
     line = validity_line({str(name): validity_summary(data.sel(mode=name)) for name in data["mode"].values})
     return [line] if line else []
 
@@ -265,7 +265,7 @@ def _model(run: Mapping[str, object]) -> str:
 
 
 def _deflection(values: NDArray[np.float64], bodies: NDArray[np.str_], factor: float) -> str:
-    """The largest deflection (samples, bodies), and whose it is."""
+    """The largest deflection (samples, bodies), and its body."""
     if not np.isfinite(values).any() or np.nanmax(values) == 0.0:
         return NOTHING
     where = int(np.nanargmax(np.nanmax(np.where(np.isfinite(values), values, -1.0), axis=0)))

@@ -1,4 +1,4 @@
-"""The report of a verification: all models of one mechanism, overlaid, and how far they are apart."""
+"""The report of a verification: all models of one mechanism in common charts, and their distances."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _SHORTEST = 1e-9
 
 
 class _Runs:
-    """Which runs there are: every model in every mode, modes first."""
+    """Runs of every model in every mode, modes first."""
 
     def __init__(self, data: xr.Dataset) -> None:
         self.modes, self.models = names_of(data, "mode"), names_of(data, "model")
@@ -236,7 +236,7 @@ def _paths(data: xr.Dataset, runs: _Runs) -> Chart:
 
 
 def _tiles(summary: Mapping[str, Any], reference: str) -> list[tuple[str, str, str]]:
-    """The nearest model to the reference and its distance in the first mode, and how long all took."""
+    """The nearest model to the reference and its distance in the first mode, and the time of all runs."""
     name, mode = next(iter(summary["modes"].items()))
     apart = {
         model: one["distance_max"] for model, one in mode["models"].items()

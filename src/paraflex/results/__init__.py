@@ -1,4 +1,4 @@
-"""Results: one labelled dataset a study, saved as netCDF with provenance; metrics.
+"""Results: one labelled dataset per study, saved as netCDF with provenance; metrics.
 
 Names are imported when they are first used: files are read without what computes them.
 """

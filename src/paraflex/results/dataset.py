@@ -97,7 +97,7 @@ def tracking_dataset(
 
 
 def _findings(records: Sequence[Record]) -> Iterator[Finding]:
-    """What is doubtful about the numbers of the mechanism, and about each run."""
+    """Findings on the numbers of the mechanism, and on each run."""
     task = records[0].task
     yield from doubtful_numbers(task.mechanism)
     part = part_of(task.path, float(task.motion.t[-1]))
@@ -123,5 +123,5 @@ def _frame(one: Record) -> Variables:
 
 
 def part_of(path: Path, end: float) -> Part | None:
-    """What runs that end then [s] do of a path that they are too short for; None where they are not."""
+    """The part of a path done by runs that end at a time [s] before its end; None if they reach it."""
     return Part(end, path.duration, length_fraction(path, end)) if too_short(end, path.duration) else None

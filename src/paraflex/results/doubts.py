@@ -1,4 +1,4 @@
-"""What datasets keep of the reasons to doubt them, and what summaries and reports make of it."""
+"""Findings in datasets, summaries and reports."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def verdict_of(data: xr.Dataset) -> Verdict:
 
 
 def doubt_lines(verdict: Iterable[Finding]) -> list[str]:
-    """A line for each finding; those of further modes with the same code share one."""
+    """A line for each finding; those of several modes with the same code share one."""
     lines, further = [], {}
     for one in verdict:
         whose = one.place.partition(MODE)[2] if one.place.startswith(MODE) else ""

@@ -1,4 +1,4 @@
-"""What a mechanism is drawn from: stations of all bodies, joints and springs over time, whoever computed them."""
+"""Geometry from which a mechanism is drawn: stations of all bodies, joints and springs over time, from any model."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
 
 @dataclass(frozen=True)
 class Drawing:
-    """Where a mechanism is drawn at k samples; all in the ground frame.
+    """Geometry of a mechanism at k samples, in the ground frame.
 
     Magnified by a factor m, stations are at `base + m (shape - base)`: joints keep together whatever m is.
 
@@ -53,7 +53,7 @@ def drawing(
     angle: Callable[[PointRef], Array],
     frame: Callable[[str], tuple[Array, Array]],
 ) -> Drawing:
-    """A drawing from what a model says of its bodies.
+    """A drawing from a model's motion of its bodies.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def system_drawing(system: System, q: Array) -> Drawing:
 
 
 def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
-    """What a mechanism is drawn from in its first assembly, undeformed, as a run of one sample.
+    """Drawing variables of a mechanism in its first assembly, undeformed, as a run of one sample.
 
     Loops are closed as well as the angles close them; bodies whose places do not follow are NaN. None without an
     assembly, or where no place follows.
@@ -137,7 +137,7 @@ def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
 
 
 def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """Variables of a dataset over time: their other dimensions and values (k, ...); of springs where there are some."""
+    """Variables of a dataset over time: their other dimensions and values (k, ...); springs if there are any."""
     springs = {"spring_position": (("spring", "end", "axis"), one.springs)} if one.springs.size else {}
     return {
         "shape": (("station", "axis"), one.shape),
@@ -149,7 +149,7 @@ def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
 
 
 def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
-    """Labels that go with them: whose the stations are, which station a point is, what the joints are.
+    """Labels of these variables: bodies of the stations, stations of the points, kinds of the joints.
 
     Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
     -1.
@@ -190,7 +190,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
-    """Radii of two wheels that mesh outside, or of a pinion and its rack, on joints that one body or the ground holds.
+    """Radii of two external gears, or of a pinion and its rack, at joints on one body or the ground.
 
     Of a rack, whose joint slides without turning, infinity: positive where its pitch line lies to the right of the
     joint's direction as seen from the pinion, else negative. NaN of anything else [m].
@@ -226,7 +226,7 @@ def _base(
     angle: Callable[[PointRef], Array],
     frame: Callable[[str], tuple[Array, Array]],
 ) -> Array:
-    """A body drawn stiff between the joints that hold it."""
+    """The undeformed body between the joints that hold it."""
     if isinstance(body, RigidBody) or not body.flexible:
         return shape
     held: dict[int, PointRef] = {}
@@ -248,7 +248,7 @@ def _base(
 
 
 def _contact(place: Array, origin: Array, angle: Array) -> Hold:
-    """Where something slides along a beam: at the place of the unbent beam that it is abreast of."""
+    """Place of a point that slides along a beam, on the undeformed beam."""
     local = _complex(place - origin) * np.exp(-1j * angle)
     return Hold(local.real.astype(complex), _complex(place))
 

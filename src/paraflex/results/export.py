@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
+from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.results.storage import save_results
 from paraflex.writing import whole_file
 
@@ -33,7 +34,7 @@ _LONGEST_NAME = 63
 
 @checked_arguments()
 def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.DataFrame]:
-    """Results as tidy tables, a row an observation; what a run did not reach is NaN.
+    """Results as tidy tables, one row per observation; times that a run did not reach are NaN.
 
     Parameters
     ----------
@@ -160,7 +161,7 @@ def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
     from pyarrow import csv
 
     names = [f"{name} [{units[name]}]" if units[name] else name for name in table.column_names]
-    csv.write_csv(table.rename_columns(names), file)
+    csv.write_csv(spreadsheet_table(table.rename_columns(names)), file)
 
 
 def matlab_struct(data: xr.Dataset) -> dict[str, Any]:

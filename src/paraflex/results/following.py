@@ -1,4 +1,4 @@
-"""How the runs of a dataset follow their paths: its metrics, which of them ranks runs, which part of a path was run."""
+"""Metrics of the runs of a dataset along their paths, the ranking metric, and the part of a path that was run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TRACES = ["end_effector", "end_effector_desired", "torque"]
 
 
 class ErrorSpan(Enum):
-    """What of a run its tracking error is taken over, where one number has to stand for it.
+    """The time span of the tracking error that ranks runs.
 
     MOTION
         The motion along the path, from its start to its end.
@@ -85,7 +85,7 @@ def metric_variables(
 
 
 def headline(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """The tracking error that ranks the runs of a dataset [m], and what it is of, in words.
+    """The tracking error that ranks the runs of a dataset [m], and its time span in words.
 
     Results that earlier versions wrote are ranked by the whole run, as they were then.
     """
@@ -100,7 +100,7 @@ def ranked_by_motion(data: xr.Dataset) -> bool:
 
 @dataclass(frozen=True)
 class Part:
-    """What runs did of a path that they were too short for.
+    """The part of a path that runs did which were too short for it.
 
     Attributes
     ----------
@@ -121,21 +121,21 @@ class Part:
         )
 
     def finding(self, place: str = "study.duration") -> Finding:
-        """The same, to be kept with results."""
+        """The same as a finding."""
         return Finding("path-cut-short", place, str(self), f"the path takes {self.path:.4g} s")
 
     def to_dict(self) -> dict[str, float | str]:
-        """As plain numbers, and in words."""
+        """The part as plain numbers, and in words."""
         return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
 
 
 def too_short(end: float, path_duration: float) -> bool:
-    """Whether a run that ends then [s] does not come to the end of its path [s]."""
+    """Whether a run that ends at a time [s] ends before its path does [s]."""
     return end < path_duration * (1.0 - SAME_TIME)
 
 
 def part_run(data: xr.Dataset) -> Part | None:
-    """What the runs of a dataset were to do of a path that they were too short for; None where they were not."""
+    """The part of a path done by the runs of a dataset that were too short for it; None if they were not."""
     end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
     if "path_length_run" not in data.attrs or not too_short(end, path):
         return None

@@ -1,4 +1,4 @@
-"""Formulas of metrics: sums, products and roots alone, so that numbers with a complex step go through them."""
+"""Formulas of metrics: sums, products and roots only, so that a complex step differentiates them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _FEWEST = 3 * (_DRIFT_DEGREE + 1)
 
 
 def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
-    """Which samples at times t (k,) are of the motion, its end among them [s]; the others are after it."""
+    """The samples at times t (k,) during the motion, its end included [s]; the others are after it."""
     end = np.real(motion_end)
     return np.real(t) <= end + SAME_TIME * abs(end)
 
@@ -27,7 +27,7 @@ def length(vectors: NDArray[Any]) -> NDArray[Any]:
 
 
 def rms(values: NDArray[Any]) -> Any:
-    """Root mean square over the first axis; NaN of no values."""
+    """Root mean square over the first axis; NaN for no values."""
     if len(values) == 0:
         return np.full(values.shape[1:], np.nan)[()]
     return np.sqrt(np.mean(values**2, axis=0))
@@ -39,7 +39,7 @@ def integral(t: NDArray[Any], values: NDArray[Any]) -> Any:
 
 
 def drift_speed(t: NDArray[Any], position: NDArray[Any]) -> Any:
-    """Speed at which positions (k, 2) at times t (k,) move on average [m/s]: of the drift that `vibration` is about.
+    """Mean speed [m/s] of the drift of positions (k, 2) at times t (k,) about which `vibration` is measured.
 
     The slope of the straight line of least squares. NaN where there are too few samples.
     """

@@ -1,4 +1,4 @@
-"""Runs as notebooks show them: how they ended, what they reached, and what the solver did."""
+"""Runs in notebooks: status, results, and counts of the solver."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST = 20
 
 @view.register(TrackingRun)
 def tracking_run_html(run: TrackingRun) -> str:
-    """Status, tracking error, torques and deflection of one mode, and the solver's figures."""
+    """Status, tracking error, torques and deflection of one mode, and counts of the solver."""
     task, solution = run.task, run.solution
     whole = task if task.whole is None else task.whole
     torque = run.applied
@@ -44,7 +44,7 @@ def tracking_run_html(run: TrackingRun) -> str:
 
 @view.register(MotionRun)
 def motion_run_html(run: MotionRun) -> str:
-    """Status of a run without a path, where its points are at the end, and the solver's figures."""
+    """Status of a run without a path, places of its points at the end, and counts of the solver."""
     solution, system = run.solution, run.system
     k = solution.t.size
     title = f"{system.mechanism.name}: {_ended(solution)}"

@@ -1,4 +1,4 @@
-"""What the bodies of a joint do to one another: all of it, whatever in the joint does it.
+"""Forces and moments between the bodies of a joint, from all members in it.
 
 Constraints have Phi of body b less that of body a and stand on the left of the equations, M q'' + ... + Phi_q^T lambda:
 -lambda acts on body b. So do the multipliers of prescribed motions, springs, dampers, friction and gears, of these
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class JointLoads(NamedTuple):
-    """What the first body of each joint does to its second.
+    """Forces and moments of the first body of each joint on its second.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class JointLoads(NamedTuple):
 
 
 def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> JointLoads:
-    """Forces and moments in joints by name: of what holds the joint, of motors, springs, dampers, friction and gears.
+    """Forces and moments in joints by name: of constraints, motors, springs, dampers, friction and gears.
 
     The second body does the opposite to the first at the same place. Springs and dampers between points (linear
     springs) are not in a joint and do not count.
@@ -92,7 +92,7 @@ def _direction(system: System, term: Term, q: Array) -> Array:
 
 
 def _track_slope(system: System, joint: Joint, q: Array) -> Array:
-    """Slope (k,) of the beam that a point slides on, against its frame, where the point stands."""
+    """Slope (k,) of a beam in its frame, at the place of the point that slides on it."""
     body = system.body(joint.a.body)
     assert body.mesh is not None
     nodes, pieces = body.mesh.nodes, transverse_pieces(body)

@@ -1,4 +1,4 @@
-"""Which of the three kinds a dataset of results is, and what becomes of another than is wanted."""
+"""The three kinds of datasets of results, and the error for a wrong one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MADE_BY = {
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """What a dataset is of: a "verification", a "motion" without a path, or "tracking"."""
+    """Kind of a dataset: "verification", "motion" (without a path), or "tracking"."""
     if "model" in data.dims:
         return "verification"
     return "motion" if data.attrs.get("kind") == "motion" else "tracking"
@@ -42,7 +42,7 @@ def check_kind(data: xr.Dataset, *kinds: str) -> None:
 
 
 def wrong_kind(kind: str, kinds: Iterable[str], field: str = "data") -> InputError:
-    """The error for results of another kind than is wanted."""
+    """The error for results of a wrong kind."""
     wanted = list(kinds)
     makers = [_MADE_BY[each] for each in wanted if each in _MADE_BY]
     remedy = "give those of the kind " + " or ".join(f'"{each}"' for each in wanted)

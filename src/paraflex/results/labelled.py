@@ -1,4 +1,4 @@
-"""What datasets of runs have in common: variables of the links, labels, units, conventions, provenance."""
+"""Common parts of datasets of runs: variables of the links, labels, units, conventions, provenance."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ _TORQUES = ("torque", "peak_torque", "rms_torque", "applied_torque")
 
 
 def link_variables(links: Links, mechanism: Mechanism) -> Variables:
-    """Of the links of a mechanism, at the samples reached."""
+    """Variables of the links of a mechanism, at the samples reached."""
     return {
         "angle": (("body",), links.angle),
         "angular_velocity": (("body",), links.rate),
@@ -130,7 +130,7 @@ def link_variables(links: Links, mechanism: Mechanism) -> Variables:
 
 
 def padded(values: NDArray[Any], total: int) -> NDArray[Any]:
-    """Values over all samples, NaN where a run did not get to."""
+    """Values over all samples, NaN where a run did not reach them."""
     out = np.full((total, *values.shape[1:]), np.nan, dtype=values.dtype)
     out[: values.shape[0]] = values
     return out
@@ -151,7 +151,7 @@ def link_coordinates(system: System) -> dict[str, Any]:
 
 
 def label(data: xr.Dataset, mechanism: Mechanism) -> None:
-    """Meaning, unit and conventions of every variable into its attributes; "_desired" is what is wanted of one."""
+    """Meaning, unit and conventions of every variable into its attributes; "_desired" is the desired value of one."""
     for name in map(str, data.variables):
         plain = name.removesuffix("_desired")
         if plain in UNITS:
@@ -171,7 +171,7 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
 def provenance(
     mechanism: Mechanism, method: str, options: IntegrationOptions, parameters: dict[str, Any] | None
 ) -> dict[str, Any]:
-    """What results came from: mechanism, method, options of our own methods, the model as read, versions."""
+    """Origin of results: mechanism, method, options of own methods, the model as read, versions."""
     # Other models and engines integrate in ways of their own.
     ours = options.to_dict() if method == options.method.title else {}
     effector = mechanism.end_effector

@@ -1,4 +1,4 @@
-"""What a run of our own says of bodies, points, joints and motors, at its samples."""
+"""Motion of bodies, points, joints and motors in a run, at its samples."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Links:
-    """Bodies, points, joints and motors at the k sample times that a run reached; NaN for what a model does not tell.
+    """Bodies, points, joints and motors at the k sample times that a run reached; NaN where a model has no value.
 
     Bodies, joints and points are those of the mechanism in its order, whatever the model cut them into. Points are all
     the named points of all bodies, body after body.
@@ -79,7 +79,7 @@ def system_links(
     whole: System | None = None,
     carriers: Mapping[str, tuple[str, float]] | None = None,
 ) -> Links:
-    """What a run says of the links of a mechanism, those that were cut into segments as they were before.
+    """Motion of the links in a run; links cut into segments are reported as the original links.
 
     Parameters
     ----------
@@ -133,20 +133,20 @@ class _Cut:
 
     @cached_property
     def parts(self) -> dict[str, list[str]]:
-        """Of each body before, the names of what it was cut into, first end first: itself if it was not."""
+        """Names of the parts of each original body, first end first: itself if it was not cut."""
         parts: dict[str, list[str]] = {body.name: [] for body in self.whole.bodies}
         for body in self.system.bodies:
             parts[self.carriers.get(body.name, (body.name, 0.0))[0]].append(body.name)
         return parts
 
     def there(self, ref: PointRef) -> PointRef:
-        """A point of a body, on the part that has it."""
+        """A point of an original body, on the part that has it."""
         owner = next(name for name in self.parts[ref.body] if ref.point in self.system.mechanism.body(name).points)
         return PointRef(owner, ref.point)
 
 
 def _multipliers(system: System, whole: System, multipliers: Array) -> Array:
-    """Multipliers by the rows of the whole mechanism; NaN of those that it does not share with what it was cut into."""
+    """Multipliers by the rows of the original mechanism; NaN for those that the cut one does not have."""
     if system is whole:
         return multipliers
     out = np.full((len(multipliers), whole.m), np.nan)
@@ -157,7 +157,7 @@ def _multipliers(system: System, whole: System, multipliers: Array) -> Array:
 
 
 def _drawing(cut: _Cut, q: Array) -> Drawing:
-    """Bodies as their own shape functions have them; cut ones where their segments lie."""
+    """Bodies by their shape functions; cut bodies by their segments."""
     system, mechanism = cut.system, cut.whole.mechanism
     if system is cut.whole:
         return system_drawing(system, q)
@@ -185,7 +185,7 @@ def _ends(system: System, names: list[str], q: Array, v: Array) -> list[PointMot
 
 
 def _end_markers(system: System, names: list[str]) -> tuple[Marker, ...]:
-    """First and last end of a body, or of what it was cut into; none of what has no ends."""
+    """First and last end of a body, or of the parts it was cut into; none for a body without ends."""
     if len(names) == 1:
         return end_markers(system.index[names[0]], system.body(names[0]))
     return system.marker(PointRef(names[0], FIRST_END)), system.marker(PointRef(names[-1], LAST_END))
@@ -216,7 +216,7 @@ def line_angle(line: Array, rate: Array, near: Array) -> tuple[Array, Array]:
 
 
 def _tip(system: System, names: list[str], q: Array) -> Array:
-    """Displacement and slope of a beam's last end in its frame: of segments, in that of the first one."""
+    """Displacement and slope of a beam's last end in its frame; with segments in that of the first one."""
     if len(names) == 1:
         return tip_deflection(system, names[0], q)
     first, last = _ends(system, names, q, np.zeros_like(q))

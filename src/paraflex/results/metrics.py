@@ -1,4 +1,4 @@
-"""What a run is judged by: every metric, written once.
+"""Metrics of runs, each defined once.
 
 A formula takes the traces of a run and those of the nominal run near it. Of a run that is its own nominal one it gives
 the metric; of one with a complex step its derivative, where a maximum or a sign is decided by the nominal run. So
@@ -22,7 +22,7 @@ Formula = Callable[[Any, Any], Any]
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that a run is judged by.
+    """A metric of a run.
 
     Attributes
     ----------
@@ -55,21 +55,21 @@ class Metric:
     whole: bool = False
 
     def value(self, traces: Traces) -> Any:
-        """The metric of a run; of a metric per motor an array."""
+        """The metric of a run; an array for a metric per motor."""
         return self.formula(traces, traces)
 
     def columns(self, motors: Sequence[str]) -> list[str]:
-        """What its numbers are called: NAME, or NAME.MOTOR of each motor."""
+        """Names of its columns: NAME, or NAME.MOTOR for each motor."""
         return [f"{self.name}.{motor}" for motor in motors] if self.per_motor else [self.name]
 
 
 def _as_it_is(formula: Callable[[Any], Any]) -> Formula:
-    """A formula in which nothing is decided."""
+    """A formula without decisions."""
     return lambda run, _: formula(run)
 
 
 def _largest(trace: Callable[[Any], Trace]) -> Formula:
-    """The largest of an array, where it is largest in the nominal run; NaN of none, or where one is."""
+    """The largest of an array, at the sample where the nominal run has it; NaN for none, or where one is NaN."""
 
     def value(run: Any, nominal: Any) -> Any:
         at_nominal = trace(nominal)
@@ -79,7 +79,7 @@ def _largest(trace: Callable[[Any], Trace]) -> Formula:
 
 
 def _largest_magnitude(trace: Callable[[Any], Trace]) -> Formula:
-    """As `_largest`, with the sign of the nominal run's; 0 of none, and NaN only where all are."""
+    """Like `_largest`, with the sign of the nominal run; 0 for none, and NaN only if all are."""
 
     def value(run: Any, nominal: Any) -> Any:
         at_nominal = trace(nominal)
@@ -103,7 +103,7 @@ def _motor_energy(run: Any, nominal: Any) -> Any:
 
 
 def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = False) -> Metric:
-    """What a solution tells under the same name."""
+    """A number of the solution of the same name."""
     formula = _as_it_is(lambda x: getattr(x.run.solution, name))
     return Metric(name, meaning, unit, formula, smooth=False, of_solver=True, whole=whole)
 
@@ -167,7 +167,7 @@ METRICS: Mapping[str, Metric] = {metric.name: metric for metric in _ALL}
 
 
 def metric_label(column: str, motor: Callable[[str], str] = str) -> str:
-    """What a column of a table is called in print: "RMS tracking error"; "peak torque of tau1" of one motor's.
+    """Label of a column of a table: "RMS tracking error"; "peak torque of tau1" for a metric of one motor.
 
     Parameters
     ----------

@@ -89,7 +89,7 @@ def motion_dataset(
 
 @checked_arguments()
 def motion_summary(data: xr.Dataset) -> dict[str, Any]:
-    """The run's figures as plain numbers; `final` is its last sample, None for one that reached none."""
+    """The run's results as plain numbers; `final` is its last sample, None if it reached none."""
     check_kind(data, "motion")
     reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
     last = data.isel(time=reached[-1] if reached.size else 0)

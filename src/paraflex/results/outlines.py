@@ -1,4 +1,4 @@
-"""Bodies as they are drawn: stations along each, where they are over time, and where they were if links were stiff."""
+"""Stations of bodies for drawings, their motion, and their places on undeformed links."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SHORT = 1e-6
 
 @dataclass(frozen=True)
 class Outline:
-    """What of a body is drawn, in order along it.
+    """Stations of a body, in order along it.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Outline:
 
 
 def outline(body: Body) -> Outline:
-    """Stations of a body; they depend on its length and points, not on how it is meshed or cut.
+    """Stations of a body, which depend on its length and points and not on its mesh or segments.
 
     Of a beam or bar so many along its centre line, named points among them. A rigid body's points in their order on a
     line, or round their hull, closed, those inside it after that; with fewer than two of them, its centre of mass too.
@@ -86,12 +86,12 @@ def outline(body: Body) -> Outline:
 
 
 def outlines(mechanism: Mechanism) -> list[Outline]:
-    """Of all bodies of a mechanism, in its order."""
+    """Stations of all bodies of a mechanism, in its order."""
     return [outline(body) for body in mechanism.bodies]
 
 
 def chord_deflections(mechanism: Mechanism, shape: Array) -> Array:
-    """Largest deflection along each body from its chord (k, bodies) [m], of drawn shapes (k, stations, 2).
+    """Largest deflection along each body from its chord (k, bodies) [m], from shapes (k, stations, 2).
 
     Over the stations: see `across_chord`. NaN of a flexible body of which fewer than three places are known, as of a
     modal body with two points.
@@ -110,7 +110,7 @@ def chord_deflections(mechanism: Mechanism, shape: Array) -> Array:
 
 
 def deflections(system: System, q: Array) -> Array:
-    """How far stations of all flexible bodies are across their chords (k, stations) [m], real or with a complex step.
+    """Deflections of the stations of all flexible bodies from their chords (k, stations) [m], real or complex.
 
     Signed: see `across_chord`. NaN as in `chord_deflections`.
     """
@@ -123,7 +123,7 @@ def deflections(system: System, q: Array) -> Array:
 
 
 def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
-    """Where the stations of a body are for coordinates (k, n): (k, s, 2) [m], by its own shape functions.
+    """Places of the stations of a body for coordinates (k, n): (k, s, 2) [m], by its shape functions.
 
     Of second-order geometry with the shortening of the model: s(x) = x + N u - 1/2 e_x int_0^x (N2' u)^2 dx.
     """
@@ -136,7 +136,7 @@ def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
 
 
 def segment_motion(system: System, names: Sequence[str], starts: Sequence[float], drawn: Outline, q: Array) -> Array:
-    """Where the stations of a beam are (k, s, 2) that was cut into rigid segments, starting so far along it [m]."""
+    """Places of the stations of a beam cut into rigid segments (k, s, 2), which start at these distances [m]."""
     x = drawn.places[:, 0]
     owners = np.searchsorted(starts, x + _SAME * drawn.size, side="right") - 1
     out = np.empty((q.shape[0], x.size, 2))
@@ -149,14 +149,14 @@ def segment_motion(system: System, names: Sequence[str], starts: Sequence[float]
 
 @dataclass(frozen=True)
 class Hold:
-    """A place that a joint holds: in the undeformed body and in the ground frame, each (k,) as x + i y [m]."""
+    """A point of a body at a joint: in the undeformed body and in the ground frame, each (k,) as x + i y [m]."""
 
     rest: NDArray[np.complex128]
     place: NDArray[np.complex128]
 
 
 def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
-    """Stations (k, s, 2) of a body drawn stiff between the places that hold it [m].
+    """Stations (k, s, 2) of the undeformed body between the places that hold it [m].
 
     Between neighbouring ones the undeformed body, turned and scaled so that both are where they are; beyond the last
     ones turned as the piece before. A body held at places that are not in line is fitted to them as a whole, what is
@@ -215,7 +215,7 @@ def _pieces(
 def _fitted(
     z: NDArray[np.complex128], rest: NDArray[np.complex128], place: NDArray[np.complex128]
 ) -> NDArray[np.complex128]:
-    """The similarity nearest to all holds, and what it misses them by, shared out by squares of distances."""
+    """The similarity nearest to all holds, and its residuals, distributed by squares of distances."""
     middle, centre = rest.mean(axis=1, keepdims=True), place.mean(axis=1, keepdims=True)
     arm = rest - middle
     ratio = np.sum(np.conj(arm) * (place - centre), axis=1, keepdims=True) / np.sum(
@@ -230,7 +230,7 @@ def _fitted(
 
 
 def _axis(z: NDArray[np.complex128], size: float) -> complex | None:
-    """Direction of the line that places lie on; None where they do not."""
+    """Direction of the line through places; None if they are not on a line."""
     far = z[np.argmax(np.abs(z - z[0]))] - z[0]
     if abs(far) == 0.0:
         return 1.0
@@ -281,7 +281,7 @@ def _distinct(places: Array) -> Array:
 
 
 def figure_order(places: Array) -> NDArray[np.int64]:
-    """Order in which places make a figure: along their line, or round their hull and back to the first, then others."""
+    """Order of places for drawing: along their line, or round their hull and back to the first, then the others."""
     z = places[:, 0] + 1j * places[:, 1]
     if len(z) < 3:
         return np.arange(len(z))
@@ -294,7 +294,7 @@ def figure_order(places: Array) -> NDArray[np.int64]:
 
 
 def _hull(places: Array) -> list[int]:
-    """Corners of the smallest convex figure that holds all places, and what lies on its sides, anticlockwise."""
+    """Corners of the convex hull of places, and the places on its sides, anticlockwise."""
     order = np.lexsort((places[:, 1], places[:, 0])).tolist()
     size = float(np.max(np.ptp(places, axis=0)))
 
@@ -310,6 +310,6 @@ def _hull(places: Array) -> list[int]:
 
 
 def _turn(places: Array, a: int, b: int, c: int) -> float:
-    """Twice the area of a triangle, positive if it is passed anticlockwise."""
+    """Twice the area of a triangle, positive if anticlockwise."""
     (ux, uy), (vx, vy) = places[b] - places[a], places[c] - places[a]
     return float(ux * vy - uy * vx)

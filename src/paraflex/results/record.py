@@ -1,4 +1,4 @@
-"""A run link by link: what every model of a mechanism can say, whoever computed it."""
+"""A run link by link, in a form that every model of a mechanism can provide."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Record(Links):
 
 
 def record(run: TrackingRun) -> Record:
-    """What a run of our own says of the links; finite segments are reported as the links they were cut from."""
+    """Record of a run; finite segments are reported as the links they were cut from."""
     task, solution, torque = run.task, run.solution, run.applied
     # The state at an event is a sample more than the task's times.
     k = solution.t.size - bool(solution.event)

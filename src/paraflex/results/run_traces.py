@@ -1,4 +1,4 @@
-"""What metrics are made of, straight from a run: a dataset takes longer to make than all of them."""
+"""Traces of a run for metrics, without making a dataset, which takes longer than all metrics."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from paraflex.tracking import TrackingRun
 
 @dataclass(frozen=True)
 class RunTraces(Traces):
-    """Traces of a run of our own.
+    """Traces of a run.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class RunTraces(Traces):
 
     @cached_property
     def deflection(self) -> Trace:
-        """How far stations of all flexible bodies are across their chords (k, stations) [m], signed."""
+        """Deflections of the stations of all flexible bodies from their chords (k, stations) [m], signed."""
         return deflections(self.run.task.system, self.run.solution.q)
 
     @property
@@ -39,7 +39,7 @@ class RunTraces(Traces):
 
     @cached_property
     def power(self) -> Trace:
-        """Power of every motor (k, motors) [W]; zero of those that are not active."""
+        """Power of every motor (k, motors) [W]; zero for passive ones."""
         task, solution = self.run.task, self.run.solution
         power = np.zeros(self.torque.shape, np.result_type(self.torque, solution.q))
         for k, motor in enumerate(task.mechanism.motors):

@@ -23,6 +23,8 @@ _TRAJECTORIES = "trajectories"
 _NAMED = 3
 # Smaller arrays are written as they are: what describes the compression takes more than it gains [bytes].
 _LARGE = 16384
+# Written at once where the reason is looked for why a file cannot be [bytes].
+_PIECE = 1 << 20
 # First bytes of what netCDF files are (HDF5, or the classic formats), and of other files of ours.
 _NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
 _PARQUET = b"PAR1"
@@ -43,7 +45,18 @@ def save_results(data: xr.Dataset, path: str | Path) -> None:
 def write_results(data: xr.Dataset, path: Path, **options: Any) -> None:
     """Write a dataset as netCDF; see `whole_file` for the options and errors."""
     with whole_file(path, **options) as unfinished:
-        data.to_netcdf(unfinished, engine="netcdf4", encoding=_encoding(data))
+        _write_netcdf(data, unfinished)
+
+
+def _write_netcdf(data: xr.Dataset, file: Path) -> None:
+    try:
+        data.to_netcdf(file, engine="netcdf4", encoding=_encoding(data))
+    except (OSError, RuntimeError) as error:
+        # The library does not say why, or says something else: writing as much without it does.
+        with file.open("wb") as plain:
+            for _ in range(1 + data.nbytes // _PIECE):
+                plain.write(bytes(_PIECE))
+        raise OSError(f"by the netCDF library: {error}") from error
 
 
 def _encoding(data: xr.Dataset) -> dict[str, dict[str, object]]:

@@ -1,4 +1,4 @@
-"""A study's figures as plain numbers: what `summary.json` holds."""
+"""Results of a study as plain numbers: the content of `summary.json`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _FIGURES = (
 
 @checked_arguments()
 def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str, Any]:
-    """Figures of every mode, parameters and version.
+    """Results of every mode, parameters and version.
 
     Parameters
     ----------
@@ -83,5 +83,5 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
 
 
 def finite_or_none(value: float) -> float | None:
-    """A number as JSON can hold it."""
+    """A number for JSON: None if it is not finite."""
     return float(value) if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""What metrics are made of: how a run went at its samples."""
+"""Traces of a run at its samples, from which metrics are computed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Trace = NDArray[Any]
 
 @dataclass(frozen=True)
 class Traces:
-    """What every model of a mechanism can say of a run, at its k samples.
+    """Time series of a run at its k samples that every model of a mechanism has.
 
     Attributes
     ----------
@@ -42,18 +42,18 @@ class Traces:
 
     @cached_property
     def moving(self) -> NDArray[np.bool_]:
-        """Which samples (k,) are of the motion along the path; the others are after it."""
+        """The samples (k,) during the motion along the path; the others are after it."""
         return during_motion(self.t, self.motion_end)
 
     @property
     def after(self) -> tuple[Trace, Trace]:
-        """Times (j,) of the samples after the motion [s], and where the end-effector is at them (j, 2) [m]."""
+        """Times (j,) of the samples after the motion [s], and places of the end-effector at them (j, 2) [m]."""
         return self.t[~self.moving], self.position[~self.moving]
 
 
 @dataclass(frozen=True)
 class DataTraces(Traces):
-    """Traces of a run that a dataset keeps.
+    """Traces of a run in a dataset.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class DataTraces(Traces):
 
 
 def data_traces(data: xr.Dataset, motion_end: float | None = None) -> DataTraces:
-    """Traces of the only run of a dataset; NaN where it did not get to.
+    """Traces of the only run of a dataset; NaN at samples it did not reach.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What datasets keep of the validity of runs, and what summaries say of it."""
+"""Validity of runs in datasets and summaries."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UNITS = {
 
 
 def validity_variables(runs: Sequence[Validity | None]) -> dict[str, np.ndarray]:
-    """Variables of a dataset, a number or text a run: NaN and "" where there is nothing to say."""
+    """Variables of a dataset, a number or text per run: NaN and "" if validity is not defined."""
     out = {
         "validity": np.array([math.nan if one is None else one.ratio for one in runs]),
         "validity_verdict": np.array(["" if one is None else one.verdict for one in runs]),
@@ -40,7 +40,7 @@ def validity_variables(runs: Sequence[Validity | None]) -> dict[str, np.ndarray]
 
 
 def validity_summary(run: xr.Dataset) -> dict[str, Any] | None:
-    """Of one run of a dataset: ratio of its worst indicator to its limit, whether the model holds, all indicators.
+    """Validity of one run of a dataset: worst indicator over its limit, verdict, all indicators.
 
     None where there is nothing to say, as of rigid bodies and in files of earlier versions.
     """
@@ -57,7 +57,7 @@ def validity_summary(run: xr.Dataset) -> dict[str, Any] | None:
 
 
 def validity_line(verdicts: Mapping[str, Mapping[str, Any] | None]) -> str:
-    """That the models of all runs hold, by the run nearest to its limit; empty where one does not, or nothing bends.
+    """A sentence that the models of all runs are valid, with the largest ratio; empty if one is not, or all are rigid.
 
     The name of a single run may be empty.
     """

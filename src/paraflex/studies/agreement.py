@@ -1,4 +1,4 @@
-"""Runs of several models of one mechanism, and what they say of each other."""
+"""Runs of several models of one mechanism, and their distances."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from paraflex.validity import doubtful_numbers
 
 
 class Refinement(Enum):
-    """Runs of one model: as asked for, and finer ones whose distance from that shows how converged it is."""
+    """Runs of one model: the base run, and finer ones whose distance from it shows its convergence."""
 
     NONE = "base"
     STEP = "finer step"
@@ -37,7 +37,7 @@ class Refinement(Enum):
 
 @dataclass(frozen=True)
 class ModelRuns:
-    """What became of one model in one mode.
+    """Results of one model in one mode.
 
     Attributes
     ----------
@@ -51,13 +51,13 @@ class ModelRuns:
     failure: str = ""
 
     def finished(self, level: Refinement | str) -> Record | None:
-        """A run that got to its end."""
+        """A run that reached its end."""
         run = self.records.get(as_enum(Refinement, level, "level"))
         return run if run is not None and run.figures["status"] == "complete" else None
 
     @property
     def base(self) -> Record | None:
-        """The run to compare, if it got to its end."""
+        """The run to compare, if it reached its end."""
         return self.finished(Refinement.NONE)
 
 
@@ -92,7 +92,7 @@ class Verification(Result):
 
     @property
     def complete(self) -> bool:
-        """Whether every run got to its end."""
+        """Whether every run reached its end."""
         return not self.interrupted and not any(
             runs.failure for by_model in self.runs.values() for runs in by_model.values()
         )
@@ -122,7 +122,7 @@ class Verification(Result):
         return data.assign(method=("model", methods))
 
     def to_dict(self) -> dict[str, Any]:
-        """What the models say of each other, in plain values; None for what a run did not reach."""
+        """Errors and distances of the models in plain values; None for what a run did not reach."""
         task, reference = self.task, reference_model(self.models)
         part = part_of(task.path, float(task.motion.t[-1]))
         out = {
@@ -143,7 +143,7 @@ class Verification(Result):
 
 @checked_arguments()
 def reference_model(models: Sequence[str]) -> str:
-    """What the others are compared with: second-order geometry, or else the first that has flexible links."""
+    """The reference of a comparison: second-order geometry, or else the first model with flexible links."""
     for name in ("second-order", "exudyn", "segments", "mujoco", "linear", "ked"):
         if name in models:
             return name

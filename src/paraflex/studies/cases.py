@@ -1,4 +1,4 @@
-"""What methods are compared on: one motion, run by whatever method, and the points that its error is taken at."""
+"""Cases on which methods are compared: one motion, run by any method, and the points of its error."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Progress = Callable[[float], None]
 @given_as("a case", "what tracking_case or motion_case returns")
 @dataclass(frozen=True)
 class Case:
-    """A motion to be integrated again and again.
+    """A motion to be integrated by several methods.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def motion_case(
     torques: Mapping[str, float] | None = None,
     start: State,
 ) -> Case:
-    """A mechanism's own motion; the error is the end-effector's, or else the largest of all named points.
+    """A mechanism's motion without a path; the error is the end-effector's, or else the largest of all named points.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def motion_case(
 
 
 def _solution(run: Callable[[], TrackingRun | MotionRun]) -> Solution:
-    """Of a run; an error carries what was computed of it."""
+    """Solution of a run; that of a failed one from its error."""
     try:
         return run().solution
     except IntegrationError as error:

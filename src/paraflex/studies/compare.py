@@ -42,7 +42,7 @@ _FIGURES = (
 
 @dataclass(frozen=True)
 class ComparisonOptions(CheckedFields):
-    """How methods are compared.
+    """Options of a comparison of methods.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class ComparisonOptions(CheckedFields):
 
 
 class _TooSlowError(Exception):
-    """A run beyond the limit of time."""
+    """A run longer than the time limit."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def compare_methods(
 
 
 def _chosen(methods: Iterable[Method | str]) -> list[Method]:
-    """Methods, each once: their names tell runs apart."""
+    """Methods, each once: runs are distinguished by their names."""
     chosen = list(dict.fromkeys(map(find_method, methods)))
     for method in chosen:
         if method != METHODS.get(method.name):
@@ -187,7 +187,7 @@ def _chosen(methods: Iterable[Method | str]) -> list[Method]:
 
 @dataclass(frozen=True)
 class _Setting:
-    """A tolerance, or a step with the tolerance that Newton's iteration works to."""
+    """A tolerance, or a step with the tolerance of Newton's iteration."""
 
     tolerance: float
     step: float | None = None
@@ -196,7 +196,7 @@ class _Setting:
         return IntegrationOptions(method=method, tolerance=self.tolerance, step=self.step)
 
     def row(self, method: str, status: str, reason: str, warned: tuple[str, ...] = ()) -> Measurement:
-        """A run that has nothing else to tell."""
+        """A row of a run without results."""
         tolerance = self.tolerance if self.step is None else None
         return Measurement(method, tolerance, self.step, status, reason, warnings=warned)
 
@@ -205,7 +205,7 @@ class _Setting:
 
 
 def _plan(method: Method, options: ComparisonOptions) -> list[_Setting]:
-    """What a method is run with, loosest first; at least one, of which the method may say that it cannot."""
+    """Settings of a method, loosest first; at least one, which the method may refuse."""
     tolerances = [_Setting(value) for value in sorted(set(options.tolerances), reverse=True)]
     steps = [_Setting(options.tightest, value) for value in sorted(set(options.steps), reverse=True)]
     fitting = (tolerances if method.error_control else []) + (steps if method.fixed_step else [])
@@ -241,7 +241,7 @@ def _measurements(
 
 
 def _warm_up(case: Case, options: IntegrationOptions) -> None:
-    """The first slice of a run: what is compiled or loaded when it is first called is there afterwards."""
+    """Run the first slice of a run, which compiles and loads what is needed at the first call."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -254,7 +254,7 @@ def _warm_up(case: Case, options: IntegrationOptions) -> None:
 def _measure(
     case: Case, method: str, setting: _Setting, places: NDArray[np.float64], options: ComparisonOptions
 ) -> Measurement:
-    """A run, repeated while that is quick."""
+    """A run, repeated if it is quick."""
     chosen, solutions = setting.options(method), list[Solution]()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -304,12 +304,12 @@ def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
 
 
 def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArray[np.float64]]:
-    """Two tight runs, by the two methods of highest order that can do it; the first is what errors are taken from."""
+    """Two tight runs, by the two methods of highest order that succeed; errors are distances from the first."""
     ours = sorted((x for x in METHODS.values() if x.family is Family.ESDIRK), key=lambda x: -x.order)
     tolerance = options.tightest / _FINER
     runs: list[tuple[Method, float, Solution]] = []
     reasons = []
-    # Where one method only can do it, that one is held against itself at another tolerance.
+    # If only one method succeeds, it is compared with itself at another tolerance.
     for method, times in [(x, y) for y in (1.0, 4.0) for x in ours]:
         asked = tolerance * (2.0 if runs and times == 1.0 else times)
         try:
@@ -325,7 +325,7 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
             break
     if len(runs) < 2:
         raise IntegrationError(
-            f"no two runs came to their end to compare the others with ({'; '.join(reasons)})",
+            f"fewer than two runs reached their end to serve as a reference ({'; '.join(reasons)})",
             remedy="choose coarser tolerances, a shorter duration, or a longer limit of time for each run",
         )
     (method, own, solution), (other, loose, check) = runs
@@ -335,7 +335,7 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
 
 
 def _distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Largest over points and samples [m]."""
+    """Largest distance over points and samples [m]."""
     return float(np.max(np.linalg.norm(one - other, axis=-1)))
 
 

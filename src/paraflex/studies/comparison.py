@@ -1,4 +1,4 @@
-"""What a comparison of methods found: a row for each run, the reference it was held against, times for an error."""
+"""Results of a comparison of methods: a row for each run, the reference, times for an error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _PACKAGES = ("paraflex", "numpy", "scipy", "numba", "scikit-sundae")
 
 @dataclass(frozen=True)
 class Reference:
-    """The converged run that errors are distances from.
+    """The converged run from which errors are distances.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class MethodComparison(Result):
-    """Wall time against error of several methods on one motion.
+    """Wall time and error of several methods on one motion.
 
     Attributes
     ----------
@@ -129,12 +129,12 @@ class MethodComparison(Result):
 
     @property
     def complete(self) -> bool:
-        """Whether every run was begun."""
+        """Whether every run was started."""
         return not self.interrupted
 
     @property
     def data(self) -> xr.Dataset:
-        """Every run, (run,): its method, tolerance or step, status, error, time and work; NaN for what it has not."""
+        """Every run, (run,): method, tolerance or step, status, error, time and work; NaN for missing values."""
         columns = {
             each.name: ("run", [getattr(run, each.name) for run in self.measurements])
             for each in fields(Measurement)
@@ -148,11 +148,11 @@ class MethodComparison(Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Those that were tried, in order."""
+        """The methods in the order of their runs."""
         return tuple(dict.fromkeys(run.method for run in self.measurements))
 
     def time_to_reach(self, method: str, error: float) -> float | None:
-        """Wall time at which a method is as close as an error says [s]; None where no run of it came so close.
+        """Wall time of a method for an error [s]; None if no run of it was so accurate.
 
         Straight lines in the logarithms of both between the runs none of which is slower and less close than another;
         that of the fastest run where it is closer already.
@@ -179,13 +179,13 @@ class MethodComparison(Result):
         return None if own is None or default is None else own / default
 
     def fastest(self, error: float) -> str | None:
-        """The method that reaches an error first; None where none does."""
+        """The method that reaches an error first; None if none does."""
         times = {method: self.time_to_reach(method, error) for method in self.methods}
         reached = {method: time for method, time in times.items() if time is not None}
         return min(reached, key=lambda method: reached[method]) if reached else None
 
     def to_dict(self) -> dict[str, Any]:
-        """The comparison in plain values: what `compare-methods.json` holds."""
+        """The comparison in plain values: the content of `compare-methods.json`."""
         out = {
             "mechanism": self.mechanism,
             "case": self.case,
@@ -216,7 +216,7 @@ class MethodComparison(Result):
 
 
 def machine() -> dict[str, Any]:
-    """What the times were taken on."""
+    """The machine of the measurements."""
     model = platform.processor() or platform.machine()
     listing = Path("/proc/cpuinfo")
     if listing.exists():

@@ -1,4 +1,4 @@
-"""Results of studies as notebooks show them: what was found, and how far they are."""
+"""Results of studies in notebooks: main results and progress."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MOST = 60
 
 @view.register(StudyResult)
 def study_html(result: StudyResult) -> str:
-    """Every mode's status, errors, torques and the solver's figures; why modes failed."""
+    """Status, errors and torques of every mode, and counts of the solver; reasons of failures."""
     if result.data is None:
         reasons = [sentence(f"{mode}: {reason}") for mode, reason in result.failed.items()]
         return page("study: no mode ran", *reasons)
@@ -58,7 +58,7 @@ def study_html(result: StudyResult) -> str:
 
 @view.register(SweepResult)
 def sweep_html(result: SweepResult) -> str:
-    """How many runs are done and how they ended, and where the table is."""
+    """Number of runs by status, and the place of the table."""
     rate = f"{result.fresh} runs in {result.seconds:.3g} s" if result.fresh else None
     known = [
         ("runs", f"{result.done} of {result.total}"),
@@ -71,7 +71,7 @@ def sweep_html(result: SweepResult) -> str:
 
 @view.register(OptimisationResult)
 def optimisation_html(result: OptimisationResult) -> str:
-    """The best design beside the start: parameters, objective, metrics."""
+    """The best design and the start: parameters, objective, metrics."""
     numbers = [(name, result.start[name], value, result.bounds.get(name, "")) for name, value in result.values.items()]
     metrics = [("objective", result.start_objective, result.objective, "")]
     metrics += [(name, result.start_metrics.get(name), value, "") for name, value in result.metrics.items()]
@@ -87,7 +87,7 @@ def optimisation_html(result: OptimisationResult) -> str:
 
 @view.register(IdentificationResult)
 def identification_html(result: IdentificationResult) -> str:
-    """The parameters found, with deviations, and what becomes of every target."""
+    """The parameters found, with deviations, and the value of every target."""
     found = result.confidence
     deviations: Mapping[str, float | None] = {} if found is None else found.deviations
     reasons: Mapping[str, str] = {} if found is None else found.reasons
@@ -116,7 +116,7 @@ def identification_html(result: IdentificationResult) -> str:
 
 @view.register(IndicesResult)
 def indices_html(result: IndicesResult) -> str:
-    """First-order and total indices of every parameter, a row each."""
+    """First-order and total indices of every parameter, one row each."""
     names = ("metric", "path", "mode", "parameter", "first", "first_confidence", "total", "total_confidence")
     rows = [tuple(row[name] for name in names) for row in result.to_dict()["indices"]]
     heads = ("metric", "path", "mode", "parameter", "first order", "±", "total", "±")
@@ -126,7 +126,7 @@ def indices_html(result: IndicesResult) -> str:
 
 @view.register(Sensitivities)
 def sensitivities_html(found: Sensitivities) -> str:
-    """Elasticities of every metric by every parameter, a row a metric, path and mode."""
+    """Elasticities of every metric by every parameter, one row per metric, path and mode."""
     relative = found.relative
     rows = [
         (metric, path, mode, float(found.values[i, j]), unit, *(float(x) for x in relative[i, j]))

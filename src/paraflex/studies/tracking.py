@@ -26,7 +26,7 @@ from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 
 class Simulator(Protocol):
-    """How one mode of a task is run where it is not by `simulate` with error control: `simulate_ked`, say."""
+    """Function that runs one mode of a task in place of `simulate`, such as `simulate_ked`."""
 
     def __call__(
         self, task: TrackingTask, mode: str | ActuationMode, *, on_progress: Callable[[float], None] | None = None
@@ -37,7 +37,7 @@ class Simulator(Protocol):
 
 @dataclass(frozen=True)
 class StudyResult(Result):
-    """What became of the modes of a study.
+    """Results of the modes of a study.
 
     Attributes
     ----------
@@ -57,18 +57,18 @@ class StudyResult(Result):
 
     @property
     def data(self) -> xr.Dataset | None:
-        """Of every mode that ran, whole or in part; None where none did."""
+        """Data of every mode that ran, whole or in part; None if none did."""
         return self.dataset
 
     @property
     def complete(self) -> bool:
-        """Whether every mode ran to its end, or to an event that was to stop it."""
+        """Whether every mode ran to its end, or to an event."""
         return (
             not self.failed and self.data is not None and bool(self.data["status"].isin(["complete", "stopped"]).all())
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The figures of all modes in plain values; why modes failed where none ran."""
+        """Results of all modes in plain values; reasons of failures if none ran."""
         return {"failed": self.failed} if self.data is None else summary(self.data, self.failed)
 
 
@@ -152,7 +152,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
     def _mode(
         self, mode: ActuationMode, stop: threading.Event, on_progress: OnProgress | None
     ) -> TrackingRun | str | None:
-        """A mode's run, or why there is none."""
+        """A mode's run, or the reason why there is none."""
         end, began = float(self.task.motion.t[-1]), time.perf_counter()
 
         def report(reached: float) -> None:

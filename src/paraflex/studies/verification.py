@@ -1,4 +1,4 @@
-"""One mechanism, path and mode at every fidelity and in other engines: do they agree, and is each converged?"""
+"""One mechanism, path and mode by every model and in other engines, each with finer steps and meshes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ FIDELITIES = ("rigid", "ked", "linear", "second-order", "segments")
 
 @dataclass(frozen=True)
 class VerificationOptions(CheckedFields):
-    """How fine the runs are; the finer ones take a quarter of the tolerance, half the step, or twice the mesh.
+    """Resolution of the runs; the finer ones have a quarter of the tolerance, half the step, or twice the mesh.
 
     Attributes
     ----------
@@ -222,5 +222,5 @@ def check_model(name: str, mechanism: Mechanism) -> None:
 
 
 def _has_meaning(name: str, level: Refinement, mechanism: Mechanism) -> bool:
-    """Rigid bodies and given shapes have no mesh; MuJoCo's is that of our own segments, run by our own kernels."""
+    """Whether a refinement applies: rigid bodies and given shapes have no mesh; MuJoCo's is that of own segments."""
     return level is not Refinement.MESH or not (name in ("rigid", "mujoco") or given_shapes(mechanism.bodies))

@@ -1,1 +1,1 @@
-"""Derivatives of the runs of a design by its numbers: what moves with them, and what runs and metrics make of that."""
+"""Derivatives of the runs of a design by its parameters, from those of its system, motion and torques."""

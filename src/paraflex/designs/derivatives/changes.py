@@ -1,4 +1,4 @@
-"""How all that a run is given changes with one parameter: system, planned motion, torques, times."""
+"""Derivatives of the inputs of a run by one parameter: system, planned motion, torques, times."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 
 
 class Described(NamedTuple):
-    """What a design's file says of its runs: all their numbers come of these."""
+    """The inputs of a design's runs as its file gives them, from which all their numbers follow."""
 
     mechanism: Mechanism
     path: Any
@@ -55,7 +55,7 @@ class Described(NamedTuple):
 
 @dataclass(frozen=True)
 class KnownPath:
-    """A path known at some times alone, with a complex step."""
+    """A path known at some times only, with a complex step."""
 
     motion: PathMotion
     angles: Numbers | None
@@ -63,7 +63,7 @@ class KnownPath:
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Its start and end: a path known at some times has none between."""
+        """Its start and end: a path known at some times has no knots between them."""
         return (0.0, self.duration)
 
     def evaluate(self, t: Array) -> PathMotion:
@@ -71,13 +71,13 @@ class KnownPath:
         return self.motion
 
     def turning(self, t: Array) -> Numbers | None:
-        """How the end-effector turns, where the path says so."""
+        """Angle of the end-effector and its derivatives, if the path prescribes it."""
         return self.angles
 
 
 @dataclass(frozen=True)
 class ModeChange:
-    """How what the run of one mode is given changes.
+    """Derivatives of the inputs of the run of one mode.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class ModeChange:
 
 
 class Change:
-    """How a design changes with one parameter, as a part of its size.
+    """Derivatives of a design by one parameter, relative to its size.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class Change:
         self.end: float = here.end
 
     def _near(self, setting: Setting, task: Task, k: int) -> tuple[Stencil, list[Described]]:
-        """Designs to both sides of this one, or to one where the other cannot be."""
+        """Designs to both sides of this one, or to one side if the other is invalid."""
         trouble: ParaflexError | None = None
         for stencil in STENCILS:
             try:
@@ -169,7 +169,7 @@ class Change:
 
     @cached_property
     def rigid(self) -> System:
-        """That of the planned motion, with a complex step."""
+        """The planned motion with a complex step."""
         bodies = tuple(
             body if isinstance(body, RigidBody) else with_fields(body, flexible=False)
             for body in self.there.mechanism.bodies
@@ -185,7 +185,7 @@ class Change:
 
     @cached_property
     def knots(self) -> Numbers:
-        """Of the path, with a complex step."""
+        """Knots of the path, with a complex step."""
         knots = path_knots(self.there.path, self.there.end)
         if knots.size != self.planned.plan.knots.size:
             raise InputError(
@@ -196,7 +196,7 @@ class Change:
         return knots
 
     def plan(self, motion: RigidMotion, effort: Effort, d_times: Array) -> _Planned:
-        """A planned motion whose times move."""
+        """A planned motion at times that change."""
         path = self.known_path(stepped(motion.t, d_times))
         change = motion_sensitivity(self.closure, motion, self._nearby(motion, d_times, path))
         return _Planned(self, motion, effort, path, stepped(motion.t, d_times), change)
@@ -243,7 +243,7 @@ class Change:
         return still_signals(mechanism, near.end)[0]
 
     def of_mode(self, nominal: Given) -> ModeChange:
-        """How what the run of a mode is given changes."""
+        """Derivatives of the inputs of the run of a mode."""
         torques = self._torques(nominal.torques)
         signals, stops = self._signals(nominal, torques)
         sampled, problem = self.sampled, nominal.problem
@@ -269,7 +269,7 @@ class Change:
         return q, v
 
     def _torques(self, nominal: FeedForward) -> FeedForward:
-        """With a complex step: through as many instants, which between knots move in proportion."""
+        """Torques with a complex step, at as many instants, which move in proportion between knots."""
         d_times = np.interp(nominal.times, nominal.knots, part(self.knots))
         motion = self.planned.plan.follow(nominal.times)
         effort = required_effort(motion)
@@ -322,7 +322,7 @@ class Change:
 
 @dataclass(frozen=True)
 class _Planned:
-    """A planned motion at instants that move, and how it changes; `times` with a complex step."""
+    """A planned motion at instants that change, and its derivatives; `times` with a complex step."""
 
     owner: Change
     motion: RigidMotion
@@ -332,7 +332,7 @@ class _Planned:
     change: MotionChange
 
     def with_step(self) -> RigidMotion:
-        """The motion with a complex step: what of it is no task coordinate is desired as it comes."""
+        """The motion with a complex step; coordinates of the end-effector outside the task are desired as they are."""
         changes = {name: stepped(getattr(self.motion, name), getattr(self.change, name)) for name in ("q", "v", "a")}
         return replace(self.motion, system=self.owner.rigid, path=self.path, t=self.times, **changes)
 
@@ -349,7 +349,7 @@ class _Planned:
         return part(required), part(transposed @ motor_rows(moved))
 
     def _forces(self) -> Numbers:
-        """Of inertia, weight and loads, with a complex step."""
+        """Forces of inertia, weight and loads, with a complex step."""
         motion, change, here = self.motion, self.change, self.motion.system.packed
         numbers, d_numbers = numbers_of(here), part(numbers_of(self.owner.rigid.packed))
 
@@ -407,6 +407,6 @@ def _moved(task: Task, k: int, by: float) -> Task:
 
 
 def _relative(difference: Difference, numbers: Array) -> float:
-    """The largest error of differences as a part of the largest number or derivative."""
+    """The largest error of differences relative to the largest number or derivative."""
     size = max(np.max(np.abs(difference.value), initial=0.0), np.max(np.abs(numbers), initial=0.0))
     return float(np.max(difference.error, initial=0.0) / size) if size > 0.0 else 0.0

@@ -128,7 +128,7 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Chan
 
 
 def _with_motion(run: TrackingRun, nominal: Given, motion: Motion) -> TrackingRun:
-    """The run, its steps solved to rounding."""
+    """The run with its steps solved to rounding."""
     energy = energies(nominal.problem.system.packed, motion.q, motion.v, motion.multipliers)
     solution = replace(
         run.solution, q=motion.q, v=motion.v, a=motion.a, multipliers=motion.multipliers, kinetic_energy=energy[:, 0],
@@ -140,7 +140,7 @@ def _with_motion(run: TrackingRun, nominal: Given, motion: Motion) -> TrackingRu
 def _slopes(
     setting: Setting, run: TrackingRun, here: Traces, nominal: Given, found: RunDerivatives, k: int, change: ModeChange
 ) -> Array:
-    """Derivatives of the numbers of metrics by parameter k as a part of its size: by a run with a complex step."""
+    """Derivatives of the numbers of metrics by parameter k relative to its size: by a run with a complex step."""
     direction, along = change.direction, Motion(*(each[k] for each in found.derivatives))
     q, v, a, multipliers, work = (stepped(x, dx) for x, dx in zip(found.motion, along, strict=True))
     energy = _stepped_energies(nominal, found.motion, along, direction)
@@ -155,7 +155,7 @@ def _slopes(
 
 
 def _stepped_energies(nominal: Given, motion: Motion, along: Motion, direction: Direction) -> Array:
-    """`energies` with a complex step: products, sines and cosines, of which a difference leaves but rounding."""
+    """`energies` with a complex step: products, sines and cosines, whose differences are exact to rounding."""
     packed, stencil = nominal.problem.system.packed, STENCILS[0]
     numbers = numbers_of(packed)
 

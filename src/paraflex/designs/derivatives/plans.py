@@ -1,4 +1,4 @@
-"""What a run is given, and the values of the parameters."""
+"""Inputs of a run, and the values of the parameters."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _OF_STEPS = ("tolerance", "step")
 
 @dataclass(frozen=True)
 class Given:
-    """All that a run of one mode is given.
+    """The inputs of a run of one mode.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ def nominal_values(setting: Setting, chosen: Collection[str] = ()) -> tuple[floa
 
 
 def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> float:
-    """What steps of parameter k are parts of: its value by default.
+    """Size of parameter k, to which its steps are relative: by default its value.
 
     Raises
     ------
@@ -82,8 +82,8 @@ def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> 
     size = abs(value) if size is None else abs(size)
     if not size > 0.0:
         raise InputError(
-            "is zero, which gives no size of steps", field=where, value=value,
-            remedy="give low and high, whose distance is taken for its size",
+            "is zero, so steps of differences have no size", field=where, value=value,
+            remedy="give low and high, whose distance is its size",
         )  # fmt: skip
     return size
 
@@ -112,12 +112,12 @@ def check_differentiable_study(setting: Setting, values: Sequence[float], column
 
 
 def given(planned: TrackingTask, options: IntegrationOptions, mode: str) -> Given:
-    """What the run of a mode is given."""
+    """Inputs of the run of a mode."""
     return given_torques(planned, options, planned.torques(mode))
 
 
 def given_torques(planned: TrackingTask, options: IntegrationOptions, torques: FeedForward) -> Given:
-    """As `simulate` makes it of a mode's torques."""
+    """The torques of a mode as in `simulate`."""
     times = planned.motion.t
     signals, knots = pack_signals(planned.mechanism, torques.signals, float(times[-1]))
     stops = np.sort(np.concatenate([torques.knots, knots]))

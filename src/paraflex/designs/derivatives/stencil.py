@@ -1,4 +1,4 @@
-"""Differences of high order of what is smooth to rounding, with an estimate of their error."""
+"""Differences of high order for functions that are smooth to rounding, with an estimate of their error."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SPACING = 4e-3
 
 
 class Difference(NamedTuple):
-    """A derivative, and how far it is from that of a formula two orders lower, which is less exact than it."""
+    """A derivative, and its difference from a formula two orders lower, which bounds its error."""
 
     value: Array
     error: Array
@@ -25,7 +25,7 @@ class Difference(NamedTuple):
 
 @dataclass(frozen=True)
 class Stencil:
-    """Places at which a function is asked for, and what weighs its values there.
+    """Points at which a function is evaluated, and their weights.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Stencil:
     coarse: Array
 
     def derivative(self, values: list[Array]) -> Difference:
-        """Of values at the places, arrays of one shape."""
+        """Derivative from values at the points, arrays of one shape."""
         stack = np.stack(values)
         # Differences from one of the values: what does not change leaves no rounding.
         stack = stack - stack[0]
@@ -49,7 +49,7 @@ class Stencil:
 
 
 def make_stencil(places: range | tuple[int, ...], spacing: float) -> Stencil:
-    """The stencil of places in units of a spacing; the coarser formula leaves out two of them."""
+    """The stencil of points in units of a spacing; the coarser formula leaves out two of them."""
     x = np.array(places, dtype=float)
     near = np.argsort(np.abs(x), kind="stable")[:-2]
     weights, coarse = np.zeros(x.size), np.zeros(x.size)
@@ -59,7 +59,7 @@ def make_stencil(places: range | tuple[int, ...], spacing: float) -> Stencil:
 
 
 def _weights(places: Array) -> Array:
-    """Of values at places for the first derivative at zero, in units of the spacing: by Taylor's series."""
+    """Weights of values at the points for the first derivative at zero, in units of the spacing: by Taylor's series."""
     taylor = np.array([places**power / factorial(power) for power in range(places.size)])
     return np.linalg.solve(taylor, np.eye(places.size)[1])
 

@@ -1,4 +1,4 @@
-"""Complex steps: whatever a design's file describes, with i h times its derivative added to every number.
+"""Complex steps: the model and settings of a design with i h times its derivative added to every number.
 
 Numbers of a mechanism are products and quotients of few of its file's, and expressions there: differences of eighth
 order over a hundredth leave nothing but rounding of them. Functions that are carried out with these complex numbers
@@ -26,14 +26,14 @@ STEP = 1e-40
 
 @dataclass(frozen=True)
 class Stepped(Generic[T]):
-    """A description with a complex step, and the largest part of a number's derivative that differences leave."""
+    """A description with a complex step, and the largest relative error of the derivatives by differences."""
 
     value: T
     error: float
 
 
 def part(values: Any) -> NDArray[np.float64]:
-    """The derivative in numbers with a complex step; zero of real ones."""
+    """The derivative in numbers with a complex step; zero for real ones."""
     return np.imag(values) / STEP
 
 
@@ -63,7 +63,7 @@ def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> Stepped[T]:
 
 
 def with_fields(record: T, **changes: Any) -> T:
-    """A dataclass with other fields, as `replace`, without the checks that it makes of real numbers."""
+    """A dataclass with other fields, like `replace`, without its checks of real numbers."""
     new = object.__new__(type(record))
     for each in fields(record):  # pyright: ignore[reportArgumentType]
         object.__setattr__(new, each.name, changes.get(each.name, getattr(record, each.name)))
@@ -71,7 +71,7 @@ def with_fields(record: T, **changes: Any) -> T:
 
 
 class _Walk:
-    """Down a description and those near it."""
+    """Simultaneous traversal of a description and those near it."""
 
     def __init__(self, stencil: Stencil) -> None:
         self.stencil, self.error = stencil, 0.0

@@ -1,1 +1,1 @@
-"""ESDIRK schemes, a file each, with their Butcher tableaux: explicit first stage, one diagonal, stiffly accurate."""
+"""ESDIRK schemes, one per file, with their Butcher tableaux: explicit first stage, one diagonal, stiffly accurate."""

@@ -1,4 +1,4 @@
-"""What schemes with a Butcher tableau have in common, and how a tableau is made from its rows."""
+"""Base class of schemes with a Butcher tableau, and functions that make a tableau from its rows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Number = str | float
 
 
 class ESDIRK(NativeMethod):
-    """A scheme with one diagonal, an explicit first stage and a last one that is the end of the step.
+    """A scheme with one diagonal element, an explicit first stage and a last stage at the end of the step.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class ESDIRK(NativeMethod):
 
     @property
     def scheme(self) -> Tableau:
-        """As the kernel takes it."""
+        """The scheme as the kernel's tableau."""
         return self.tableau
 
 
@@ -74,7 +74,7 @@ def make_tableau(
 
 
 def paired_rows(diagonal: Number, rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
-    """Rows of A where all from the third on begin with two equal entries: these once, and what follows to the diagonal.
+    """Rows of A, all with two equal entries from the third on: given once, and the entries up to the diagonal.
 
     So have methods of stage order two that Kennedy and Carpenter derive.
     """

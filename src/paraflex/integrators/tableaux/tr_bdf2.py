@@ -14,7 +14,7 @@ _W = sqrt(2.0) / 4.0
 
 
 class TRBDF2(ESDIRK):
-    """The trapezoidal rule and the second backward difference formula in turn: L-stable."""
+    """The trapezoidal rule followed by the second backward difference formula: L-stable."""
 
     name = "tr-bdf2"
     title = "TR-BDF2"

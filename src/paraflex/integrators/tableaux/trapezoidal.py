@@ -6,7 +6,7 @@ from paraflex.integrators.tableaux.make import ESDIRK, Tableau, make_tableau
 
 
 class Trapezoidal(ESDIRK):
-    """A-stable, without any damping."""
+    """The trapezoidal rule: A-stable, without any damping."""
 
     name = "trapezoidal"
     title = "Trapezoidal rule"

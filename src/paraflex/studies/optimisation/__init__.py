@@ -1,1 +1,1 @@
-"""Designs looked for: what minimises metrics, what reproduces them, and which parameters matter at all."""
+"""Searches for designs: optimisation, identification, and Sobol indices."""

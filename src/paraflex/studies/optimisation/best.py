@@ -1,4 +1,4 @@
-"""The best design as a mechanism's file."""
+"""The model file of the best design."""
 
 from __future__ import annotations
 

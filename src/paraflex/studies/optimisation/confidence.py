@@ -1,4 +1,4 @@
-"""How well targets fix the parameters of a fit, and whether that can be said at all."""
+"""How well targets determine the parameters of a fit, and whether the estimate is valid."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ONE_DEVIATION = math.erf(math.sqrt(0.5))
 
 @dataclass(frozen=True)
 class Confidence:
-    """How well targets fix the parameters, to first order about the design found.
+    """How well targets determine the parameters, to first order about the design found.
 
     Attributes
     ----------
@@ -62,11 +62,11 @@ class Confidence:
 
     @property
     def telling(self) -> bool:
-        """Whether the targets tell the parameters apart."""
+        """Whether the targets distinguish the parameters."""
         return self.condition < ILL_CONDITIONED
 
     def to_dict(self) -> dict[str, Any]:
-        """In plain values: JSON has no infinity and no numbers that are none."""
+        """The estimate in plain values, with None for infinity and NaN, which JSON does not have."""
         return {
             "deviations": dict(self.deviations),
             "errors": dict(self.errors),
@@ -99,7 +99,7 @@ def student_factor(freedom: int) -> float:
 def confidence(
     study: DesignStudy[Result], targets: Sequence[Target], design: Evaluated, jacobian: Array, bound: Mapping[str, str]
 ) -> Confidence:
-    """What a Jacobian says of a design found.
+    """Estimate of the deviations from the Jacobian at the design found.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def checked(
     jacobian: Array,
     found: Confidence,
 ) -> Confidence:
-    """Withhold deviations where residuals do not change by them as the Jacobian says.
+    """Withhold deviations if residuals do not change as the Jacobian predicts.
 
     Along every principal direction of the Jacobian two designs lie one standard error to both sides. Residuals change
     from one to the other by twice their own standard deviation where the Jacobian is right and they are straight; noise
@@ -191,5 +191,5 @@ def checked(
 
 
 def _standard_deviation(targets: Sequence[Target], design: Evaluated, freedom: int) -> float:
-    """Of the residuals, from what is left of them."""
+    """Standard deviation of the residuals, from those of the fit."""
     return float(np.sqrt(np.sum(residuals(targets, design) ** 2) / freedom))

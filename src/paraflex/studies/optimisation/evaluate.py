@@ -1,4 +1,4 @@
-"""Designs evaluated: each once, all at a time in parallel, every one a few rows of the table."""
+"""Evaluation of designs: each once, several in parallel, each with its rows of the table."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ RunTask = Callable[..., Outcome]
 
 
 class LimitReached(Exception):
-    """As many designs have been evaluated as the study allows."""
+    """The limit of evaluated designs has been reached."""
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A design and what became of it.
+    """A design and its rows.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Evaluated:
 
     @property
     def reason(self) -> str:
-        """Why it does not count; empty where all runs are complete."""
+        """Reason why the design cannot be used; empty if all runs are complete."""
         for row in self.rows:
             if row["status"] != COMPLETE:
                 return f'{row["path"]}, mode "{row["mode"]}": {row["reason"]}'
@@ -60,7 +60,7 @@ class Evaluated:
 
     @property
     def complete(self) -> bool:
-        """Whether all its runs are."""
+        """Whether all its runs are complete."""
         return not self.reason
 
     def metric(self, column: str) -> Array:
@@ -69,7 +69,7 @@ class Evaluated:
 
 
 class Evaluate:
-    """Evaluates designs; what a folder has rows of is read, not computed.
+    """Evaluation of designs; rows of a folder are read, not computed.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Evaluate:
 
     @property
     def history(self) -> list[Evaluated]:
-        """All that were asked for and are there, in that order."""
+        """All designs requested and evaluated, in that order."""
         return sorted(self.known.values(), key=lambda each: each.number)
 
     def __call__(self, designs: Sequence[Design]) -> list[Evaluated]:
@@ -133,7 +133,7 @@ class Evaluate:
         return [self.known[design] for design in designs]
 
     def add_slopes(self, at: Evaluated) -> Evaluated:
-        """A design with what `run_slopes` adds to its rows, which are kept with it."""
+        """A design with the derivatives of `run_slopes` in its rows, which are kept with it."""
         assert self.run_slopes is not None
         for _, found in self._compute([at.design], self.run_slopes):
             rows = tuple(row | more for row, more in zip(at.rows, found, strict=True))
@@ -157,7 +157,7 @@ class Evaluate:
             self.on_evaluated(self, done)
 
     def _compute(self, designs: list[Design], run: RunTask) -> Iterator[tuple[Design, tuple[Row, ...]]]:
-        """Designs and all their rows, as they become complete."""
+        """Designs and all their rows, in order of completion."""
         setting = self.study.setting
         rows: dict[Design, dict[tuple[str, str], Row]] = {design: {} for design in designs}
         for job, outcome in outcomes(self.engine, partial(_do, run), self._jobs(designs)):
@@ -175,7 +175,7 @@ class Evaluate:
         return tuple(row | {"run": first + k, "design": number} for k, row in enumerate(rows))
 
     def _jobs(self, designs: list[Design]) -> Iterator[Job]:
-        """One a design and path; one a mode where that leaves workers without any. Rows do not depend on it."""
+        """One job per design and path, or per mode if workers would be idle. Rows do not depend on it."""
         setting = self.study.setting
         apart = len(designs) * len(setting.paths) < self.engine.workers
         for design in designs:
@@ -185,7 +185,7 @@ class Evaluate:
 
 
 class Job(NamedTuple):
-    """A task, and in which modes."""
+    """A task, and its modes."""
 
     setting: Setting
     task: Task

@@ -1,4 +1,4 @@
-"""Residuals of targets as a problem of least squares, and what its Jacobian says of the parameters found."""
+"""The least-squares problem of an identification, and the estimate from its Jacobian."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _TOLERANCE = 1e-6
 
 
 def residuals(targets: Sequence[Target], design: Evaluated) -> Array:
-    """Of all targets, (targets,); infinite for a design that does not run."""
+    """Residuals of all targets, (targets,); infinite for a design that does not run."""
     if not design.complete:
         return np.full(len(targets), np.inf)
     return np.array([target.residual(design) for target in targets])
 
 
 def root_mean_square(targets: Sequence[Target], design: Evaluated) -> float:
-    """Of the residuals."""
+    """Root mean square of the residuals."""
     return float(np.sqrt(np.mean(residuals(targets, design) ** 2)))
 
 
@@ -39,7 +39,7 @@ def closest(targets: Sequence[Target], designs: Sequence[Evaluated]) -> Evaluate
 def fit(
     study: DesignStudy[Result], targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: Evaluated
 ) -> str:
-    """Reduce the residuals from a start; why it stopped, in words.
+    """Minimise the residuals from a start; the reason of the end, in words.
 
     A trial that does not run has infinite residuals, which SciPy's trust region answers by a shorter step.
 

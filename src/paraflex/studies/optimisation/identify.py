@@ -26,7 +26,7 @@ from paraflex.studies.optimisation.study import DesignStudy, SweepStudy, base_st
 
 @dataclass(frozen=True)
 class Reached:
-    """A target and what the best design makes of it.
+    """A target and its value at the best design.
 
     Attributes
     ----------
@@ -43,13 +43,13 @@ class Reached:
     residual: float
 
     def to_dict(self) -> dict[str, Any]:
-        """In plain values."""
+        """The target in plain values."""
         return self.target.to_dict() | {"reached": self.reached, "start": self.start, "residual": self.residual}
 
 
 @dataclass(frozen=True, kw_only=True)
 class IdentificationResult(SearchResult):
-    """Where an identification stands after a session: see `SearchResult`; its history tells root mean square residuals.
+    """State of an identification after a session: see `SearchResult`; its history has root mean square residuals.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class IdentificationResult(SearchResult):
     derivatives: str
 
     def to_dict(self) -> dict[str, Any]:
-        """In plain values; without times and counts of a session, which are no results."""
+        """The result in plain values, without times and counts of a session."""
         return super().to_dict() | {
             "targets": [each.to_dict() for each in self.targets],
             "confidence": None if self.confidence is None else self.confidence.to_dict(),
@@ -92,7 +92,7 @@ class IdentificationStudy(DesignStudy[IdentificationResult]):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Metrics that count."""
+        """Metrics of the targets."""
         return tuple(dict.fromkeys(target.column for target in self.targets))
 
     def sought(self) -> dict[str, Any]:
@@ -107,7 +107,7 @@ class IdentificationStudy(DesignStudy[IdentificationResult]):
         on_progress: OnProgress | None = None,
         run: RunTask | None = None,
     ) -> IdentificationResult:
-        """Look for the parameters; see `OptimisationStudy.run`."""
+        """Search for the parameters; see `OptimisationStudy.run`."""
         folder, solution = kept_in(folder), _Solution(self)
         watch = None if on_progress is None else _watch(self, on_progress)
         result = partial(_result, self, folder, solution)
@@ -140,7 +140,7 @@ def identify(
     on_progress: OnProgress | None = None,
     run: RunTask | None = None,
 ) -> IdentificationResult:
-    """Look for the parameters that reproduce the targets of a study, or of its file.
+    """Search for the parameters that reproduce the targets of a study, or of its file.
 
     `study.run(folder)` in one call: see there and `Workers`.
     """
@@ -175,7 +175,7 @@ def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:
 
 
 class _Solution:
-    """The search itself; keeps where it ended, what derivatives there say, and how they were taken."""
+    """The search: its end, the estimate from the derivatives there, and how these were taken."""
 
     def __init__(self, study: IdentificationStudy) -> None:
         self.study = study
@@ -184,7 +184,7 @@ class _Solution:
         self.derivatives = ""
 
     def solve(self, evaluate: Evaluate) -> str:
-        """From the start, or the best of samples, to the least residuals."""
+        """Search from the start, or the best of samples, for the least residuals."""
         study, slopes = self.study, slopes_of(self.study, evaluate)
         running_start(study, evaluate)
         start = sampled_start(study, evaluate, lambda designs: closest(study.targets, designs))
@@ -202,7 +202,7 @@ class _Solution:
 
 
 def _how(study: IdentificationStudy, slopes: object) -> str:
-    """How derivatives were taken, and why not exactly."""
+    """How derivatives were taken, and the reason if they are not exact."""
     if isinstance(slopes, ExactSlopes):
         others = list(dict.fromkeys(slopes.reasons))
         return f"exact; differences at {len(slopes.reasons)} designs ({others[0]})" if others else "exact"

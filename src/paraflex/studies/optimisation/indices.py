@@ -1,4 +1,4 @@
-"""Global sensitivity: what share of a metric's variance each parameter explains, alone and with the others."""
+"""Global sensitivity: the share of a metric's variance explained by each parameter, alone and with the others."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SAMPLES, _FEWEST = 128, 8
 
 @dataclass(frozen=True)
 class IndicesResult(SweptResult):
-    """Where a study of indices stands after a session; see `SweptResult`.
+    """State of a study of indices after a session; see `SweptResult`.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class IndicesResult(SweptResult):
 
     @property
     def table(self) -> Path:
-        """Of the indices."""
+        """Table of the indices."""
         return self.folder / TABLE
 
     @property
@@ -60,7 +60,7 @@ class IndicesResult(SweptResult):
         return self.indices
 
     def to_dict(self) -> dict[str, Any]:
-        """In plain values: a row an index and parameter."""
+        """The indices in plain values: one row per index and parameter."""
         table = self.indices.to_dataframe(dim_order=["index", "parameter"]).reset_index().reindex(columns=list(_ROW))
         plain = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
         return {"kind": "indices", "name": self.sweep.name, "indices": plain}
@@ -94,7 +94,7 @@ class IndicesStudy(Study[IndicesResult]):
         on_progress: OnProgress | None = None,
         run: RunTask = run_task,
     ) -> IndicesResult:
-        """Do the runs, and find the indices when all are done; see `SweepStudy.run`.
+        """Do the runs, and compute the indices when all are done; see `SweepStudy.run`.
 
         The folder gets the sweep's table, `indices.parquet` and `indices.json`.
 
@@ -192,7 +192,7 @@ def _indices(study: IndicesStudy, table: Path) -> list[dict[str, Any]]:
 def _analysed(
     study: IndicesStudy, names: tuple[str, str, str], values: Array, usable: NDArray[np.bool_]
 ) -> dict[str, Any]:
-    """Indices from the base samples all of whose runs are usable."""
+    """Indices from the base samples with complete runs only."""
     kept = usable.reshape(study.samples, -1).all(axis=1)
     count = int(np.count_nonzero(kept))
     if count < _FEWEST:

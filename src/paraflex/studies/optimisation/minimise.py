@@ -31,7 +31,7 @@ _BATCH = 4
 
 
 def minimise(problem: DesignProblem, method: str | None, start: Array) -> str:
-    """Look for the least objective from a start; why it stopped, in words.
+    """Search for the least objective from a start; the reason of the end, in words.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How much of a computed number is noise: what is left in differences of high order."""
+"""Noise of a computed number, estimated from differences of high order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is to be least, or to be reproduced: numbers of a design from the metrics of its runs, and their slopes."""
+"""Objectives and targets: numbers of a design from the metrics of its runs, and their derivatives."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WORST, MEAN = "worst", "mean"
 
 
 class Measured(Protocol):
-    """A design whose runs are all complete."""
+    """A design with complete runs."""
 
     def metric(self, column: str) -> Array:
         """A metric of every run, (runs,)."""
@@ -49,15 +49,15 @@ class Objective:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Every metric that counts, once."""
+        """Every metric of the objective and its limits, once."""
         return tuple(dict.fromkeys([*self.weights, *(column for column, _ in self.limits)]))
 
     def metrics(self, design: Measured) -> dict[str, float]:
-        """The worst or mean of every metric that counts."""
+        """The worst or mean value of every metric."""
         return {column: float(self._shares(design, column) @ design.metric(column)) for column in self.columns}
 
     def scales(self, start: Measured) -> dict[str, float]:
-        """What metrics are divided by, from the design at the start; a metric that is zero there has no scale."""
+        """Divisors of metrics, from the design at the start; a metric that is zero there has none."""
         metrics = self.metrics(start)
         return {column: abs(metrics[column]) if self.relative else 1.0 for column in self.weights}
 
@@ -75,7 +75,7 @@ class Objective:
         return np.sum(terms, axis=0)
 
     def room(self, design: Measured) -> Array:
-        """How far metrics are below their limits, as a share of the limit (of 1 where it is 0); (limits,)."""
+        """Distance of metrics from their limits, relative to the limit (to 1 if it is 0); (limits,)."""
         metrics = self.metrics(design)
         return np.array([(limit - metrics[column]) / (abs(limit) or 1.0) for column, limit in self.limits])
 
@@ -85,11 +85,11 @@ class Objective:
         return np.array(rows)
 
     def violation(self, design: Measured) -> float:
-        """By how much the limits are passed in all, as shares of them."""
+        """Sum of the relative violations of the limits."""
         return float(np.sum(np.maximum(-self.room(design), 0.0)))
 
     def _shares(self, design: Measured, column: str) -> Array:
-        """What each run contributes to the worst or mean of a metric."""
+        """Contribution of each run to the worst or mean of a metric."""
         values = design.metric(column)
         if self.over == MEAN:
             return np.full(values.size, 1.0 / values.size)
@@ -98,7 +98,7 @@ class Objective:
 
 @dataclass(frozen=True)
 class Target:
-    """A number that is to be reproduced.
+    """A number to be reproduced.
 
     Attributes
     ----------
@@ -124,11 +124,11 @@ class Target:
 
     @property
     def factor(self) -> float:
-        """What the difference is multiplied by."""
+        """Factor of the difference."""
         return self.weight / (abs(self.value) if self.relative else 1.0)
 
     def residual(self, design: Measured) -> float:
-        """Weight times what is reached less the value, over the value where it is relative."""
+        """Weight times difference of the metric from the target, divided by the target if `relative`."""
         return self.factor * float(design.metric(self.column)[self.run] - self.value)
 
     def slope(self, slopes: Mapping[str, Array]) -> Array:
@@ -136,5 +136,5 @@ class Target:
         return self.factor * slopes[self.column][self.run]
 
     def to_dict(self) -> dict[str, Any]:
-        """In plain values."""
+        """The target in plain values."""
         return {"path": self.path, "mode": self.mode, "metric": self.column, "value": self.value}

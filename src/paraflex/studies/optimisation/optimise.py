@@ -1,4 +1,4 @@
-"""The design whose metrics are least."""
+"""Optimisation: the design with the least objective."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _DIFFERENCE = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class OptimisationResult(SearchResult):
-    """Where an optimisation stands after a session: see `SearchResult`; its history tells objectives.
+    """State of an optimisation after a session: see `SearchResult`; its history has objectives.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Metrics that count."""
+        """Metrics of the objective and its limits."""
         return self.objective.columns
 
     def sought(self) -> dict[str, Any]:
@@ -83,7 +83,7 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
         on_progress: OnProgress | None = None,
         run: RunTask | None = None,
     ) -> OptimisationResult:
-        """Look for the design; see `Study.run`.
+        """Search for the design; see `Study.run`.
 
         The folder gets the table of all runs, `result.json` and `best.toml`. `run` is what is done for a task, the
         simulation unless given.
@@ -136,7 +136,7 @@ def optimise(
     on_progress: OnProgress | None = None,
     run: RunTask | None = None,
 ) -> OptimisationResult:
-    """Look for the design of a study, or of its file, whose objective is least.
+    """Search for the design of a study, or of its file, with the least objective.
 
     `study.run(folder)` in one call: see there and `Workers`.
     """
@@ -188,7 +188,7 @@ def _result(study: OptimisationStudy, folder: Path, session: Session) -> Optimis
 
 
 class _Watch:
-    """Tells how far an optimisation is, and the best objective until then."""
+    """Reports the progress of an optimisation, with the best objective so far."""
 
     def __init__(self, study: OptimisationStudy, on_progress: OnProgress | None) -> None:
         self.study, self.objective, self.on_progress = study, study.objective, on_progress
@@ -196,7 +196,7 @@ class _Watch:
         self.scales: Mapping[str, float] | None = None
 
     def __call__(self, evaluate: Evaluate, done: Evaluated) -> None:
-        """Take note of a design; the start is the first."""
+        """Record a design; the start is the first."""
         if self.on_progress is None:
             return
         if self.scales is None and done.complete:

@@ -1,4 +1,4 @@
-"""An optimisation as methods see it: functions on the unit cube that have a value everywhere."""
+"""An optimisation as functions on the unit cube that have a value everywhere."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ class DesignProblem:
         return self.evaluate([self.study.design(x)])[0]
 
     def scores(self, places: Sequence[Array]) -> list[float]:
-        """For methods without slopes: the objective; more than that for designs that pass limits or fail."""
+        """For methods without gradients: the objective, and more for designs that violate limits or fail."""
         return [self._score(design) for design in self.evaluate([self.study.design(x) for x in places])]
 
     def value(self, x: Array) -> float:
-        """For methods with slopes: the objective, and more than at the start beyond the designs that run."""
+        """For methods with gradients: the objective, and beyond the designs that run more than at the start."""
         design = self.at(x)
         if design.complete:
             return self.objective.value(design, self.scales)
@@ -81,7 +81,7 @@ class DesignProblem:
         return _REFUSED * self.cost * away / (float(np.linalg.norm(away)) or 1.0)
 
     def room(self, x: Array) -> Array:
-        """How far metrics are below their limits, (limits,); none where the design fails."""
+        """Distance of metrics from their limits, (limits,); none if the design fails."""
         design = self.at(x)
         return self.objective.room(design) if design.complete else np.full(len(self.objective.limits), -1.0)
 
@@ -102,7 +102,7 @@ class DesignProblem:
 
 
 def start_scales(study: DesignStudy[Result], objective: Objective, evaluate: Evaluate) -> Mapping[str, float]:
-    """What metrics are divided by.
+    """Divisors of metrics, from the start.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> Evaluated:
 
 
 def best_of(objective: Objective, scales: Mapping[str, float], designs: Sequence[Evaluated]) -> Evaluated | None:
-    """The complete design that holds all limits and has the least objective, or else the one that passes them least."""
+    """The complete design within all limits with the least objective, or else that with the least violation."""
 
     def rank(design: Evaluated) -> tuple[float, float, int]:
         violation = objective.violation(design)
@@ -149,5 +149,5 @@ def best_of(objective: Objective, scales: Mapping[str, float], designs: Sequence
 
 
 def holds_limits(objective: Objective, design: Evaluated) -> bool:
-    """Whether no limit is passed."""
+    """Whether no limit is violated."""
     return objective.violation(design) <= _HELD

@@ -1,4 +1,4 @@
-"""What every search for a design tells of itself, and writes in the end."""
+"""Base class of the results of searches for designs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _OF_SESSION = ("fresh", "seconds", "folder")
 
 @dataclass(frozen=True, kw_only=True)
 class SearchResult(KeptResult):
-    """Where a search stands after a session.
+    """State of a search after a session.
 
     Attributes
     ----------
@@ -68,24 +68,24 @@ class SearchResult(KeptResult):
 
     @property
     def complete(self) -> bool:
-        """Whether it came to its end."""
+        """Whether the search has ended."""
         return not self.interrupted
 
     def to_dict(self) -> dict[str, Any]:
-        """In plain values; without times and counts of a session, which are no results."""
+        """The result in plain values, without times and counts of a session."""
         out = {name: value for name, value in vars(self).items() if name not in _OF_SESSION}
         listed = {"history": [list(each) for each in self.history], "reasons": list(self.reasons)}
         return {"kind": self.kind} | out | listed
 
     def write(self, study: DesignStudy[Result], folder: Path) -> None:
-        """Write `result.json`, and the best design's mechanism where there is one."""
+        """Write `result.json`, and the model file of the best design if there is one."""
         write_json(folder / self.values_file, self.to_dict(), remedy=GO_ON)
         if self.values:
             write_best(folder, study, tuple(self.values.values()))
 
 
 def of_session(study: DesignStudy[Result], folder: Path, session: Session, best: Evaluated | None) -> dict[str, Any]:
-    """What a `SearchResult` holds of a session and its best design, but for the history."""
+    """Fields of a `SearchResult` from a session and its best design, without the history."""
     history, names = session.evaluate.history, study.setting.names
     reasons = [each.reason for each in history if not each.complete]
     return {
@@ -105,7 +105,7 @@ def of_session(study: DesignStudy[Result], folder: Path, session: Session, best:
 
 
 def at_bounds(study: DesignStudy[Result], design: Sequence[float]) -> dict[str, str]:
-    """Which numbers of a design are at an end of their range."""
+    """The numbers of a design that are at an end of their range."""
     places = dict(zip(study.setting.names, study.unit(design), strict=True))
     low = {name: "low" for name, place in places.items() if place < _AT_BOUND}
     return low | {name: "high" for name, place in places.items() if place > 1.0 - _AT_BOUND}

@@ -1,4 +1,4 @@
-"""The study file of a search for designs as pydantic sees it: a sweep's, and more."""
+"""The schema of a search's study file in pydantic: that of a sweep with further tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GradientsName = Literal["differences", "exact"]
 
 
 class ParameterTable(VaryTable):
-    """A parameter that is looked for."""
+    """A parameter of the search."""
 
     start: Number | None = Field(default=None, description="where the search starts; the file's number by default")
 
@@ -27,7 +27,7 @@ class AtMostTable(Table):
 
 
 class ObjectiveTable(Table):
-    """What is to be least."""
+    """The objective."""
 
     minimise: dict[str, Number] = Field(description="metrics and their weights")
     over: Literal["worst", "mean"] = Field(
@@ -38,7 +38,7 @@ class ObjectiveTable(Table):
 
 
 class TargetTable(Table):
-    """A number that is to be reproduced."""
+    """A number to be reproduced."""
 
     metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
     value: Number = Field(description="what it should be, in the metric's unit")
@@ -49,7 +49,7 @@ class TargetTable(Table):
 
 
 class SearchTable(Table):
-    """How it is looked for."""
+    """Settings of the search."""
 
     method: MethodName | None = Field(
         default=None,

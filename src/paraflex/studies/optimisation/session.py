@@ -1,4 +1,4 @@
-"""One session of a search: the folder held, workers had, rows written whatever ends it."""
+"""One session of a search: it locks the folder, starts workers, and writes rows however it ends."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Session:
-    """What a session of a search leaves.
+    """Results of a session of a search.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ def search(
     run: RunTask | None = None,
     result: Callable[[Session], R],
 ) -> R:
-    """Solve a study in a folder, which is held while it lasts.
+    """Solve a study in a folder, which is locked meanwhile.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def search(
 
 
 def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
-    """Columns of the table: a sweep's, and derivatives of the metrics that count where they are exact."""
+    """Columns of the table: those of a sweep, and exact derivatives of the metrics."""
     import pyarrow as pa
 
     schema = table_schema(study.setting, study.base.motors)
@@ -129,7 +129,7 @@ def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
 def sampled_start(
     study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[Evaluated]], Evaluated | None]
 ) -> Evaluated:
-    """The start, or what is best of it and the samples that the study wants looked at first."""
+    """The best of the start and the initial samples of the study."""
     number, asked = study.search.samples, [study.start]
     if number:
         points = designs(study.parameters, SOBOL, number, study.search.seed)
@@ -147,7 +147,7 @@ def _solved(evaluate: Evaluate, solve: Callable[[Evaluate], str]) -> str:
 
 
 def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | None:
-    """What is done for exact derivatives; None where differences are taken.
+    """Function for exact derivatives; None if differences are taken.
 
     Raises
     ------

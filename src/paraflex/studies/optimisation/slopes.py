@@ -1,4 +1,4 @@
-"""Derivatives of metrics by the place of a design in the unit cube: by differences, or exact ones of the runs."""
+"""Derivatives of metrics by the place of a design in the unit cube: differences, or exact derivatives of the runs."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ def slope_column(column: str, parameter: str) -> str:
 
 
 class Slopes(Protocol):
-    """Derivatives of the metrics that count."""
+    """Derivatives of the metrics of an objective or of targets."""
 
     def __call__(self, at: Evaluated) -> Mapping[str, Array]:
-        """By column (runs, parameters), at a design that is complete."""
+        """Derivatives by column (runs, parameters), at a complete design."""
         ...
 
 
 def slopes_of(study: DesignStudy[Result], evaluate: Evaluate) -> Slopes:
-    """Derivatives as a study asks for them: exact ones where the evaluation makes such."""
+    """Derivatives of the kind a study asks for; exact ones if the evaluation has them."""
     differing = Differences(study, evaluate)
     return differing if evaluate.run_slopes is None else ExactSlopes(study, evaluate, differing)
 
 
 class Differences:
-    """Central differences; their step is the study's, or chosen against the noise of its metrics.
+    """Central differences with the step of the study, or one adapted to the noise of its metrics.
 
     Noise is measured once, where derivatives are first asked for. The step that balances it against what a smooth
     metric bends by, if it bends by itself over a range, is its cubic root (Press et al., Numerical Recipes, 5.7).
@@ -85,7 +85,7 @@ class ExactSlopes:
 
 
 def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated) -> float:
-    """Largest noise of a metric that counts, as a part of its value: from designs close together on a line."""
+    """Largest relative noise of a metric, from designs close together on a line."""
     middle = study.unit(at.design)
     # Along the diagonal, inwards; as far in all as the least difference reaches.
     along = np.where(middle > 0.5, -1.0, 1.0) * 2.0 * _LEAST_STEP
@@ -102,7 +102,7 @@ def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated
 
 
 def differences(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated, step: float) -> Mapping[str, Array]:
-    """Central differences, all designs of them evaluated at once.
+    """Central differences, all of their designs evaluated at once.
 
     The step is a share of the range: long against what the choice of time steps makes of a metric, short against the
     metric's own bends. At a bound, and beside a design that fails, the difference is one-sided; beside two that fail
@@ -122,7 +122,7 @@ def differences(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated, s
 
 
 def _moved(study: DesignStudy[Result], at: Evaluated, k: int, place: float) -> tuple[float, ...]:
-    """A design with one of its numbers elsewhere in its range."""
+    """A design with one of its numbers changed within its range."""
     if place == study.unit(at.design)[k]:
         return at.design
     moved = study.design(np.full(len(at.design), place))[k]
@@ -130,7 +130,7 @@ def _moved(study: DesignStudy[Result], at: Evaluated, k: int, place: float) -> t
 
 
 def exact_slopes(study: DesignStudy[Result], at: Evaluated) -> Mapping[str, Array]:
-    """Derivatives that the rows hold; see `run_slopes`."""
+    """Derivatives in the rows; see `run_slopes`."""
     scale = study.per_unit(at.design)
     return {
         column: scale * np.array([[row[slope_column(column, name)] for name in study.setting.names] for row in at.rows])
@@ -144,7 +144,7 @@ def _has_slopes(study: DesignStudy[Result], at: Evaluated) -> bool:
 
 
 def no_exact_slopes(study: DesignStudy[Result]) -> str:
-    """Why a study has no exact derivatives; empty where it has."""
+    """Reason why a study has no exact derivatives; empty if it has."""
     from paraflex.designs.derivatives.plans import check_differentiable_study
 
     try:
@@ -161,7 +161,7 @@ def run_slopes(
     task: Task,
     watch: Callable[[float], None] | None = None,
 ) -> Outcome:
-    """Exact derivatives of some metrics, or why there are none, a row a mode.
+    """Exact derivatives of some metrics, or the reason why there are none, one row per mode.
 
     Parameters
     ----------

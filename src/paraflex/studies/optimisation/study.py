@@ -1,4 +1,4 @@
-"""A search for designs, read from its file: what a sweep has, where it starts, and what is looked for."""
+"""A search for designs, read from its file: a sweep's settings, the start, and the search."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Search:
-    """How a design is looked for.
+    """Settings of a search.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Search:
 
 @dataclass(frozen=True)
 class DesignStudy(Study[R_co]):
-    """A mechanism, the parameters that are free within bounds, and how they are looked for.
+    """A mechanism, parameters within bounds, and the settings of their search.
 
     Attributes
     ----------
@@ -84,17 +84,17 @@ class DesignStudy(Study[R_co]):
 
     @property
     def name(self) -> str:
-        """Of the study."""
+        """Name of the study."""
         return self.base.name
 
     @property
     def setting(self) -> Setting:
-        """What all runs have in common."""
+        """Common settings of all runs."""
         return self.base.setting
 
     @property
     def parameters(self) -> tuple[Varied, ...]:
-        """What is looked for, each with its range."""
+        """The parameters, each with its range."""
         return self.base.parameters
 
     @property
@@ -110,19 +110,19 @@ class DesignStudy(Study[R_co]):
     @property
     @abstractmethod
     def columns(self) -> tuple[str, ...]:
-        """Metrics that count."""
+        """Metrics of the objective or targets."""
 
     @abstractmethod
     def sought(self) -> dict[str, Any]:
-        """What is looked for, in plain values."""
+        """The objective or targets, in plain values."""
 
     def design(self, unit: Array) -> tuple[float, ...]:
-        """Numbers of a point of the unit cube, which the ranges are mapped to: logarithmic ones by the logarithm."""
+        """Numbers of a point of the unit cube, which maps to the ranges, to logarithmic ones by the logarithm."""
         inside = np.clip(unit, 0.0, 1.0)
         return tuple(_rounded(p, float(p.spread(x))) for p, x in zip(self.parameters, inside, strict=True))
 
     def unit(self, design: Sequence[float]) -> Array:
-        """Where a design is in the unit cube."""
+        """Place of a design in the unit cube."""
         return np.array([_share(p, value) for p, value in zip(self.parameters, design, strict=True)])
 
     def per_unit(self, design: Sequence[float]) -> Array:
@@ -134,7 +134,7 @@ class DesignStudy(Study[R_co]):
         return np.array(out)
 
     def content(self) -> dict[str, Any]:
-        """What the results depend on, in plain values; the limit of evaluations is left out, for it may be raised."""
+        """Everything that the results depend on, in plain values, without the limit of evaluations."""
         search = {name: value for name, value in vars(self.search).items() if name != "evaluations"}
         ranges = [[p.low, p.high, p.log] for p in self.parameters]
         sought = {"objective": None, "targets": []} | self.sought()
@@ -142,7 +142,7 @@ class DesignStudy(Study[R_co]):
 
 
 def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> SweepStudy:
-    """What is run, its one design the start; with the metrics that are kept anyway and those that count, by field."""
+    """The sweep of a search, with the start as its one design, the metrics always kept, and further ones by field."""
     for name, entry in table.vary.items():
         _check_range(f"vary.{name}", entry)
     for field, column in columns.items():
@@ -188,7 +188,7 @@ def _check_column(field: str, column: str, motors: tuple[str, ...]) -> None:
 
 
 def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given: float | None) -> float:
-    """Where a parameter starts: as the study says, else as the mechanism's file."""
+    """Start of a parameter: that of the study, else that of the mechanism's file."""
     field = f"vary.{parameter.name}.start"
     found = {number_at(setting.data, place) for place in places} if given is None else {given}
     if len(found) > 1:
@@ -219,14 +219,14 @@ def _share(parameter: Varied, value: float) -> float:
 
 
 def _rounded(parameter: Varied, value: float) -> float:
-    """A value to twelve digits, within the bounds: the last ones would only keep equal designs apart."""
+    """A value to twelve digits, within the bounds, so that equal designs do not differ by rounding."""
     assert parameter.low is not None
     assert parameter.high is not None
     return min(max(float(f"{value:.12g}"), parameter.low), parameter.high)
 
 
 def read_search(table: SearchTable) -> Search:
-    """How a design is looked for, as a file says it."""
+    """Settings of a search in a file."""
     for name in ("evaluations", "difference", "tolerance"):
         value = getattr(table, name)
         if value is not None and not value > 0:

@@ -1,1 +1,1 @@
-"""Sensitivities: derivatives of what runs are judged by, by any numbers of the mechanism's file."""
+"""Sensitivities: derivatives of metrics by any numbers of the mechanism's file."""

@@ -25,6 +25,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.findings import Verdict
 from paraflex.folders import SENSITIVITY
 from paraflex.mechanism.quantities import known
+from paraflex.results.spreadsheet import spreadsheet_text
 from paraflex.results.summary import finite_or_none
 from paraflex.writing import whole_file
 
@@ -84,7 +85,7 @@ class Sensitivities(Result):
 
     @property
     def complete(self) -> bool:
-        """True: one that lacks a derivative is an error instead."""
+        """Always True: a missing derivative is an error."""
         return True
 
     @property
@@ -113,7 +114,7 @@ class Sensitivities(Result):
 
     @property
     def relative(self) -> Array:
-        """Elasticities (rows, metrics, parameters): how many per cent a metric changes by with one of a parameter.
+        """Elasticities (rows, metrics, parameters): change of a metric in per cent per per cent of a parameter.
 
         NaN where the metric is zero.
         """
@@ -126,7 +127,7 @@ class Sensitivities(Result):
         return self.data.drop_vars("residual").to_dataframe(dims).reset_index().reindex(columns=list(_COLUMNS))
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain values; None for what is no number."""
+        """All results as plain values; None for NaN and infinity."""
         parameters = zip(self.parameters, self.nominal, self.fields, strict=True)
         return {
             "content": self.content,
@@ -151,7 +152,8 @@ class Sensitivities(Result):
         super().write_files(folder)
         lines = self.to_frame()
         with whole_file(folder / TABLE) as unfinished:
-            lines.to_csv(unfinished, index=False)
+            cells = lines.map(lambda cell: spreadsheet_text(cell) if isinstance(cell, str) else cell)
+            cells.to_csv(unfinished, index=False)
         with whole_file(folder / LINES) as unfinished:
             _to_parquet(lines, unfinished)
 
@@ -166,7 +168,7 @@ class Sensitivities(Result):
 
 @dataclass(frozen=True)
 class SensitivityStudy(Study[Sensitivities]):
-    """What is differentiated by what.
+    """The runs, metrics and parameters of a sensitivity study.
 
     Attributes
     ----------
@@ -184,7 +186,7 @@ class SensitivityStudy(Study[Sensitivities]):
     at: Mapping[str, float] = field(default_factory=dict)
 
     def content(self) -> str:
-        """A digest of all that the results depend on."""
+        """A digest of everything that the results depend on."""
         setting = self.setting
         places = [[list(place) for place in places] for places in setting.places]
         asked = [setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics]
@@ -293,7 +295,7 @@ def _values(setting: Setting, at: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def _size(parameter: Varied, value: float) -> float | None:
-    """What steps are parts of, where the value is zero: the parameter's range, if it has one."""
+    """Size for the steps of a parameter whose value is zero: its range, if it has one."""
     if value != 0.0 or parameter.low is None or parameter.high is None:
         return None
     return parameter.high - parameter.low

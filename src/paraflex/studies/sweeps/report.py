@@ -1,4 +1,4 @@
-"""The report of a study's folder: its rows, and the best of its runs made again to be seen in motion."""
+"""The report of a study's folder: its rows, and its best runs repeated for the animation."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
 def _again(
     study: StudyFolder, designs: DesignTable, picked: Sequence[Picked]
 ) -> tuple[dict[int, xr.Dataset], dict[int, str], list[int]]:
-    """The picked runs, why some cannot be made, and which come out otherwise than their rows say."""
+    """The picked runs, reasons why some failed, and those whose results differ from their rows."""
     if not picked:
         return {}, {}, []
     compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism)
@@ -157,7 +157,7 @@ def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> l
 
 
 def _found(file: Path) -> Mapping[str, Any]:
-    """What a search found; empty of a sweep."""
+    """Result of a search; empty for a sweep."""
     if not file.is_file():
         return {}
     try:
@@ -168,13 +168,13 @@ def _found(file: Path) -> Mapping[str, Any]:
 
 
 def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool]]:
-    """Number, objective and whether limits hold, where what was found tells all three."""
+    """Number, objective and whether limits hold, if the result has all three."""
     steps = found.get("history") or []
     return [tuple(step) for step in steps if len(step) == 3]
 
 
 def _searched(designs: DesignTable, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:
-    """The runs of the design that a search found and of its start, and some of the best by single metrics."""
+    """Runs of the best design of a search and of its start, and some of the best by single metrics."""
     out: dict[int, list[str]] = {}
     for key, why in (("values", "what was sought"), ("start", "the start")):
         design = found.get(key) or {}
