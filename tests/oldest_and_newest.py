@@ -24,9 +24,9 @@ TOOLS = ("pytest", "psutil")
 
 
 def oldest(requirements: list[str]) -> list[str]:
-    """Pins of the releases from which on a package is said to do: numpy>=2.0 is numpy==2.0.*."""
+    """Pins of the releases from which on a package is said to do: numpy>=2.0 is numpy~=2.0.0, the newest of 2.0."""
     found = (re.fullmatch(r"([\w.-]+)>=([\d.]+)", each) for each in requirements)
-    return [f"{one[1]}=={one[2]}.*" for one in found if one is not None]
+    return [f"{one[1]}~={one[2]}{'.0' * (one[2].count('.') < 2)}" for one in found if one is not None]
 
 
 def pins(which: str) -> list[str]:

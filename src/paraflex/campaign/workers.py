@@ -134,9 +134,13 @@ class Processes(Engine):
 
     def close(self, *, abandon: bool = False) -> None:
         """See `Engine`."""
-        for process in list((self._pool._processes or {}).values()) if abandon else []:
-            process.terminate()
-        super().close()
+        if not abandon:
+            super().close()
+            return
+        for process in list((self._pool._processes or {}).values()):
+            process.kill()
+        # Threads of the pool may wait for ever for workers that are gone.
+        self._pool.shutdown(wait=False, cancel_futures=True)
 
     def _start(self) -> ProcessPoolExecutor:
         # Not forked: threads of this process may hold locks.
