@@ -42,6 +42,8 @@ LIMIT = 60.0
 MEMORY = 8 * 2**30
 # Steps of a run: what is tried is whether it ends well, not whether it comes far.
 STEPS = 300
+# Motions along paths are planned every millisecond: longer ones [s] take as long as was asked for, as do more samples.
+LONGEST, MOST_SAMPLES = 60.0, 5000
 # Ends that are no failures.
 GOOD = ("fine", "refused", "stopped")
 
@@ -211,6 +213,8 @@ def _run(case: Case, file: Path) -> str:
     model = pf.load(file)
     study = model.study
     options = study.integration({"max_steps": STEPS})
+    if _asks_for_much(model):
+        return ""
     if model.paths:
         task = model.plan(warning=False)
         runs = TrackingStudy(task, model.modes()[:2], options, {}, error=study.error)
@@ -234,6 +238,12 @@ def _run(case: Case, file: Path) -> str:
         if name in data and not _finite(data[name].values):
             return f"{name} of a complete run is not finite"
     return ""
+
+
+def _asks_for_much(model: Any) -> bool:
+    """Whether a run is so long, or keeps so many samples, that it may take minutes: that is no hang."""
+    duration = model.duration(model.path()) if model.paths else 0.0
+    return LONGEST < duration < math.inf or model.study.samples > MOST_SAMPLES
 
 
 def _study(case: Case, file: Path) -> str:

@@ -36,7 +36,7 @@ def test_a_seed_gives_the_same_case_and_every_change_occurs():
     texts = mutations.originals(mutations.MODELS)
     cases = [mutations.mutated(seed, texts) for seed in range(400)]
     assert cases[:50] == [mutations.mutated(seed, texts) for seed in range(50)]
-    assert len({case.content for case in cases}) > 390
+    assert len({case.content for case in cases}) > 380
     done = {change.partition("(")[0] for case in cases for change in case.changes}
     changes = (*mutations._DATA_CHANGES, *mutations._NUMBERS, *mutations._TEXT_CHANGES)
     assert done >= {change.__name__ for change in changes}

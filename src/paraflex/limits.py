@@ -32,7 +32,9 @@ EXPRESSION_LETTERS = 200
 # Parameters that are given by one another in a row: a chain of more is made by a program, which can put in numbers.
 PARAMETER_CHAIN = 100
 # Elements of a beam: results converge with ten, and its modes come from a dense matrix of four rows an element.
-ELEMENTS = 200
+ELEMENTS = 64
+# The shortest run [s]: in a picosecond nothing of a mechanism has moved, and its fifth power is still a number.
+SHORTEST = 1e-12
 # Shape functions of a bar: the tenth sine is far above what a motion excites.
 SHAPE_FUNCTIONS = 100
 # Samples of a run: an hour at 250 Hz; of fifty coordinates they take a gigabyte.

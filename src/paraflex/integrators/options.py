@@ -12,7 +12,7 @@ from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators.events import Event
 from paraflex.integrators.methods import Method, MethodField, Treatment
-from paraflex.limits import SAMPLES, at_most
+from paraflex.limits import SAMPLES, SHORTEST, at_most
 
 # A tolerance beyond this part of the mechanism's size is doubted: at a fifth the five-bar's tracking error is half as
 # large again.
@@ -165,6 +165,9 @@ def check_times(duration: float | None, samples: int | None) -> None:
     """
     if duration is not None and not (math.isfinite(duration) and duration > 0.0):
         raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
+    if duration is not None and duration < SHORTEST:
+        remedy = f"give it in seconds, at least {SHORTEST:g}"
+        raise InputError("too short for a run", field="duration", value=duration, remedy=remedy)
     if samples is not None and samples < 2:
         raise InputError("too few samples", field="samples", value=samples, remedy="ask for at least 2")
     at_most(samples or 0, SAMPLES, "samples", "too many samples")
