@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from paraflex.designs.run import FAILED, Outcome, lost
+from paraflex.designs.run import STATUS_FAILED, Outcome, lost
 
 STUDY = """
 mechanism = "raparm_i"
@@ -46,7 +46,7 @@ def made_up(**metrics):
                 row |= {name: formula(row["mode"], *task.values) for name, formula in metrics.items()}
                 row |= {"status": "complete", "time_reached": 0.15}
             except ValueError as error:
-                row |= {"status": FAILED, "reason": str(error)}
+                row |= {"status": STATUS_FAILED, "reason": str(error)}
         run.designs.append(task.values)
         return Outcome(task, rows)
 

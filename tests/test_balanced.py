@@ -172,7 +172,7 @@ def test_large_systems_find_the_same_balance(monkeypatch):
         frictions=(JointFriction("dry", "B", 0.3, 1e-2),),
     )
     _, _, dense = start_of(mechanism)
-    monkeypatch.setattr(equilibria, "_DENSE", 0)
+    monkeypatch.setattr(equilibria, "_MOST_DENSE", 0)
     monkeypatch.setattr(projection, "DENSE_ROWS", 0)
     _, _, sparse = start_of(mechanism)
     np.testing.assert_allclose(sparse.q, dense.q, rtol=0, atol=1e-11)

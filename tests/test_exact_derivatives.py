@@ -7,7 +7,7 @@ import twins
 from paraflex.designs.derivatives.changes import Change
 from paraflex.designs.derivatives.plans import given, nominal_values, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
-from paraflex.designs.derivatives.steps import STEP, complex_step, part, with_fields
+from paraflex.designs.derivatives.steps import COMPLEX_STEP, complex_step, part, with_fields
 from paraflex.designs.run import Task, plan_task
 from paraflex.dynamics import build_system, numbers_of
 from paraflex.errors import InputError
@@ -68,7 +68,7 @@ def cantilever(length=1.0, modulus=70e9, thickness=5e-3, density=2700.0, conditi
 def elasticities(**moved):
     """Of the squares of frequencies, by one number of the cantilever."""
     ((name, value),) = moved.items()
-    omega = modal_basis(cantilever(**{name: np.complex128(complex(value, STEP * value))})).omega
+    omega = modal_basis(cantilever(**{name: np.complex128(complex(value, COMPLEX_STEP * value))})).omega
     return part(omega**2) / omega.real**2
 
 
@@ -85,7 +85,7 @@ def test_frequencies_of_a_beam_by_its_numbers():
 
 @pytest.mark.parametrize("condition", ReferenceCondition)
 def test_every_reference_condition(condition):
-    omega = modal_basis(cantilever(length=np.complex128(1.0 + 1j * STEP), condition=condition)).omega
+    omega = modal_basis(cantilever(length=np.complex128(1.0 + 1j * COMPLEX_STEP), condition=condition)).omega
     near = [modal_basis(cantilever(length=1.0 + place, condition=condition)).omega for place in STENCIL.places]
     assert part(omega) == pytest.approx(STENCIL.derivative(near).value, rel=1e-10)
 
@@ -113,11 +113,11 @@ def test_eigenpairs_with_a_complex_step():
     rng = np.random.default_rng(5)
     A, B, dK, dM = rng.standard_normal((4, 6, 6))
     K, M, dK, dM = A @ A.T + 6.0 * np.eye(6), B @ B.T + 6.0 * np.eye(6), dK + dK.T, dM + dM.T
-    values, V = eigenpairs(K + 1j * STEP * dK, M + 1j * STEP * dM)
-    left = (K + 1j * STEP * dK) @ V - (M + 1j * STEP * dM) @ V * values
+    values, V = eigenpairs(K + 1j * COMPLEX_STEP * dK, M + 1j * COMPLEX_STEP * dM)
+    left = (K + 1j * COMPLEX_STEP * dK) @ V - (M + 1j * COMPLEX_STEP * dM) @ V * values
     assert np.abs(left.real).max() < 1e-12
     assert np.abs(part(left)).max() < 1e-11
-    assert np.abs(part(V.T @ (M + 1j * STEP * dM) @ V)).max() < 1e-12
+    assert np.abs(part(V.T @ (M + 1j * COMPLEX_STEP * dM) @ V)).max() < 1e-12
 
 
 def test_modes_of_one_frequency():
@@ -135,14 +135,14 @@ def test_assumed_modes():
         shapes = AssumedShapes(length, (Sine(1), Sine(2), Polynomial((0.0, 0.0, 1.0, -1.0))), (Polynomial((0.0, 1.0)),))
         return assumed_integrals(shapes, SpanProperties(0.4, 1e7, 20.0))
 
-    found = modal_basis(integrals(np.complex128(0.5 + 1j * STEP))).omega
+    found = modal_basis(integrals(np.complex128(0.5 + 1j * COMPLEX_STEP))).omega
     near = [modal_basis(integrals(0.5 + place)).omega for place in 0.25 * np.array(STENCIL.places)]
     assert part(found) == pytest.approx(4.0 * STENCIL.derivative(near).value, rel=1e-10)
 
 
 def test_assumed_modes_in_a_system():
     bar = AssumedModesBeam("bar", 0.5, Section(1e-4, 1e-9), Material(70e9, 2700.0), (Sine(1), Sine(2)))
-    stepped = with_fields(bar, length=np.complex128(0.5 + 1j * STEP))
+    stepped = with_fields(bar, length=np.complex128(0.5 + 1j * COMPLEX_STEP))
     assert np.iscomplexobj(stepped.integrals.K)
     assert part(stepped.integrals.m) == pytest.approx(0.27)
 

@@ -71,7 +71,7 @@ def test_torques_that_no_spline_follows(monkeypatch):
     model = pf.load("five_bar")
     task = pf.plan(model.mechanism, model.path("square"), duration=0.02, samples=5)
     # No accuracy is fine enough for these, as where torques have a pole.
-    monkeypatch.setattr(feed_forward, "_ACCURACY", 0.0)
+    monkeypatch.setattr(feed_forward, "_SPLINE_ERROR", 0.0)
     with pytest.raises(
         NumericalError, match=r'the torques of mode "\+\+" rise too steeply to be interpolated'
     ) as caught:

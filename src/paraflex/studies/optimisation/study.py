@@ -16,7 +16,7 @@ from paraflex.designs.measure import check_metric, metric_of
 from paraflex.designs.overlay import Place, number_at
 from paraflex.designs.samples import RANDOM, Varied
 from paraflex.designs.schema import SamplingTable
-from paraflex.designs.setting import Setting
+from paraflex.designs.setting import INTEGRATION, Setting
 from paraflex.designs.sweep import SweepStudy, make_study
 from paraflex.errors import InputError, suggestion
 from paraflex.limits import DESIGNS, at_most
@@ -188,10 +188,20 @@ def _check_column(field: str, column: str, motors: tuple[str, ...]) -> None:
         raise InputError("not a metric per motor", field=field, value=column, remedy=f'say "{metric.name}"')
 
 
+def _nominal(setting: Setting, place: Place, field: str) -> float:
+    """The number at a place of the mechanism's file, or of the study's own [integration]."""
+    if place[0] != INTEGRATION:
+        return number_at(setting.data, place)
+    value = setting.integration.get(str(place[1]))
+    if value is None:
+        raise InputError("the study's [integration] has no such number", field=field, remedy="give a start")
+    return float(value)
+
+
 def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given: float | None) -> float:
     """Start of a parameter: that of the study, else that of the mechanism's file."""
     field = f"vary.{parameter.name}.start"
-    found = {number_at(setting.data, place) for place in places} if given is None else {given}
+    found = {_nominal(setting, place, field) for place in places} if given is None else {given}
     if len(found) > 1:
         values = sorted(found)
         raise InputError(
