@@ -118,11 +118,14 @@ def test_figures_and_reports_made_later_belong_to_the_results(paraflex, monkeypa
     paraflex("plot", "here", "tracking_errors", "--format", "pdf")
     paraflex("report", "here")
     (drawn,) = Path("here/figures").glob("*.pdf")
+    paraflex("export", "here", "--to", "mat")
     after = json.loads(Path("here/manifest.json").read_text(encoding="utf-8"))
     assert after["identity"] == before["identity"]
     new = set(after["files"]) - set(before["files"])
     assert "report.html" in new
-    assert new == {"report.html", f"figures/{drawn.name}"}
+    assert new == {"report.html", f"figures/{drawn.name}", "export/results.mat"}
+    paraflex(*RUN, "--out", "here")
+    assert not Path("here/export").exists()
 
 
 def test_sensitivities_made_again_are_named(paraflex, monkeypatch, tmp_path):

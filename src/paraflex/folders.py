@@ -63,7 +63,7 @@ class Manifest:
     kind : str
         Of KINDS.
     identity : str
-        A digest of the results without their figures and report: the same wherever they are copied to.
+        A digest of the results without figures, report and exports: the same wherever they are copied to.
     files : mapping of str to str
         Digests of the bytes of all files, by their names within the folder ("figures/fig11_desired_path.png").
     """
@@ -75,7 +75,7 @@ class Manifest:
     @classmethod
     def of(cls, kind: str, files: Mapping[str, str]) -> Manifest:
         """The manifest of some files."""
-        numbers = [f"{name} {files[name]}" for name in sorted(files) if not _drawn(name)]
+        numbers = [f"{name} {files[name]}" for name in sorted(files) if not _is_derived(name)]
         return cls(kind, _digest("\n".join(numbers).encode()), dict(sorted(files.items())))
 
 
@@ -417,8 +417,9 @@ def _matches(name: str, patterns: Iterable[str]) -> bool:
     return any(fnmatch(name, pattern) for pattern in patterns)
 
 
-def _drawn(name: str) -> bool:
-    return name == _REPORT or name.startswith("figures/")
+def _is_derived(name: str) -> bool:
+    """Whether a file is made of the files of numbers, and can be made again."""
+    return name == _REPORT or name.startswith(("figures/", "export/"))
 
 
 def _digest(data: bytes) -> str:

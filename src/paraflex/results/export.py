@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
+from paraflex.folders import added_to
 from paraflex.results.parquet import read_parquet, write_parquet
 from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.results.storage import save_results
@@ -131,7 +133,7 @@ def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = Fals
     if to in ("mat", "netcdf"):
         file = output if single else output / f"results{ending}"
         _refuse([file], force)
-        with whole_file(file) as unfinished:
+        with _added(file) as unfinished:
             if to == "mat":
                 _write_mat({"results": matlab_struct(data)}, unfinished)
             else:
@@ -141,9 +143,16 @@ def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = Fals
     files = {name: output if single else output / f"{name}{ending}" for name in ([TIME_SERIES] if single else tables)}
     _refuse(list(files.values()), force)
     for name, file in files.items():
-        with whole_file(file) as unfinished:
+        with _added(file) as unfinished:
             _write_table(tables[name], unfinished, to, {key: _plain(value) for key, value in data.attrs.items()})
     return list(files.values())
+
+
+@contextmanager
+def _added(file: Path) -> Iterator[Path]:
+    """The name to write a file under, which becomes part of the results in whose folder it lies."""
+    with added_to(file.parent) as folder, whole_file(folder / file.name) as unfinished:
+        yield unfinished
 
 
 def _write_table(table: pd.DataFrame, file: Path, to: str, about: Mapping[str, str]) -> None:
@@ -237,7 +246,7 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
     file = output if output.suffix.lower() == ENDINGS[to] else output / f"results{ENDINGS[to]}"
     _refuse([file], force)
     found = read_parquet(source)
-    with whole_file(file) as unfinished:
+    with _added(file) as unfinished:
         if to == "csv":
             units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in found.schema}
             _write_csv(found, units, unfinished)
