@@ -158,7 +158,10 @@ class ResultsFolder:
     """
 
     def __init__(self, path: Path, kind: str, *, locks: bool = True, remedy: str = ELSEWHERE) -> None:
-        self.path, self.kind, self.locks, self.remedy = path, kind, locks, remedy
+        self.path: Path = path
+        self.kind: str = kind
+        self.locks: bool = locks
+        self.remedy: str = remedy
 
     @contextmanager
     def replaced(self, *, but: Sequence[str] = ()) -> Iterator[Path]:

@@ -81,7 +81,8 @@ class Verification(Result):
         whole run.
     """
 
-    kept_as, data_file = VERIFICATION, "verify.nc"
+    kept_as = VERIFICATION
+    data_file = "verify.nc"
     values_file = "verify.json"
     task: TrackingTask
     models: tuple[str, ...]

@@ -115,7 +115,8 @@ class MethodComparison(Result):
         Kept as provenance.
     """
 
-    kept_as, values_file = COMPARISON, "compare-methods.json"
+    kept_as = COMPARISON
+    values_file = "compare-methods.json"
     case: str
     mechanism: str
     duration: float

@@ -49,7 +49,8 @@ class StudyResult(Result):
         Whether the user stopped it.
     """
 
-    kept_as, data_file = RUN, "results.nc"
+    kept_as = RUN
+    data_file = "results.nc"
     values_file = "summary.json"
     dataset: xr.Dataset | None
     failed: dict[str, str]

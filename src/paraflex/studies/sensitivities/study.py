@@ -68,7 +68,8 @@ class Sensitivities(Result):
         What is doubtful about the design that the file describes.
     """
 
-    kept_as, values_file = SENSITIVITY, "sensitivity.json"
+    kept_as = SENSITIVITY
+    values_file = "sensitivity.json"
     name: str
     mechanism: str
     rows: tuple[tuple[str, str], ...]
