@@ -71,6 +71,7 @@ def killed_at(change, work):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_killed_at_any_change_of_a_file_the_results_are_the_old_or_the_new_ones(folder, tmp_path):
     found, change = [], 1
     while True:

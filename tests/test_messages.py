@@ -343,3 +343,10 @@ def test_a_search_needs_a_start(tmp_path):
         "[objective]\nminimise = { tracking_rms = 1.0 }\n"
     )
     assert "so that there is no start" in message(lambda: load_optimisation(file))
+    tolerances = (
+        file.read_text().replace('"ground.A1.0", "ground.A2.0"', '"integration.tolerance"').replace("-0.2", "1e-7")
+    )
+    file.write_text(tolerances)
+    assert "the study's [integration] has no such number; give a start" in message(lambda: load_optimisation(file))
+    file.write_text(tolerances + "[integration]\ntolerance = 1e-4\n")
+    assert load_optimisation(file).start == (1e-4,)
