@@ -14,6 +14,7 @@ from paraflex.folders import (
     MANIFEST,
     RUN,
     STUDY_OF_RUNS,
+    Manifest,
     added_to,
     check_listed,
     files_of,
@@ -23,6 +24,7 @@ from paraflex.folders import (
     lock_folder,
     read_manifest,
 )
+from paraflex.writing import write_json
 
 BEFORE = {"results.nc": "old", "summary.json": "old", "figures/a.png": "old", "figures/b.png": "old"}
 AFTER = {"results.nc": "new", "summary.json": "new", "figures/b.png": "new", "figures/c.png": "new"}
@@ -239,6 +241,21 @@ def test_a_reader_finishes_what_a_killed_writer_left_or_waits_for_a_living_one(f
             check_listed(folder / "results.nc")
     check_listed(folder / "results.nc")
     assert not ready.exists()
+
+
+@pytest.mark.parametrize("name", ["../mine.txt", "figures/../../mine.txt", "/mine.txt", "C:\\mine.txt", "..\\mine.txt"])
+def test_no_list_reaches_out_of_its_folder(folder, name):
+    mine = folder.parent / "mine.txt"
+    mine.write_text("mine")
+    name = str(mine) if name == "/mine.txt" else name
+    forged = Manifest.of(RUN, files_of(folder) | {name: "0"})
+    write_json(folder / MANIFEST, vars(forged))
+    with pytest.raises(InputError, match=r"manifest\.json: damaged: not a list of the folder's files"):
+        check_listed(folder / "results.nc")
+    replace(folder, AFTER)
+    write(folder / ".ready", {MANIFEST: (folder / MANIFEST).read_text(), "removed.json": json.dumps([name])})
+    check_listed(folder / "results.nc")
+    assert mine.read_text() == "mine"
 
 
 def test_what_is_in_the_way_is_named_before_anything_is_moved(folder):

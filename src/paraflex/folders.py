@@ -18,7 +18,7 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from importlib.metadata import version
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 from paraflex.errors import InputError, OutputError
 from paraflex.interrupts import uninterrupted
@@ -94,7 +94,8 @@ def read_manifest(folder: Path) -> Manifest | None:
     found = read_json(file, remedy)
     try:
         manifest = Manifest.of(found["kind"], found["files"])
-        if manifest.identity == found["identity"] and manifest.kind in KINDS:
+        whole = manifest.identity == found["identity"] and manifest.kind in KINDS
+        if whole and all(map(_is_inside, manifest.files)):
             return manifest
     except (KeyError, TypeError, AttributeError):
         pass
@@ -403,7 +404,7 @@ def _put(ready: Path, folder: Path) -> None:
             if name.as_posix() not in (MANIFEST, _REMOVED):
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 file.replace(folder / name)
-        for name in removed:
+        for name in filter(_is_inside, removed):
             (folder / name).unlink(missing_ok=True)
             with suppress(OSError):  # it holds other files, or is gone
                 (folder / name).parent.rmdir()
@@ -414,6 +415,12 @@ def _put(ready: Path, folder: Path) -> None:
 
 def _files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.rglob("*") if file.is_file())
+
+
+def _is_inside(name: str) -> bool:
+    """Whether a name in a list is of a file within the folder: others are never touched, whoever wrote the list."""
+    path = PureWindowsPath(name)  # which takes both slashes for what they are
+    return not path.anchor and ".." not in path.parts
 
 
 def _matches(name: str, patterns: Iterable[str]) -> bool:
