@@ -163,7 +163,7 @@ def silent(folder: Path) -> str:
         if not (folder / name).is_file():
             return f"{name} is listed and missing"
         try:
-            check_listed(folder / name)
+            check_listed(folder / name, "")
         except InputError as error:
             return str(error)
     listed = {*manifest.files, "manifest.json"}

@@ -348,7 +348,7 @@ def test_a_damaged_table_is_named(tmp_path):
     # ... and a journal of the table.
     journal.unlink()
     result.table.write_bytes(whole[:60])
-    with pytest.raises(InputError, match=r"results.parquet: damaged: .*delete it and run"):
+    with pytest.raises(InputError, match=r"results.parquet: damaged.*; .*delete it and run"):
         optimise(study, tmp_path / "out", run=made_up(tracking_rms=bowl))
 
 

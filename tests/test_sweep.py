@@ -311,6 +311,9 @@ def test_other_versions_do_not_mix(finished, tmp_path):
     said = read_json(tmp_path / "out" / "study.json")
     said["versions"]["numba"] = "0.1"
     write_json(tmp_path / "out" / "study.json", said)
+    with pytest.raises(InputError, match=r"study.json: damaged, or of other results"):
+        sweep(study, tmp_path / "out", run=stub)
+    (tmp_path / "out" / "manifest.json").unlink()
     with pytest.raises(InputError, match=r"begun with numba 0.1"):
         sweep(study, tmp_path / "out", run=stub)
 

@@ -347,7 +347,7 @@ def test_a_folder_without_rows_is_refused(finished, tmp_path):
     with pytest.raises(InputError, match="no run is done yet"):
         study_page(tmp_path)
     (tmp_path / "study.json").write_text('{"content": "x"}', encoding="utf-8")
-    with pytest.raises(InputError, match="not the study"):
+    with pytest.raises(InputError, match=r"not a study\.json of paraflex"):
         study_page(tmp_path)
 
 

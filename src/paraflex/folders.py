@@ -114,8 +114,14 @@ def kind_of_folder(folder: Path) -> str:
     return next((kind for kind, names in KINDS.items() if any((folder / name).is_file() for name in names)), "")
 
 
-def check_listed(file: Path) -> None:
-    """Check that a file is the one that the manifest of its folder lists; None where there is no manifest.
+def check_listed(file: Path, remedy: str) -> None:
+    """Check that a file is the one that the manifest of its folder lists; nothing is checked without a manifest.
+
+    Parameters
+    ----------
+    file : Path
+    remedy : str
+        Of the error.
 
     Raises
     ------
@@ -124,10 +130,8 @@ def check_listed(file: Path) -> None:
     """
     if _is_listed(file) or _is_listed(file):  # once more: another process may have replaced the results meanwhile
         return
-    raise InputError(
-        "not the file that the manifest beside it lists: damaged, or of other results", field=str(file),
-        remedy="copy the whole folder anew, or run the same command again",
-    )  # fmt: skip
+    why = "damaged, or of other results: not the file that the folder's manifest lists"
+    raise InputError(why, field=str(file), remedy=remedy)
 
 
 def _is_listed(file: Path) -> bool:

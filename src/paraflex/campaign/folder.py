@@ -111,8 +111,9 @@ def read_study(file: Path) -> dict[str, Any]:
     InputError
         It is damaged, cannot be read, or is none of ours.
     """
-    found = read_values(file, "delete it and run the same command again: it is written again")
-    check_listed(file)
+    remedy = "delete it and run the same command again: it is written again"
+    found = read_values(file, remedy)
+    check_listed(file, remedy)
     if not isinstance(found, dict) or "content" not in found:
         raise InputError("not the study of a campaign", field=str(file), remedy="name a new folder")
     return found

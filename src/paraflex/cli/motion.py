@@ -90,9 +90,11 @@ def _run_held(
     write_numbers(data, summary, folder)
     tell(summary, lambda out: _report(out, summary, data), as_json=request.json)
     finished = run.solution.status in DONE_STATUSES
-    if not finished:
-        console.print(f"error: {run.solution.message}", soft_wrap=True)
-    write_drawn_run(data, folder, request, began)
+    try:
+        write_drawn_run(data, folder, request, began)
+    finally:
+        if not finished:
+            console.print(f"error: {run.solution.message}", soft_wrap=True)
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 

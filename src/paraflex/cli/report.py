@@ -66,7 +66,7 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
 
 def _beside(file: Path) -> dict[str, Any]:
     numbers = read_json(file)
-    check_listed(file)
+    check_listed(file, "run the command again")
     if not isinstance(numbers.get("modes"), dict):
         raise InputError("is no summary that paraflex wrote", field=str(file), remedy="run the command again")
     return numbers

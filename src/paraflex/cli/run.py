@@ -106,8 +106,10 @@ def _run_along(
         validity(out, {name: mode.get("validity") for name, mode in summary["modes"].items()})
 
     tell(summary, show, as_json=request.json)
-    failures(console, result)
-    write_drawn_run(result.data, folder, request, began)
+    try:
+        write_drawn_run(result.data, folder, request, began)
+    finally:
+        failures(console, result)
     return exit_code(result.complete, interrupted=result.interrupted)
 
 

@@ -82,14 +82,16 @@ def _verify(
             print_agreement(out, summary, mode)
 
     tell(summary, show, as_json=request.json)
-    for mode, by_model in verification.runs.items():
-        for name, runs in by_model.items():
-            if runs.failure:
-                console.print(f'error: mode "{mode}", {name}: {runs.failure}', soft_wrap=True)
-    if data is not None:
-        write_drawn(data, folder, (lambda: verification_page(data, summary)) if request.report else None)
-        if not request.json:
-            say_where(began, "numbers, figures", folder.path, report=request.report)
+    try:
+        if data is not None:
+            write_drawn(data, folder, (lambda: verification_page(data, summary)) if request.report else None)
+            if not request.json:
+                say_where(began, "numbers, figures", folder.path, report=request.report)
+    finally:
+        for mode, by_model in verification.runs.items():
+            for name, runs in by_model.items():
+                if runs.failure:
+                    console.print(f'error: mode "{mode}", {name}: {runs.failure}', soft_wrap=True)
     return exit_code(verification.complete, interrupted=verification.interrupted)
 
 

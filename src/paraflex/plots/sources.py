@@ -88,8 +88,9 @@ def _format(file: Path) -> str:
 
 
 def _json(file: Path) -> Source:
-    found = read_values(file, "make these results again")
-    check_listed(file)
+    remedy = "make these results again"
+    found = read_values(file, remedy)
+    check_listed(file, remedy)
     kind = kind_of_numbers(found)
     if kind:
         searched = kind in ("optimisation", "identification", "indices")

@@ -49,7 +49,7 @@ def read_parquet(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
     import pyarrow.parquet as pq
 
     check_seal(file, _AGAIN)
-    check_listed(file)
+    check_listed(file, _AGAIN)
     try:
         names = None if columns is None else list(columns)
         table = pq.read_table(file, columns=names, page_checksum_verification=True)

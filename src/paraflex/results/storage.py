@@ -149,7 +149,7 @@ def _read(file: Path) -> xr.Dataset:
             remedy="name a results.nc that paraflex wrote",
         )  # fmt: skip
     check_seal(file, _AGAIN)
-    check_listed(file)
+    check_listed(file, _AGAIN)
     try:
         return xr.load_dataset(file, engine="netcdf4")
     # Of a damaged file without a seal the libraries raise whatever its bytes lead them to.

@@ -162,7 +162,7 @@ def _found(file: Path) -> Mapping[str, Any]:
     if not file.is_file():
         return {}
     found = read_json(file)
-    check_listed(file)
+    check_listed(file, "run the same command again")
     return found
 
 
