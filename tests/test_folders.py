@@ -221,6 +221,16 @@ def test_nothing_is_left_where_nothing_came_of_it(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_computed(folder, monkeypatch):
+    def forbidden(self, *_, **__):
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr("pathlib.Path.rmdir", forbidden)
+    said = r"^--out: cannot be written \(permission denied\) \(got .*\); choose another folder$"
+    with pytest.raises(OutputError, match=said), hold_folder(folder, RUN, field="--out"):
+        pytest.fail("computed")
+
+
 def test_two_writers_of_one_folder(folder):
     with hold_folder(folder, RUN):
         for writer in (lambda: replace(folder, AFTER), lambda: added_to(folder).__enter__()):

@@ -259,6 +259,12 @@ def hold_folder(
                     f"the folder holds other results, a {there}", field=field, value=str(path),
                     remedy=f"name another folder{'' if force is None else ', or say --force to replace them'}",
                 )  # fmt: skip
+            try:
+                shutil.rmtree(path / _NEW, ignore_errors=True)
+                (path / _NEW).mkdir()
+                (path / _NEW).rmdir()
+            except OSError as error:
+                raise no_folder(path, error, field) from error
             yield ResultsFolder(path, kind, locks=locks, remedy=remedy)
     finally:
         _remove_empty(path, made)
