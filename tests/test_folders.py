@@ -114,7 +114,7 @@ def test_broken_off_it_leaves_what_was_there(folder, error):
 
 
 def test_ctrl_c_waits_until_all_files_are_in_their_place(folder, monkeypatch):
-    import paraflex.folders as module
+    import paraflex.folders.changes as module
 
     put = module._put
 
@@ -244,7 +244,7 @@ def test_a_reader_finishes_what_a_killed_writer_left_or_waits_for_a_living_one(f
     write(ready, {"summary.json": "new", "removed.json": "[]"})
     manifest = json.loads((folder / MANIFEST).read_text())
     (ready / MANIFEST).write_text(json.dumps(manifest))
-    monkeypatch.setattr("paraflex.folders._PATIENCE", 0.1)
+    monkeypatch.setattr("paraflex.folders.lock._PATIENCE", 0.1)
     with lock_folder(folder):
         write(ready, {"removed.json": "[]", MANIFEST: json.dumps(manifest)})
         with pytest.raises(InputError, match="another process writes to it"):
@@ -266,6 +266,9 @@ def test_no_list_reaches_out_of_its_folder(folder, name):
     write(folder / ".ready", {MANIFEST: (folder / MANIFEST).read_text(), "removed.json": json.dumps([name])})
     check_listed(folder / "results.nc", "again")
     assert mine.read_text() == "mine"
+    write(folder / ".ready", {MANIFEST: (folder / MANIFEST).read_text(), "removed.json": "["})
+    with pytest.raises(InputError, match=r"removed\.json: damaged: .*; delete the folder \.ready"):
+        check_listed(folder / "results.nc", "again")
 
 
 def test_what_is_in_the_way_is_named_before_anything_is_moved(folder):

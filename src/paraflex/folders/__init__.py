@@ -1,0 +1,27 @@
+"""Folders of results: a manifest lists the files that belong together, and they are replaced whole or not at all.
+
+Whoever opens a folder next moves what is left to move, should the writer be killed.
+"""
+
+from paraflex.folders.changes import MANIFEST as MANIFEST
+from paraflex.folders.held import ResultsFolder as ResultsFolder, added_to as added_to, hold_folder as hold_folder
+from paraflex.folders.lock import (
+    LOCK as LOCK,
+    FolderInUseError as FolderInUseError,
+    finish_change as finish_change,
+    lock_folder as lock_folder,
+)
+from paraflex.folders.manifest import (
+    COMPARISON as COMPARISON,
+    KINDS as KINDS,
+    RUN as RUN,
+    SENSITIVITY as SENSITIVITY,
+    STUDY_OF_RUNS as STUDY_OF_RUNS,
+    VERIFICATION as VERIFICATION,
+    Manifest as Manifest,
+    check_listed as check_listed,
+    files_of as files_of,
+    foreign_files as foreign_files,
+    kind_of_folder as kind_of_folder,
+    read_manifest as read_manifest,
+)

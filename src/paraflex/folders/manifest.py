@@ -1,0 +1,173 @@
+"""What belongs to a folder of results: its manifest, the kinds of results, files that are not of paraflex."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from paraflex.errors import InputError
+from paraflex.folders.changes import MANIFEST, NEW, READY, files_in, is_inside
+from paraflex.folders.lock import LOCK, finish_change
+from paraflex.seals import damaged
+from paraflex.writing import read_json
+
+# So much of a file is held at once [bytes].
+_PIECE = 1 << 20
+
+# Kinds of results, and by which files a folder without a manifest, of an earlier release, is known to hold them.
+RUN = "run"
+VERIFICATION = "verification"
+COMPARISON = "comparison of methods"
+SENSITIVITY = "sensitivity"
+STUDY_OF_RUNS = "study of many runs"
+KINDS: Mapping[str, tuple[str, ...]] = {
+    STUDY_OF_RUNS: ("study.json", "journal.sqlite", "results.parquet"),
+    VERIFICATION: ("verify.json", "verify.nc"),
+    COMPARISON: ("compare-methods.json",),
+    SENSITIVITY: ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
+    RUN: ("summary.json", "results.nc"),
+}
+# What else a study of many runs keeps, listed or not: they come and go while it runs.
+_OF_STUDY = (
+    "journal.sqlite*", "parts/*", "trajectories/*", "unfinished.parquet", "results.csv", "result.json", "summary.json",
+    "best.toml", "indices.*", "report.html",
+)  # fmt: skip
+_REPORT = "report.html"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What belongs together in a folder.
+
+    Attributes
+    ----------
+    kind : str
+        Of KINDS.
+    identity : str
+        A digest of the results without figures, report and exports: the same wherever they are copied to.
+    files : mapping of str to str
+        Digests of the bytes of all files, by their names within the folder ("figures/fig11_desired_path.png").
+    """
+
+    kind: str
+    identity: str
+    files: Mapping[str, str]
+
+    @classmethod
+    def of(cls, kind: str, files: Mapping[str, str]) -> Manifest:
+        """The manifest of some files."""
+        numbers = [f"{name} {files[name]}" for name in sorted(files) if not _is_derived(name)]
+        return cls(kind, _digest("\n".join(numbers).encode()), dict(sorted(files.items())))
+
+
+def read_manifest(folder: Path) -> Manifest | None:
+    """The manifest of a folder; None where there is none.
+
+    Raises
+    ------
+    InputError
+        It is damaged.
+    """
+    file = folder / MANIFEST
+    if not file.is_file():
+        return None
+    remedy = "run the same command again; or delete this file, and others are read without it"
+    found = read_json(file, remedy)
+    try:
+        manifest = Manifest.of(found["kind"], found["files"])
+        whole = manifest.identity == found["identity"] and manifest.kind in KINDS
+        if whole and all(map(is_inside, manifest.files)):
+            return manifest
+    except (KeyError, TypeError, AttributeError):
+        pass
+    raise damaged(file, "not a list of the folder's files", remedy)
+
+
+def kind_of_folder(folder: Path) -> str:
+    """Which kind of results a folder holds; empty where none of ours."""
+    finish_change(folder)
+    try:
+        manifest = read_manifest(folder)
+    except InputError:
+        manifest = None
+    if manifest is not None:
+        return manifest.kind
+    return next((kind for kind, names in KINDS.items() if any((folder / name).is_file() for name in names)), "")
+
+
+def check_listed(file: Path, remedy: str) -> None:
+    """Check that a file is the one that the manifest of its folder lists; nothing is checked without a manifest.
+
+    Parameters
+    ----------
+    file : Path
+    remedy : str
+        Of the error.
+
+    Raises
+    ------
+    InputError
+        It is damaged, or belongs to other results than the files beside it.
+    """
+    if _is_listed(file) or _is_listed(file):  # once more: another process may have replaced the results meanwhile
+        return
+    why = "damaged, or of other results: not the file that the folder's manifest lists"
+    raise InputError(why, field=str(file), remedy=remedy)
+
+
+def files_of(folder: Path) -> dict[str, str]:
+    """The files of a folder that paraflex wrote, with the digests of its manifest; empty where it lists none."""
+    try:
+        manifest = read_manifest(folder)
+    except InputError:
+        manifest = None
+    kind = kind_of_folder(folder)
+    found = {} if manifest is not None else dict.fromkeys((*KINDS.get(kind, ()), *([_REPORT] if kind else ())), "")
+    if kind == STUDY_OF_RUNS:
+        each = (file.relative_to(folder).as_posix() for pattern in _OF_STUDY for file in folder.glob(pattern))
+        found |= dict.fromkeys(each, "")
+    found |= {} if manifest is None else manifest.files
+    return {name: digest for name, digest in found.items() if (folder / name).is_file()}
+
+
+def foreign_files(folder: Path) -> list[str]:
+    """Files of a folder that paraflex did not write; what lies in folders of other results is theirs."""
+    ours = files_of(folder)
+    inner = {name.partition("/")[0] for name in ours if "/" in name}
+    entries = [entry for entry in sorted(folder.iterdir()) if entry.name not in (MANIFEST, LOCK, NEW, READY)]
+    found = [file for entry in entries if entry.name in inner for file in files_in(entry)]
+    found += [entry for entry in entries if entry.name not in inner and not (entry.is_dir() and kind_of_folder(entry))]
+    return [name for name in (each.relative_to(folder).as_posix() for each in found) if name not in ours]
+
+
+def digest_of(file: Path, *, sync: bool = False) -> str:
+    """The digest of a file's bytes, which are on the disk afterwards where that is asked for."""
+    with file.open("rb+" if sync else "rb") as opened:
+        if sync:
+            os.fsync(opened.fileno())
+        digest = hashlib.blake2b(digest_size=16)
+        while piece := opened.read(_PIECE):
+            digest.update(piece)
+        return digest.hexdigest()
+
+
+def _is_listed(file: Path) -> bool:
+    for folder in file.absolute().parents[:2]:
+        finish_change(folder)
+        manifest = read_manifest(folder)
+        if manifest is not None:
+            wanted = manifest.files.get(file.absolute().relative_to(folder).as_posix())
+            return wanted is None or wanted == digest_of(file)
+    return True
+
+
+def _is_derived(name: str) -> bool:
+    """Whether a file is made of the files of numbers, and can be made again."""
+    return name == _REPORT or name.startswith(("figures/", "export/"))
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.blake2b(data, digest_size=16).hexdigest()
