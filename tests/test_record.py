@@ -1,8 +1,11 @@
 """What a run says of its links, whatever they are cut into."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
@@ -88,3 +91,14 @@ def test_a_motor_that_slides_without_a_path():
     np.testing.assert_allclose(data["motor_power"].sel(motor="push"), 4.5 * data["time"], rtol=1e-9)
     units = [data[name].attrs["units"] for name in ("motor_speed", "motor_power", "applied_torque")]
     assert units == ["m/s", "W", "N"]
+
+
+@pytest.mark.filterwarnings("ignore::paraflex.errors.ModelWarning")
+def test_a_body_both_of_whose_ends_are_in_one_place_turns_as_its_frame(tmp_path):
+    text = (Path(__file__).parents[1] / "benchmarks" / "fuzzed" / "everything.toml").read_text(encoding="utf-8")
+    (tmp_path / "one.toml").write_text(text.replace("position = [0.2, 0.0]", "position = [0.0, 0.0]"))
+    run = simulate_motion(pf.load(tmp_path / "one.toml"), 0.01, samples=3)
+    given = motion_dataset(run).sel(body="given")
+    assert np.ptp(given["angle"].values) > 1e-4
+    np.testing.assert_array_equal(given["chord_angle"], given["angle"])
+    np.testing.assert_array_equal(given["chord_velocity"], given["angular_velocity"])

@@ -192,15 +192,15 @@ def _end_markers(system: System, names: list[str]) -> tuple[Marker, ...]:
 
 
 def _chord(system: System, names: list[str], q: Array, v: Array) -> tuple[Array, Array]:
-    """Angle and rate of the line from a beam's first end to its last; a rigid body's own.
+    """Angle and rate of the line from a beam's first end to its last; a rigid body's own, or where both ends are one.
 
     Less the line's angle in the undeformed body, which is zero of a beam.
     """
     angle, ends = system.body(names[0]).angle, _end_markers(system, names)
-    if not ends:
+    x, y = ends[1].x0 - ends[0].x0 if ends else (0.0, 0.0)
+    if x == y == 0.0:
         return q[:, angle], v[:, angle]
     first, last = _ends(system, names, q, v)
-    x, y = ends[1].x0 - ends[0].x0
     offset = np.arctan2(y, x)
     line, rate = last.position - first.position, last.velocity - first.velocity
     chord, chord_rate = line_angle(line, rate, q[:, angle] + offset)
