@@ -215,7 +215,7 @@ def attack(name: str, place: Path, kills: int, full: int, chance: random.Random)
         sys.exit(f"{name} does not run:\n{log.read_text()}")
     changes, expected = int(counted.read_text()), content(whole)
     steps = [1 + (i * changes) // kills for i in range(kills)]
-    told: Counter[str] = Counter(changes=changes)
+    counts: Counter[str] = Counter(changes=changes)
     for i, at in enumerate(steps):
         out = place / f"{name}-{i}"
         again = i % 3 == 2
@@ -225,41 +225,41 @@ def attack(name: str, place: Path, kills: int, full: int, chance: random.Random)
             code = in_child(command(line, out), log, kill_after=chance.uniform(0.0, 1.1 * seconds))
         else:
             code = in_child(command(line, out, at=at), log)
-        told["killed"] += code == KILLED
-        look_and_repeat(name, f"kill {i}", out, log, expected, told)
+        counts["killed"] += code == KILLED
+        look_and_repeat(name, f"kill {i}", out, log, expected, counts)
     largest = max(file.stat().st_size for file in whole.rglob("*") if file.is_file())
     for i in range(full):
         out, limit = place / f"{name}-full-{i}", _LOG + int((largest - _LOG) * (i / full) ** 2)
         code = in_child(out_of_room(command(line, out), limit), log)
         said = log.read_text(errors="replace")
-        told["full"] += code == 2
+        counts["full"] += code == 2
         if code not in (0, 2) or "Traceback" in said or (code == 2 and "error: " not in said):
-            report(told, "error", f"{name}, no file over {limit} bytes: exit code {code}\n{said}")
-        look_and_repeat(name, f"no file over {limit} bytes", out, log, expected, told)
-    return told
+            report(counts, "error", f"{name}, no file over {limit} bytes: exit code {code}\n{said}")
+        look_and_repeat(name, f"no file over {limit} bytes", out, log, expected, counts)
+    return counts
 
 
-def look_and_repeat(name: str, how: str, out: Path, log: Path, expected: dict[str, Any], told: Counter[str]) -> None:
+def look_and_repeat(name: str, how: str, out: Path, log: Path, expected: dict[str, Any], counts: Counter[str]) -> None:
     """See whether readers are deceived by what a command left, run it again, and compare; the folder is gone then."""
     problem = silent(out) if out.exists() else ""
     if problem:
-        report(told, "silent", f"{name}, {how}: {problem}")
+        report(counts, "silent", f"{name}, {how}: {problem}")
     code = in_child(command(LINES[name], out), log)
     said = log.read_text(errors="replace")
     if code != 0 or "Traceback" in said:
-        report(told, "error", f"{name}, {how}: then exit code {code}\n{said}")
+        report(counts, "error", f"{name}, {how}: then exit code {code}\n{said}")
     elif (found := content(out)) != expected:
         files = [each for each in {*found, *expected} if found.get(each, 0) != expected.get(each, 0)]
-        report(told, "differs", f"{name}, {how}: {sorted(files)}")
+        report(counts, "differs", f"{name}, {how}: {sorted(files)}")
     left = [each.name for each in out.iterdir() if each.name in (".new", ".ready") or each.suffix == ".part"]
     if left:
-        report(told, "left", f"{name}, {how}: {left}")
+        report(counts, "left", f"{name}, {how}: {left}")
     shutil.rmtree(out)
 
 
-def report(told: Counter[str], what: str, text: str) -> None:
+def report(counts: Counter[str], what: str, text: str) -> None:
     """Count a failure and print it."""
-    told[what] += 1
+    counts[what] += 1
     print(f"{what}: {text}", flush=True)
 
 
@@ -286,8 +286,8 @@ def main() -> None:
             Path(f"{name}.toml").write_text(text, encoding="utf-8")
         for name in asked.only:
             began = time.perf_counter()
-            told = attack(name, Path(folder), asked.kills, asked.full, random.Random(f"{asked.seed} {name}"))
-            rows.append((name, *(told[head] for head in heads), f"{time.perf_counter() - began:.0f} s"))
+            counts = attack(name, Path(folder), asked.kills, asked.full, random.Random(f"{asked.seed} {name}"))
+            rows.append((name, *(counts[head] for head in heads), f"{time.perf_counter() - began:.0f} s"))
             print(*rows[-1], flush=True)
     print("\n" + "".join(f"{head:>16}" for head in ("command", *heads, "took")))
     for row in rows:

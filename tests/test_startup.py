@@ -73,6 +73,12 @@ def test_describing_the_library_imports_nothing_that_only_runs_need():
     assert python("-c", look, *unneeded) == []
 
 
+@pytest.mark.parametrize("command", ["run", "verify", "motion"])
+def test_commands_import_what_draws_once_there_are_numbers(command):
+    look = f"import sys; import paraflex.cli.{command}; print(*set(sys.argv) & set(sys.modules))"
+    assert python("-c", look, "matplotlib", "paraflex.report", "paraflex.plots.save") == []
+
+
 def test_imports_compile_nothing(tmp_path):
     kernels, signatures = python("-c", EVERYTHING, NUMBA_CACHE_DIR=str(tmp_path))[-1].split()
     assert int(kernels) > 50

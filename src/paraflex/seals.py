@@ -53,10 +53,14 @@ def check_seal(file: Path, remedy: str) -> None:
         with file.open("rb") as stream:
             whole = _is_whole(stream)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"cannot be read ({reason})", field=str(file), remedy="check its permissions") from error
+        raise unreadable(error, file) from error
     if not whole:
         raise damaged(file, "not as it was written", remedy)
+
+
+def unreadable(error: OSError, file: Path, remedy: str = "check its permissions") -> InputError:
+    """The error of a file that cannot be read, with the system's reason."""
+    return InputError(f"cannot be read ({error.strerror or error})", field=str(file), remedy=remedy)
 
 
 def damaged(file: Path, why: str, remedy: str) -> InputError:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError, OutputError
-from paraflex.seals import damaged, seal
+from paraflex.seals import damaged, seal, unreadable
 
 ELSEWHERE = "choose another folder"
 # Under which key a file of JSON has the digest of the others.
@@ -153,7 +153,7 @@ def read_values(file: Path, remedy: str) -> Any:
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror or error})", field=str(file), remedy=remedy) from error
+        raise unreadable(error, file, remedy) from error
     except (ValueError, RecursionError) as error:
         raise damaged(file, "not JSON to its end", remedy) from error
     if isinstance(found, dict) and _DIGEST in found and found.pop(_DIGEST) != _digest(found):

@@ -26,6 +26,7 @@ from paraflex.campaign.tables import (
     read_data as read_data,
     read_table as read_table,
     read_tables as read_tables,
+    table_name as table_name,
     tables_of as tables_of,
 )
 from paraflex.campaign.workers import (

@@ -14,7 +14,7 @@ import xarray as xr
 
 from paraflex.arguments import CheckedFields
 from paraflex.campaign.folder import STUDY
-from paraflex.campaign.tables import CSV, RESULTS, UNFINISHED, read_data
+from paraflex.campaign.tables import CSV, read_data, table_name
 from paraflex.campaign.workers import THREADS, Engine, open_engine
 from paraflex.display import Shown
 from paraflex.errors import InputError
@@ -149,7 +149,7 @@ class KeptResult(Result):
     @property
     def table(self) -> Path:
         """The one table, or that of the runs done while some are missing."""
-        return self.folder / (RESULTS if self.complete else UNFINISHED)
+        return self.folder / table_name(finished=self.complete)
 
     @property
     def data(self) -> xr.Dataset:

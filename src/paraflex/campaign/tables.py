@@ -34,6 +34,11 @@ _KEYS = ("run", "id", "design", "path", "mode")
 _ATTRIBUTES = {"unit": "units", "meaning": "comment"}
 
 
+def table_name(*, finished: bool) -> str:
+    """The file of the one table, or of the runs done while some are missing."""
+    return RESULTS if finished else UNFINISHED
+
+
 def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
     """Write a journal's rows as one table, `results.parquet` or, while more are to come, `unfinished.parquet`.
 
@@ -46,7 +51,7 @@ def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
     """
     import pyarrow as pa
 
-    file = folder / (RESULTS if finished else UNFINISHED)
+    file = folder / table_name(finished=finished)
     schema, held = _schema(journal), min(_HELD, _GROUP)
     pieces = _pieces(journal, held)
     with open_parquet(file, schema, remedy=GO_ON) as writer:

@@ -29,7 +29,6 @@ from paraflex.files import Model, load
 from paraflex.folders import VERIFICATION, ResultsFolder
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry
-from paraflex.report import verification_page
 from paraflex.studies import FIDELITIES, VerificationOptions, VerificationStudy, check_model
 
 
@@ -84,6 +83,8 @@ def _verify(
     tell(summary, show, as_json=request.json)
     try:
         if data is not None:
+            from paraflex.report import verification_page
+
             write_drawn(data, folder, (lambda: verification_page(data, summary)) if request.report else None)
             if not request.json:
                 say_where(began, "numbers, figures", folder.path, report=request.report)

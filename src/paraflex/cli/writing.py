@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
@@ -11,9 +11,12 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import say_where
 from paraflex.errors import OutputError
 from paraflex.folders import ResultsFolder
-from paraflex.report import Page
 from paraflex.results import save_results
 from paraflex.writing import write_json
+
+if TYPE_CHECKING:
+    # Imported when a page is made: it takes a second.
+    from paraflex.report import Page
 
 _LATER = "paraflex plot and paraflex report draw them"
 

@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.campaign import (
-    RESULTS,
     TRAJECTORIES,
-    UNFINISHED,
     Campaign,
     Engine,
     KeptResult,
@@ -30,6 +28,7 @@ from paraflex.campaign import (
     kept_in,
     open_campaign,
     outcomes,
+    table_name,
 )
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
@@ -311,7 +310,7 @@ class _Session:
     def end(self, interrupted: bool) -> SweepResult:
         """Write the table, and counts beside it."""
         with self.campaign.published(finished=self.complete) as new:
-            table = read_parquet(new / (RESULTS if self.complete else UNFINISHED), ["status", VALIDITY])
+            table = read_parquet(new / table_name(finished=self.complete), ["status", VALIDITY])
             result = SweepResult(
                 name=self.study.name,
                 folder=self.campaign.folder.path,

@@ -89,10 +89,18 @@ def read_manifest(folder: Path) -> Manifest | None:
 def kind_of_folder(folder: Path) -> str:
     """Which kind of results a folder holds; empty where none of ours."""
     finish_change(folder)
+    return _kind(folder, _whole_manifest(folder))
+
+
+def _whole_manifest(folder: Path) -> Manifest | None:
+    """The manifest of a folder; None where there is none, or it is damaged."""
     try:
-        manifest = read_manifest(folder)
+        return read_manifest(folder)
     except InputError:
-        manifest = None
+        return None
+
+
+def _kind(folder: Path, manifest: Manifest | None) -> str:
     if manifest is not None:
         return manifest.kind
     return next((kind for kind, names in KINDS.items() if any((folder / name).is_file() for name in names)), "")
@@ -120,11 +128,9 @@ def check_listed(file: Path, remedy: str) -> None:
 
 def files_of(folder: Path) -> dict[str, str]:
     """The files of a folder that paraflex wrote, with the digests of its manifest; empty where it lists none."""
-    try:
-        manifest = read_manifest(folder)
-    except InputError:
-        manifest = None
-    kind = kind_of_folder(folder)
+    finish_change(folder)
+    manifest = _whole_manifest(folder)
+    kind = _kind(folder, manifest)
     found = {} if manifest is not None else dict.fromkeys((*KINDS.get(kind, ()), *([_REPORT] if kind else ())), "")
     if kind == STUDY_OF_RUNS:
         each = (file.relative_to(folder).as_posix() for pattern in _OF_STUDY for file in folder.glob(pattern))

@@ -11,7 +11,7 @@ from paraflex.campaign import tables_of
 from paraflex.errors import InputError
 from paraflex.folders import check_listed
 from paraflex.plots.designs import DesignTable, read_designs
-from paraflex.seals import NETCDF, PARQUET
+from paraflex.seals import NETCDF, PARQUET, unreadable
 from paraflex.writing import read_values
 
 _OURS = "name a folder or file that paraflex wrote"
@@ -80,7 +80,7 @@ def _format(file: Path) -> str:
         with file.open("rb") as opened:
             beginning = opened.read(4)
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror or error})", field=str(file), remedy=_OURS) from error
+        raise unreadable(error, file, _OURS) from error
     kind = _BEGINNINGS.get(beginning, "json" if beginning.lstrip()[:1] in (b"{", b"[") else "")
     if not kind:
         raise InputError("not a file of results", field=str(file), remedy=_OURS)

@@ -12,7 +12,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.folders import check_listed
 from paraflex.results.following import metric_variables
-from paraflex.seals import NETCDF, PARQUET, check_seal, damaged
+from paraflex.seals import NETCDF, PARQUET, check_seal, damaged, unreadable
 from paraflex.writing import sealed_file
 
 # Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from. 3:
@@ -136,9 +136,7 @@ def _read(file: Path) -> xr.Dataset:
         with file.open("rb") as stream:
             start = stream.read(4)
     except OSError as error:
-        raise InputError(
-            f"cannot be read ({error.strerror or error})", field=str(file), remedy="check its permissions"
-        ) from error
+        raise unreadable(error, file) from error
     if start == PARQUET:
         raise InputError(
             "a table of many runs, not the results of one", field=str(file), remedy="read it with pandas or pyarrow"
