@@ -153,6 +153,9 @@ class GeneralSectionTable(_Table):
 
     area: Number = Field(description="the area in m^2")
     second_moment: Number = Field(description="the second moment of area in m^4")
+    outer_fibre: Number | None = Field(
+        default=None, description="the distance of the outermost fibre from the neutral axis in m"
+    )
 
 
 class MaterialTable(_Table):
@@ -160,6 +163,7 @@ class MaterialTable(_Table):
 
     youngs_modulus: Number = Field(description="Young's modulus in Pa")
     density: Number = Field(description="the density in kg/m^3")
+    strength: Number | None = Field(default=None, description="the largest stress that it bears in Pa")
 
 
 class LumpTable(_Table):

@@ -39,6 +39,9 @@ class Section(CheckedFields):
         Of area, about the axis normal to the plane of motion [m^4].
     sides : (width, thickness), optional
         Of a rectangle: out of the plane of motion and in it [m].
+    outer_fibre : float, optional
+        Distance of the outermost fibre from the neutral axis, in the plane of motion [m]; without it there are no
+        bending stresses.
     """
 
     _table = "section"
@@ -46,22 +49,34 @@ class Section(CheckedFields):
     area: float
     second_moment: float
     sides: tuple[float, float] | None = None
+    outer_fibre: float | None = None
 
     @classmethod
     @checked_arguments()
     def rectangle(cls, width: float, thickness: float) -> Section:
         """A rectangle: width out of the plane of motion, thickness in it [m]."""
-        return cls(width * thickness, width * thickness**3 / 12.0, (width, thickness))
+        return cls(width * thickness, width * thickness**3 / 12.0, (width, thickness), thickness / 2.0)
 
 
 @dataclass(frozen=True)
 class Material(CheckedFields):
-    """Linear elastic material: Young's modulus [Pa] and density [kg/m^3]."""
+    """Linear elastic material.
+
+    Attributes
+    ----------
+    youngs_modulus : float
+        [Pa]
+    density : float
+        [kg/m^3]
+    strength : float, optional
+        Largest stress that it bears, for instance its yield strength [Pa]; safety factors are over it.
+    """
 
     _table = "material"
 
     youngs_modulus: float
     density: float
+    strength: float | None = None
 
 
 class Curvature(Enum):

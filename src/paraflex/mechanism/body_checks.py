@@ -78,9 +78,13 @@ def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
     for where, section in _each(body.section, f"{field}.section"):
         positive(section.area, f"{where}.area", "m^2")
         positive(section.second_moment, f"{where}.second_moment", "m^4")
+        if section.outer_fibre is not None:
+            positive(section.outer_fibre, f"{where}.outer_fibre", "m")
     for where, material in _each(body.material, f"{field}.material"):
         positive(material.youngs_modulus, f"{where}.youngs_modulus", "Pa")
         positive(material.density, f"{where}.density", "kg/m^3")
+        if material.strength is not None:
+            positive(material.strength, f"{where}.strength", "Pa")
     finite(body.points.values(), f"{field}.points")
     with _within(field):
         mesh_beam(body.length, body.points, body.elements if isinstance(body, FlexibleBeam) else 1)
