@@ -32,7 +32,7 @@ coverage: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --cov --cov-report=term
 
 docs: $(VENV)/.dev
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir site
 
 # Set-up is skipped while these stamps are newer than what they depend on.
 $(VENV)/.run: pyproject.toml constraints.txt

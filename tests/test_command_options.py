@@ -52,7 +52,7 @@ def called(monkeypatch, command, line):
         loaded.append(name)
         raise InputError("enough", field="test")
 
-    for module in ("run", "verify", "compare", "modes", "inspect"):
+    for module in ("run", "verify", "compare_methods", "modes", "inspect"):
         monkeypatch.setattr(f"paraflex.cli.{module}.load", load)
     with pytest.raises(InputError, match="enough"):
         COMMANDS[command].main([*line], standalone_mode=False)

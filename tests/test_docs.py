@@ -1,15 +1,19 @@
 """Pages for newcomers are run block by block; pages made from the code say what the code says."""
 
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from pages import blocks_of, check_output, run_page, with_numbers_of
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
+MAKEFILE, MKDOCS = ((ROOT / name).read_text(encoding="utf-8") for name in ("Makefile", "mkdocs.yml"))
 sys.path.append(str(ROOT / "benchmarks"))
 
 import documented  # noqa: E402
@@ -25,6 +29,7 @@ import documented  # noqa: E402
         ("interface.md", 3),
         ("validity.md", 1),
         ("findings.md", 2),
+        ("python-mechanisms.md", 6),
     ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):
@@ -99,6 +104,42 @@ def test_links_between_pages_and_images_exist():
             assert (ROOT / target).exists(), f"{page.name}: {target}"
 
 
+BUILD = [sys.executable, "-m", *re.search(r"\$\(BIN\)/(mkdocs build .*) --site-dir", MAKEFILE)[1].split()]
+
+
+def built(folder, text):
+    """MkDocs on one page, by the command of `make docs` and with the project's settings of what is checked."""
+    checked = yaml.safe_load(re.search(r"^validation:\n(?: .*\n)+", MKDOCS, re.MULTILINE)[0])
+    (folder / "docs").mkdir(exist_ok=True)
+    (folder / "docs" / "index.md").write_text(text, encoding="utf-8")
+    settings = {"site_name": "a", "nav": [{"Home": "index.md"}], "plugins": [], **checked}
+    (folder / "mkdocs.yml").write_text(yaml.safe_dump(settings), encoding="utf-8")
+    return subprocess.run(
+        BUILD, cwd=folder, capture_output=True, text=True, check=False, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "extra"),
+    [
+        ("[there](nowhere.md)", ""),
+        ("[there](#nowhere)", ""),
+        ("[there](/index.md)", ""),
+        ("![there](nowhere.png)", ""),
+        ("a page that is not in the navigation", "other.md"),
+    ],
+    ids=["page", "anchor", "absolute", "image", "navigation"],
+)
+def test_the_build_of_the_documentation_fails_on_a_warning(text, extra, tmp_path):
+    done = built(tmp_path, "# Home\n\n[here](#home)\n")
+    assert done.returncode == 0, done.stderr
+    if extra:
+        (tmp_path / "docs" / extra).write_text("# Other\n", encoding="utf-8")
+    done = built(tmp_path, f"# Home\n\n{text}\n")
+    assert done.returncode == 1
+    assert "WARNING" in done.stderr
+
+
 @pytest.fixture
 def hooks(monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS / "hooks"))
@@ -146,7 +187,9 @@ def test_every_public_name_stands_on_one_page():
         for name in public_names(package):
             assert _origin(package, name) in origins, (package, name)
     index = pages["reference/api/index.md"]
-    assert all(f"`pf.{name}`" in index for name in paraflex.__all__)
+    described = dict(re.findall(r"^\| `pf\.(\w+)` \|[^|]+\| (.+) \|$", index, flags=re.MULTILINE))
+    assert set(described) == set(paraflex.__all__)
+    assert described["plan"].startswith("Plan a run of the end-effector along a path")
 
 
 def test_the_page_of_the_interface_has_the_public_names_in_their_groups_and_no_others():

@@ -53,6 +53,39 @@ def text_of(html):
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html))
 
 
+def test_the_mechanism_comes_before_tables_and_the_solver_after_them():
+    html = html_of(tracking_page(tracked().assign_attrs(findings="[]"), FAILED))
+    marks = ('class="verdict sound"', 'class="tiles"', 'id="moving"', "<h2>Modes</h2>", "<h2>Integration</h2>",
+             '<dl class="facts">')  # fmt: skip
+    places = [html.index(mark) for mark in marks]
+    assert places == sorted(places)
+    linked = re.findall(r'<a href="#([^"]+)">', html[: places[1]])
+    assert len(linked) > 3
+    assert all(f'id="{anchor}"' in html for anchor in linked)
+
+
+def test_many_notices_are_folded_and_all_there():
+    notes = ["one", "two", "three"]
+    few, many = (html_of(Page("a", "run", notes=notes[:k])) for k in (2, 3))
+    assert "<details>" not in few
+    assert "<summary>2 more notices</summary>" in many
+    assert all(f'<p class="notice">{note}</p>' in many for note in notes)
+
+
+def test_what_is_only_rounding_is_printed_as_zero():
+    assert number(1e-17, 1e3, beside=0.3) == "0"
+    assert number(-1e-17, 1e3, beside=0.3) == "0"
+    assert number(1e-12, 1e3, beside=0.3) == "1.00 × 10⁻⁹"
+    assert number(1e-17) == "1.00 × 10⁻¹⁷"
+    assert number(1e-17, beside=np.nan) == "1.00 × 10⁻¹⁷"
+    data = tracked().copy(deep=True)
+    data["energy_balance_max"][:] = 3e-18
+    data["tracking_rms_motion"][0] = data["tracking_rms"][0] = 2e-17
+    html = html_of(tracking_page(data))
+    assert "10⁻¹⁸" not in html
+    assert re.search(r'class="pick">\+\+\+\+</button></th><td class="words">complete</td><td>0</td>', html)
+
+
 def test_charts_are_titled_by_what_they_plot():
     """A distance from singular positions would fall to zero there; a condition number grows."""
     page = tracking_page(tracked())

@@ -76,6 +76,68 @@ def test_it_opens_at_once(browser, report):
     assert min(taken) < OPENING
 
 
+def test_the_mechanism_is_above_the_fold_and_the_solver_below_it(opened):
+    page = opened(viewport={"width": 1400, "height": 1000})
+    drawing, solver = page.locator("#canvas").bounding_box(), page.locator("#part-integration").bounding_box()
+    assert drawing is not None
+    assert solver is not None
+    assert drawing["y"] + drawing["height"] <= 1000
+    assert solver["y"] > 1000
+
+
+def test_no_chart_can_be_sent_anywhere(opened):
+    requests = []
+    page = opened()
+    page.on("request", lambda request: requests.append(request.url))
+    curves(page, "torques")
+    titles = page.evaluate(
+        "[...document.querySelectorAll('.modebar-btn')].map((one) => one.dataset.title || one.title || one.ariaLabel)"
+    )
+    assert any("Download" in title for title in titles)
+    assert not [
+        title for title in titles if any(word in title.lower() for word in ("share", "cloud", "edit", "plotly"))
+    ]
+    context = page.evaluate("document.querySelector('#chart-torques .js-plotly-plot')._context")
+    assert not context["showSendToCloud"]
+    assert context["plotlyServerURL"] == ""
+    assert not [url for url in requests if url.startswith(("http", "ws"))]
+
+
+def test_a_print_keeps_proportions_and_cuts_nothing(opened):
+    page = opened(viewport={"width": 720, "height": 1000})
+    curves(page, "path")
+    page.emulate_media(media="print")
+    wait_for_drawing(page)
+    canvas = page.evaluate(
+        "(({clientWidth, clientHeight, width, height}) => clientWidth * height / (clientHeight * width))"
+        "(document.getElementById('canvas'))"
+    )
+    assert canvas == pytest.approx(1.0, abs=0.02)
+    # A metre of the path is as long across as up.
+    drawn = page.evaluate(
+        "(({xaxis, yaxis}) => [xaxis._length / (xaxis.range[1] - xaxis.range[0]),"
+        " yaxis._length / (yaxis.range[1] - yaxis.range[0])])"
+        "(document.querySelector('#chart-path .js-plotly-plot')._fullLayout)"
+    )
+    assert drawn[0] == pytest.approx(drawn[1], rel=0.01)
+    box = page.locator("#chart-path .main-svg").first.bounding_box()
+    assert box is not None
+    assert box["x"] + box["width"] <= 720
+    assert page.evaluate("getComputedStyle(document.getElementById('chart-path')).breakInside") == "avoid"
+    assert not page.locator("#dock").is_visible()
+
+
+def test_a_table_on_a_phone_says_that_it_scrolls(opened):
+    page = opened(viewport=PHONE)
+    table = page.locator("#part-modes .scroll")
+    assert page.locator("#part-modes .swipe").is_visible()
+    assert "goes-on" in table.get_attribute("class")
+    table.evaluate("(one) => one.scrollTo(one.scrollWidth, 0)")
+    page.wait_for_function("!document.querySelector('#part-modes .scroll').classList.contains('goes-on')")
+    wide = opened(viewport={"width": 1560, "height": 900})
+    assert not wide.locator("#part-modes .swipe").is_visible()
+
+
 def test_charts_below_the_screen_wait_until_they_are_seen(opened):
     page = opened()
     described = page.evaluate("charts.all.length")

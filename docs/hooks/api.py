@@ -32,6 +32,7 @@ PACKAGES = (
     "results.export",
     "plots",
     "plots.film",
+    "plots.compare",
     "report",
     "results.metrics",
     "designs.setting",
@@ -44,6 +45,10 @@ PACKAGES = (
     "errors",
     "compilation",
 )
+
+# Public names that are modules, and constants, which have no docstrings.
+_MODULES = {"library": "library", "methods": "integrators.methods", "plots": "plots"}
+_CONSTANTS = {"METHODS": "Methods of integration by their names."}
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -108,7 +113,7 @@ def _package_page(package: str, names: list[str]) -> str:
 
 def _index_page(homes: dict[str, str]) -> str:
     names = public_names("")
-    rows = [f"| `pf.{name}` | {_link(name, homes)} |" for name in names]
+    rows = [f"| `pf.{name}` | {_link(name, homes)} | {_described(name)} |" for name in names]
     packages = [f"| [paraflex.{package}]({package}.md) | {_about(package)} |" for package in PACKAGES]
     return "\n".join(
         [
@@ -116,7 +121,7 @@ def _index_page(homes: dict[str, str]) -> str:
             "",
             "Made from the docstrings. `import paraflex as pf`; what stands here is public.",
             "",
-            *["| Name | Told under |", "|---|---|", *rows, ""],
+            *["| Name | Described under | |", "|---|---|---|", *rows, ""],
             *["| Package | |", "|---|---|", *packages, ""],
             _about(""),
         ]
@@ -124,10 +129,21 @@ def _index_page(homes: dict[str, str]) -> str:
 
 
 def _link(name: str, homes: dict[str, str]) -> str:
-    modules = {"library": "library", "methods": "integrators.methods", "plots": "plots"}
-    if name in modules:
-        return f"[paraflex.{modules[name]}]({modules[name]}.md)"
+    if name in _MODULES:
+        return f"[paraflex.{_MODULES[name]}]({_MODULES[name]}.md)"
     return f"[{homes[name]}][]"
+
+
+def _described(name: str) -> str:
+    """The first sentence of a public name's docstring, as a cell of a table."""
+    if name in _MODULES:
+        return _about(_MODULES[name])
+    module, _, own = _origin("", name).rpartition(".")
+    for node in _tree(module, "py").body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == own:
+            about = (ast.get_docstring(node) or "").split("\n\n")[0]
+            return " ".join(about.split()).replace("|", r"\|")
+    return _CONSTANTS.get(name, "")
 
 
 def _about(package: str) -> str:

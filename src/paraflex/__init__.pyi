@@ -87,6 +87,7 @@ from .results import (
     save_results as save_results,
     load_results as load_results,
     open_results as open_results,
+    compare as compare,
 )
 from .results.export import export as export
 from .plots.film import FilmOptions as FilmOptions, animate as animate

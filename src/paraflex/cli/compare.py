@@ -1,119 +1,124 @@
-"""`paraflex compare-methods`: time, work and error of every method of integration on one motion."""
+"""`paraflex compare`: two runs side by side."""
 
 from __future__ import annotations
 
+import math
 import time
+from collections.abc import Iterable
 
-from paraflex.cli.bars import counting
-from paraflex.cli.commands.runs import CompareRequest
-from paraflex.cli.compare_tables import print_comparison
-from paraflex.cli.ending import exit_code, say_where, tell
-from paraflex.cli.motion import own_motion, start_of
+from rich.console import Console
+from rich.table import Table
+
+from paraflex.cli import COMPLETE
+from paraflex.cli.commands.results import CompareRequest
+from paraflex.cli.ending import say_where, tell
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    at_fault,
-    find_mode,
-    find_path,
-    flagged,
-    of_assembly,
-    plan_study,
-)
-from paraflex.cli.tables import plain_console
-from paraflex.cli.writing import write_drawn
-from paraflex.compilation import compile_kernels_for
-from paraflex.dynamics import build_system, consistent_state
-from paraflex.errors import AssemblyError, InputError
-from paraflex.files import Model, load
-from paraflex.folders import COMPARISON, ResultsFolder
-from paraflex.integrators import METHODS
-from paraflex.integrators.methods import find_method
-from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_case, tracking_case
+from paraflex.cli.tables import plain_table, print_titled
+from paraflex.errors import InputError
+from paraflex.folders import RUN_COMPARISON, ResultsFolder
+from paraflex.results.comparison import MotionPair, NumberPair, RunComparison, compare
+from paraflex.results.metrics import metric_label
+from paraflex.writing import write_json
+
+# Settings that are printed, and letters of each; compare.json has all.
+_MOST_SETTINGS, _MOST_LETTERS = 20, 40
 
 
 def compare_command(request: CompareRequest) -> int:
-    """Run all methods, write what they took and how far off they are; the exit code."""
-    model = load(request.model.name)
-    options, methods = _options(request), _methods(request)
-    # Every check that needs no computing comes before the first minute is spent.
-    mode = _mode(model, request)
-    with hold_results(request.out, COMPARISON, force=request.force) as folder:
-        return _compare(request, model, mode, methods, options, folder)
-
-
-def _compare(
-    request: CompareRequest,
-    model: Model,
-    mode: str | None,
-    methods: list[str],
-    options: ComparisonOptions,
-    folder: ResultsFolder,
-) -> int:
-    """Run all methods in a mode, None without a path; write results into a folder that is held."""
-    console = plain_console(stderr=True)
-    compile_kernels_for(model.mechanism, console.print)
+    """Compare two runs, print what differs, and write it where that is asked for; the exit code."""
     began = time.perf_counter()
-    if mode is None:
-        case = _motion(model, request)
-    else:
-        path, name = find_path(model, request.path)
-        case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-    asked = {"mechanism": model.source, "limit": options.limit, "repetitions": options.repetitions}
-    asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
-    study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
-    with counting(console) as report:
-        comparison = study.run(on_progress=report)
-    summary = comparison.to_dict()
-    if comparison.measurements:
-        comparison.save_in(folder)
-    tell(summary, lambda out: print_comparison(out, summary), as_json=request.json, doubts=())
-    if comparison.measurements:
-        write_drawn(summary, folder)
-        if not request.json:
-            say_where(began, "numbers and figure", folder.path)
-    done = any(run.status == "complete" for run in comparison.measurements)
-    return exit_code(done, interrupted=comparison.interrupted)
-
-
-def _options(request: CompareRequest) -> ComparisonOptions:
-    default = ComparisonOptions()
-    with flagged(request):
-        return ComparisonOptions(
-            # A step alone asks for fixed steps alone.
-            tolerances=tuple(request.tolerances) or (() if request.steps else default.tolerances),
-            steps=tuple(request.steps),
-            limit=default.limit if request.limit is None else request.limit,
-        )
-
-
-def _methods(request: CompareRequest) -> list[str]:
     try:
-        return [find_method(name).name for name in request.methods or METHODS]
+        found = compare(request.first, request.second, request.modes)
     except InputError as error:
-        raise error.at("--method") from None
+        if error.field != "modes":
+            raise
+        raise error.at("--mode") from None
+    if request.out is None:
+        _tell(found, request)
+        return COMPLETE
+    with hold_results(request.out, RUN_COMPARISON, force=request.force) as folder:
+        _write(found, folder)
+    _tell(found, request)
+    if not request.json:
+        say_where(began, "numbers and figures", folder.path)
+    return COMPLETE
 
 
-def _mode(model: Model, request: CompareRequest) -> str | None:
-    """The one mode to compare in: that asked for, or the study's with most motors; None for a model without a path."""
-    if model.paths or request.path is not None:
-        return find_mode(model, [] if request.mode is None else [request.mode]).name
-    if request.mode is not None:
-        raise InputError(
-            "a model without a path has no actuation modes, its torques are constant",
-            field="--mode", value=request.mode,
-            remedy="leave it out, or add a [path.NAME] table",
-        )  # fmt: skip
-    return None
+def _tell(found: RunComparison, request: CompareRequest) -> None:
+    tell(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, doubts=())
 
 
-def _motion(model: Model, request: CompareRequest) -> Case:
-    study, mechanism = own_motion(model, request.plan), model.mechanism
-    assert study.duration is not None
-    try:
-        start = start_of(model, mechanism, study.assembly, balanced=False)
-        if start is None:
-            start = consistent_state(build_system(mechanism), mechanism.assembly(study.assembly))
-        return motion_case(mechanism, study.duration, samples=study.samples, torques=study.torques, start=start)
-    except AssemblyError as error:
-        raise of_assembly(error, model) from error
-    except InputError as error:
-        raise at_fault(error, model) from None
+def _write(found: RunComparison, folder: ResultsFolder) -> None:
+    """Numbers first, then figures."""
+    from paraflex.plots.compare import save_overlays
+
+    with folder.replaced() as new:
+        write_json(new / "compare.json", found.to_dict())
+    with folder.amended() as new:
+        save_overlays(found, new / "figures")
+
+
+def print_compared(console: Console, found: RunComparison) -> None:
+    """What differs: settings, then of each mode the numbers and the motions."""
+    console.print(f"A: {found.names[0]}\nB: {found.names[1]}", soft_wrap=True)
+    for note in found.notes:
+        console.print(note, soft_wrap=True)
+    _print_settings(console, found)
+    for mode in found.modes:
+        whose = f", mode {mode}" if mode else ""
+        numbers = [pair for pair in found.numbers if pair.mode == mode]
+        differing = [pair for pair in numbers if pair.first != pair.second]
+        alike = len(numbers) - len(differing)
+        if differing:
+            title = f"Numbers that differ{whose}" + (f" ({alike} others are the same)" if alike else "")
+            print_titled(console, title, _numbers(differing))
+        else:
+            console.print(f"All {alike} numbers are the same{whose}", soft_wrap=True)
+        print_titled(console, f"Motions{whose}: largest difference", _motions(found.motions, mode))
+
+
+def _print_settings(console: Console, found: RunComparison) -> None:
+    if not found.settings:
+        console.print("The same settings and versions")
+        return
+    shown = list(found.settings.items())[:_MOST_SETTINGS]
+    rows = ([name, *(_short(value) for value in pair)] for name, pair in shown)
+    print_titled(console, "Settings that differ", plain_table("setting", "A", "B", rows=rows))
+    if len(found.settings) > len(shown):
+        console.print(f"and {len(found.settings) - len(shown)} more (--out writes all)")
+
+
+def _numbers(pairs: Iterable[NumberPair]) -> Table:
+    rows = (
+        [metric_label(pair.name), "" if pair.unit == "1" else pair.unit,
+         *(_number(value) for value in (pair.first, pair.second, pair.difference)), _percent(pair.relative)]
+        for pair in pairs
+    )  # fmt: skip
+    return plain_table("number", "unit", numbers=("A", "B", "B - A", "relative"), rows=rows)
+
+
+def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
+    """Of each variable the part that differs most."""
+    most: dict[str, MotionPair] = {}
+    for pair in pairs:
+        if pair.mode == mode and (pair.name not in most or pair.difference > most[pair.name].difference):
+            most[pair.name] = pair
+    rows = (
+        [pair.name.replace("_", " "), pair.part, pair.unit,
+         *(_number(value) for value in (pair.first, pair.second, pair.difference, pair.time))]
+        for pair in most.values()
+    )  # fmt: skip
+    return plain_table("quantity", "of", "unit", numbers=("peak A", "peak B", "difference", "at [s]"), rows=rows)
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else "-"
+
+
+def _percent(value: float) -> str:
+    return f"{100.0 * value:+.3g} %" if math.isfinite(value) else "-"
+
+
+def _short(value: object) -> str:
+    text = "none" if value is None else str(value)
+    return text if len(text) <= _MOST_LETTERS else f"{text[: _MOST_LETTERS - 3]}..."

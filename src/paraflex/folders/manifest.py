@@ -22,11 +22,13 @@ RUN = "run"
 VERIFICATION = "verification"
 COMPARISON = "comparison of methods"
 SENSITIVITY = "sensitivity"
+RUN_COMPARISON = "comparison of runs"
 STUDY_OF_RUNS = "study of many runs"
 KINDS: Mapping[str, tuple[str, ...]] = {
     STUDY_OF_RUNS: ("study.json", "journal.sqlite", "results.parquet"),
     VERIFICATION: ("verify.json", "verify.nc"),
     COMPARISON: ("compare-methods.json",),
+    RUN_COMPARISON: ("compare.json",),
     SENSITIVITY: ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
     RUN: ("summary.json", "results.nc"),
 }

@@ -24,7 +24,7 @@ ERRORS = Chart(
 )
 STRAIN = Chart("strain", "Strain energy", "strain energy")
 TIPS = Chart(
-    "deflections", "Displacements of the links' ends across them", "transverse displacement of the tip",
+    "deflections", "Displacements of the links' ends across them", "transverse displacement",
     choosing="link", note="Of a link's last end from the tangent at its first end.",
 )  # fmt: skip
 
@@ -43,6 +43,12 @@ def largest(values: NDArray[np.float64]) -> float:
     """Largest finite magnitude; NaN if there is none."""
     magnitudes = np.abs(values[np.isfinite(values)])
     return float(magnitudes.max()) if magnitudes.size else float("nan")
+
+
+def energy_scale(data: xr.Dataset) -> float:
+    """Largest energy or work of all runs [J], which imbalances are differences of."""
+    return max((largest(data[name].values) for name in ("kinetic_energy", "strain_energy", "work") if name in data),
+               key=np.nan_to_num, default=0.0)  # fmt: skip
 
 
 def errors(data: xr.Dataset) -> xr.DataArray:

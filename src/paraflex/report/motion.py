@@ -10,10 +10,10 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
-from paraflex.report.curves import TIPS, bending, energies, followed, largest, look, thinned
+from paraflex.report.curves import TIPS, bending, energies, energy_scale, followed, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line
+from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import count, number, pairs, quantity
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import check_kind
@@ -36,10 +36,11 @@ def motion_page(data: xr.Dataset) -> Page:
         title=data.attrs["mechanism"],
         kind="run",
         subtitle="left to its loads, prescribed motion and constant torques",
+        verdict=verdict_word(data),
         facts=common_facts(data),
         command=run_command_line(asked(data)),
         figures=_figures(data),
-        tables=[("Run", _table(data))],
+        more=[("Integration", _table(data))],
         panels=_panels(few),
         time=few["time"].values,
         runs=_ALONE,
@@ -48,21 +49,22 @@ def motion_page(data: xr.Dataset) -> Page:
         notes=[
             *doubt_lines(verdict_of(data)),
             *([] if status == "complete" else [f"{status}: {data['message'].item()}"]),
-            *filter(None, [validity_line({"": validity_summary(data)})]),
         ],
+        remarks=list(filter(None, [validity_line({"": validity_summary(data)})])),
     )
 
 
 def _table(data: xr.Dataset) -> str:
+    wide = largest(data["point_position"].values)
     facts = [
         ("status", str(data["status"].item())),
         ("steps, rejected", f"{count(data['steps'].item())}, {count(data['rejected'].item())}"),
         ("Newton iterations", count(data["newton_iterations"].item())),
         ("factorisations", count(data["factorisations"].item())),
         ("wall time", f"{number(data['wall_time'].item())} s"),
-        ("constraint violation, position", f"{number(data['constraint_position_max'].item())} m"),
+        ("constraint violation, position", f"{number(data['constraint_position_max'].item(), beside=wide)} m"),
         ("constraint violation, velocity", f"{number(data['constraint_velocity_max'].item())} m/s"),
-        ("imbalance of energy", f"{number(data['energy_balance_max'].item())} J"),
+        ("imbalance of energy", f"{number(data['energy_balance_max'].item(), beside=energy_scale(data))} J"),
     ]
     facts += [(f"torque of {text_symbol(str(name))}", f"{number(float(data['applied_torque'][k]))} N m")
              for k, name in enumerate(data["motor"].values)]  # fmt: skip

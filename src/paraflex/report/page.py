@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
@@ -23,6 +24,9 @@ from paraflex.report.film import Animation
 from paraflex.report.packing import Series
 from paraflex.writing import write_text
 
+# So many notices are folded.
+_FOLDED = 3
+_ORIGIN = "How these results were made"
 _STYLES = ("page.css",)
 _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
 
@@ -197,10 +201,12 @@ class Page:
     title, subtitle : str
     kind : str
         What it is a report of, for the browser's title.
+    verdict : str
+        On the results in a word, beside the title: "sound", "doubtful", "wrong"; empty where there is none.
     facts : sequence of (str, str)
-        Names and values below the title.
+        Names and values of what the results were made with, at the end.
     command : str
-        The command that gives these results again; empty where it is not known.
+        The command that gives these results again, below them; empty where it is not known.
     figures : sequence of (str, str, str)
         The few numbers that matter: name, value, and what it is of.
     tables, more : sequence of (str, str)
@@ -224,11 +230,14 @@ class Page:
         Why there is none.
     notes : sequence of str
         What the reader has to know first: runs that failed.
+    remarks : sequence of str
+        What speaks for the results, below the notes.
     """
 
     title: str
     kind: str
     subtitle: str = ""
+    verdict: str = ""
     facts: Sequence[tuple[str, str]] = ()
     command: str = ""
     figures: Sequence[tuple[str, str, str]] = ()
@@ -244,6 +253,7 @@ class Page:
     film: Animation | None = None
     no_film: str = ""
     notes: Sequence[str] = ()
+    remarks: Sequence[str] = ()
 
 
 @checked_arguments()
@@ -253,10 +263,11 @@ def render(page: Page) -> str:
         title=escape(page.title),
         kind=escape(page.kind),
         subtitle=escape(page.subtitle),
-        facts="".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in page.facts),
-        command=_command(page.command),
+        verdict=_verdict(page.verdict),
+        contents=_contents(page),
+        origin=_origin(page),
         figures=_figures(page.figures),
-        notes="".join(f'<p class="notice">{escape(note)}</p>' for note in page.notes),
+        notes=_notes(page.notes) + _paragraphs(page.remarks, "notice remark"),
         tables=_sections(page.tables),
         more=_sections(page.more),
         no_film=escape(page.no_film),
@@ -347,7 +358,46 @@ def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
 
 
 def _sections(parts: Sequence[tuple[str, str]]) -> str:
-    return "".join(f'<section class="card"><h2>{escape(heading)}</h2>{html}</section>' for heading, html in parts)
+    return "".join(
+        f'<section class="card" id="{_anchor(heading)}"><h2>{escape(heading)}</h2>{html}</section>'
+        for heading, html in parts
+    )
+
+
+def _anchor(heading: str) -> str:
+    return "part-" + re.sub(r"\W+", "-", heading.lower()).strip("-")
+
+
+def _contents(page: Page) -> str:
+    """Links to the parts of the page, in their order."""
+    parts = [
+        *([("All designs", "survey")] if page.survey else []),
+        *((heading, _anchor(heading)) for heading, _ in page.tables),
+        *([("Animation and charts", "moving")] if page.panels else []),
+        *((heading, _anchor(heading)) for heading, _ in page.more),
+        *([(_ORIGIN, _anchor(_ORIGIN))] if page.facts or page.command else []),
+    ]
+    return "".join(f'<a href="#{anchor}">{escape(heading)}</a>' for heading, anchor in parts) if len(parts) > 1 else ""
+
+
+def _notes(notes: Sequence[str]) -> str:
+    """Notices; the mechanism stays in sight below many of them, as they are folded from the second on."""
+    if len(notes) < _FOLDED:
+        return _paragraphs(notes, "notice")
+    rest = _paragraphs(notes[1:], "notice")
+    return (
+        f"{_paragraphs(notes[:1], 'notice')}<details><summary>{len(notes) - 1} more notices</summary>{rest}</details>"
+    )
+
+
+def _paragraphs(texts: Sequence[str], kind: str) -> str:
+    return "".join(f'<p class="{kind}">{escape(text)}</p>' for text in texts)
+
+
+def _verdict(word: str) -> str:
+    if not word:
+        return ""
+    return f'<span class="verdict {escape(word)}"><span class="unseen">verdict: </span>{escape(word)}</span>'
 
 
 def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
@@ -357,6 +407,13 @@ def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
         for name, value, of in figures
     )
     return f'<div class="tiles">{tiles}</div>' if tiles else ""
+
+
+def _origin(page: Page) -> str:
+    """What the results were made with."""
+    facts = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in page.facts)
+    html = (f'<dl class="facts">{facts}</dl>' if facts else "") + _command(page.command)
+    return _sections([(_ORIGIN, html)]) if html else ""
 
 
 def _command(command: str) -> str:

@@ -37,11 +37,15 @@ def asked(data: xr.Dataset) -> dict[str, Any]:
         return {}
 
 
+def verdict_word(data: xr.Dataset) -> str:
+    """Verdict on results: "sound", "doubtful", "wrong"; empty for files of earlier versions."""
+    return verdict_of(data).level.value if FINDINGS in data.attrs else ""
+
+
 def common_facts(data: xr.Dataset) -> list[tuple[str, str]]:
     """Duration, method, tolerance and versions."""
     time, attrs = data["time"].values, data.attrs
-    facts = [("verdict", verdict_of(data).level.value)] if FINDINGS in attrs else []
-    facts.append(("duration", f"{time[-1]:g} s, {time.size} samples"))
+    facts = [("duration", f"{time[-1]:g} s, {time.size} samples")]
     method = attrs.get("method")
     if method:
         facts.append(("integration", str(method)))

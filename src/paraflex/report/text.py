@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from html import escape
 
@@ -12,17 +13,27 @@ from paraflex.plots.labels import display_unit, raised
 
 # Magnitudes written out; others as powers of ten.
 _SMALLEST_PLAIN, _LARGEST_PLAIN = 1e-3, 1e5
+# A value is rounding below this share of what it is a difference of.
+_ROUNDING = 16.0 * sys.float_info.epsilon
 NO_VALUE = "–"
 _WORD_CLASS, _SORTABLE = ' class="words"', ' class="sortable"'
 
 
-def number(value: float | None, factor: float = 1.0) -> str:
-    """A value to three digits, times a factor: "0.377", "1.2 × 10⁻⁵"; a dash if there is none."""
+def number(value: float | None, factor: float = 1.0, *, beside: float = 0.0) -> str:
+    """A value to three digits, times a factor: "0.377", "1.2 × 10⁻⁵"; a dash if there is none.
+
+    Parameters
+    ----------
+    value : float, optional
+    factor : float
+    beside : float
+        Magnitude of what the value is a difference of, or a part; what is only the rounding of that is "0".
+    """
     if value is None or not math.isfinite(value):
         return NO_VALUE
-    value = factor * value
-    if value == 0.0:
+    if value == 0.0 or (math.isfinite(beside) and abs(value) < _ROUNDING * beside):
         return "0"
+    value = factor * value
     if not _SMALLEST_PLAIN <= abs(value) < _LARGEST_PLAIN:
         digits, power = f"{value:.2e}".split("e")
         return f"{digits} × 10{raised(int(power))}".replace("-", "−")

@@ -20,6 +20,7 @@ from paraflex.report.curves import (
     bending,
     compared,
     energies,
+    energy_scale,
     errors,
     followed,
     largest,
@@ -31,7 +32,7 @@ from paraflex.report.curves import (
 )
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line
+from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
@@ -63,17 +64,22 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         title=data.attrs["mechanism"],
         kind="run",
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
+        verdict=verdict_word(data),
         facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
         command=run_command_line(run),
         figures=_figures(data),
-        tables=[("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {}))],
+        more=[
+            ("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {})),
+            ("Integration", solver_table(data)),
+        ],
         panels=_panels(few, runs),
         time=few["time"].values,
         runs=runs,
         selected=runs.index(default_mode(data)),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=[*doubt_lines(verdict_of(data)), *_unfinished(data, failed or {}), *_validity(data)],
+        notes=[*doubt_lines(verdict_of(data)), *_unfinished(data, failed or {})],
+        remarks=_validity(data),
     )
 
 
@@ -87,42 +93,58 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     after = _after_columns(data)
     motors = names_of(data, "motor")
     torques = [data[name].transpose("mode", "motor").values for name in ("peak_torque", "rms_torque")]
+    wide, work, effort = largest(data["end_effector_desired"].values), energy_scale(data), largest(torques[0])
     heads = [
         ("mode", ""), ("status", ""), ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
         *((name, f"[{unit}]") for name, unit, _ in after),
         *((text_symbol(motor), f"[{torque_unit(data)}]") for motor in motors),
-        ("deflection", f"largest [{bend.name}]"), ("strain", "energy [J]"), ("imbalance", "[J]"),
-        ("steps", "rejected"), ("iterations", "factorisations"), ("wall time", "[s]"),
+        ("deflection", f"largest [{bend.name}]"), ("strain", "energy [J]"),
     ]  # fmt: skip
     rows = []
     for r, name in enumerate(runs):
         one = data.isel(mode=r)
         rows.append((name, [
             str(one["status"].item()),
-            number(errors_rms[r].item(), length.factor),
-            number(largest(ranked[r]), length.factor),
+            number(errors_rms[r].item(), length.factor, beside=wide),
+            number(largest(ranked[r]), length.factor, beside=wide),
             *(number(values[r]) for _, _, values in after),
-            *(f"{number(peak)}\n{number(rms)}" for peak, rms in zip(*(each[r] for each in torques), strict=True)),
-            _deflection(deflections[r], data["body"].values, bend.factor),
-            number(largest(one["strain_energy"].values)),
-            number(one["energy_balance_max"].item()),
-            f"{count(one['steps'].item())}\n{count(one['rejected'].item())}",
-            f"{count(one['newton_iterations'].item())}\n{count(one['factorisations'].item())}",
-            number(one["wall_time"].item()),
+            *("\n".join(number(each, beside=effort) for each in pair)
+              for pair in zip(*(each[r] for each in torques), strict=True)),
+            _deflection(deflections[r], data["body"].values, bend.factor, wide),
+            number(largest(one["strain_energy"].values), beside=work),
         ]))  # fmt: skip
     rows += [(name, ["failed", *[NO_VALUE] * (len(heads) - 2)]) for name in failed]
     kind = "Forces" if torque_unit(data) == "N" else "Torques"
     note = f"Error and largest: {words}. "
     if after:
         note += "Error after: RMS, after the motion; drift: mean speed then; vibration: RMS about the drift. "
-    note += (
-        f"{kind}: peak and, below it, RMS. Deflection: from a link's chord. Strain energy: peak. Imbalance: "
-        "largest, of energy and work."
-    )
+    note += f"{kind}: peak and, below it, RMS. Deflection: from a link's chord. Strain energy: peak."
     if failed or not bool((data["status"] == "complete").all()):
         note += " Of a mode that did not get to its end: until then."
     selects = {name: r for r, name in enumerate(runs)}
     return table(heads, rows, caption="What every mode came to", note=note, runs=selects)
+
+
+def solver_table(data: xr.Dataset) -> str:
+    """What the integration of every mode took, and how well it kept energy and constraints."""
+    heads = [
+        ("mode", ""), ("imbalance", "energy [J]"), ("constraints", "position [m]"), ("constraints", "velocity [m/s]"),
+        ("steps", ""), ("rejected", "steps"), ("iterations", "of Newton"), ("factorisations", ""), ("wall time", "[s]"),
+    ]  # fmt: skip
+    wide, work = largest(data["end_effector_desired"].values), energy_scale(data)
+    counts = ("steps", "rejected", "newton_iterations", "factorisations")
+    rows = []
+    for r, name in enumerate(names_of(data, "mode")):
+        one = data.isel(mode=r)
+        rows.append((name, [
+            number(one["energy_balance_max"].item(), beside=work),
+            number(one["constraint_position_max"].item(), beside=wide),
+            number(one["constraint_velocity_max"].item()),
+            *(count(one[each].item()) for each in counts),
+            number(one["wall_time"].item()),
+        ]))  # fmt: skip
+    note = "Imbalance: largest, of energy and work. Constraints: largest violation; 0 is below rounding."
+    return table(heads, rows, caption="The integration of every mode", note=note)
 
 
 def _after(data: xr.Dataset) -> list[tuple[str, str]]:
@@ -175,7 +197,7 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     ]
     if bending(data).size:
         axial = "Displacements of the links' ends along them"
-        axial_chart = replace(TIPS, identity="axial", title=axial, y="axial displacement of the tip")
+        axial_chart = replace(TIPS, identity="axial", title=axial, y="axial displacement")
         links = [
             followed(TIPS, bending(data), runs),
             followed(axial_chart, bending(data, "tip_axial"), runs),
@@ -264,9 +286,9 @@ def _model(run: Mapping[str, object]) -> str:
     return f"{run.get('geometry', 'linear')} geometry"
 
 
-def _deflection(values: NDArray[np.float64], bodies: NDArray[np.str_], factor: float) -> str:
-    """The largest deflection (samples, bodies), and its body."""
+def _deflection(values: NDArray[np.float64], bodies: NDArray[np.str_], factor: float, wide: float) -> str:
+    """The largest deflection (samples, bodies) of a mechanism of some width, and its body."""
     if not np.isfinite(values).any() or np.nanmax(values) == 0.0:
         return NO_VALUE
     where = int(np.nanargmax(np.nanmax(np.where(np.isfinite(values), values, -1.0), axis=0)))
-    return f"{number(largest(values), factor)}\n{text_symbol(str(bodies[where]))}"
+    return f"{number(largest(values), factor, beside=wide)}\n{text_symbol(str(bodies[where]))}"

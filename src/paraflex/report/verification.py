@@ -16,10 +16,10 @@ from paraflex.plots.agreement import printed
 from paraflex.plots.labels import display_unit, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.plots.workspace import round_magnification
-from paraflex.report.curves import TIPS, errors, labelled, look, thinned
+from paraflex.report.curves import TIPS, errors, labelled, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
-from paraflex.report.provenance import asked, common_facts, verify_command_line
+from paraflex.report.provenance import asked, common_facts, verdict_word, verify_command_line
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
@@ -83,11 +83,13 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
     reference = str(data.attrs["reference"])
     moving = animation(data, ("mode", "model"))
     few = thinned(data)
-    tables = [(f"Models, mode {name}", _models(mode, reference, runs, name)) for name, mode in summary["modes"].items()]
-    more = []
+    wide = largest(data["end_effector_desired"].values)
+    more = [
+        (f"Models, mode {name}", _models(mode, reference, runs, name, wide)) for name, mode in summary["modes"].items()
+    ]
     for name, mode in summary["modes"].items():
         more += [
-            (f"Largest distance between the paths of two models, mode {name}", _distances(mode)),
+            (f"Largest distance between the paths of two models, mode {name}", _distances(mode, wide)),
             (f"Difference from {printed(reference)}, mode {name}", _differences(mode, summary["links"], reference)),
         ]
     facts = [(name, value) for name, value in common_facts(data) if name != "integration"]
@@ -96,10 +98,10 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
         kind="verification",
         subtitle=f"{len(runs.models)} models of one mechanism, path “{asked_for.get('path', '')}”, "
         f"reference: {printed(reference)}",
+        verdict=summary.get("verdict", {}).get("level", verdict_word(data)),
         facts=facts,
         command=verify_command_line(asked_for, data, _ENGINES),
         figures=_tiles(summary, reference),
-        tables=tables,
         more=more,
         panels=_panels(few, runs, reference),
         time=few["time"].values,
@@ -118,7 +120,8 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
     )
 
 
-def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str) -> str:
+def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str, wide: float) -> str:
+    """Every model in a mode of a mechanism whose path reaches so far from the origin [m]."""
     models = mode["models"]
     unit = display_unit("m", np.array([one.get("tracking_error") or np.nan for one in models.values()]))
     heads = [
@@ -130,10 +133,10 @@ def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str) -> 
     rows = [
         (printed(model), [
             one["status"],
-            number(one.get("tracking_error"), unit.factor),
-            f"{number(one.get('distance_max'))}\n{number(one.get('distance_rms'))}",
-            number(one.get("change_with_finer_step")),
-            number(one.get("change_with_finer_mesh")),
+            number(one.get("tracking_error"), unit.factor, beside=wide),
+            "\n".join(number(one.get(key), beside=wide) for key in ("distance_max", "distance_rms")),
+            number(one.get("change_with_finer_step"), beside=wide),
+            number(one.get("change_with_finer_mesh"), beside=wide),
             number(one.get("energy_balance_max")),
             count(one.get("steps")),
             number(one.get("wall_time")),
@@ -146,10 +149,10 @@ def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str) -> 
     return table(heads, rows, caption=f"Every model in mode {name}", runs=selects)
 
 
-def _distances(mode: Mapping[str, Any]) -> str:
+def _distances(mode: Mapping[str, Any], wide: float) -> str:
     names = list(mode["distances"])
     rows = [
-        (printed(a), [NO_VALUE if a == b else number(mode["distances"][a][b]) for b in names])
+        (printed(a), [NO_VALUE if a == b else number(mode["distances"][a][b], beside=wide) for b in names])
         for a in names
     ]  # fmt: skip
     return table([("[m]", ""), *((printed(name), "") for name in names)], rows, caption="Distances between models")

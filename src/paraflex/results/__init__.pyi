@@ -1,3 +1,4 @@
+from .comparison import RunComparison as RunComparison, compare as compare
 from .dataset import tracking_dataset as tracking_dataset
 from .following import (
     peak_torque as peak_torque,

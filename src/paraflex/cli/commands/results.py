@@ -50,6 +50,20 @@ class AnimateRequest:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CompareRequest:
+    """What `paraflex compare` is asked for."""
+
+    first: Annotated[str, Argument(metavar="RESULTS", help="The folder of a run, or a file.")]
+    second: Annotated[str, Argument(metavar="RESULTS", help="Those that are compared with it.")]
+    modes: Annotated[
+        list[str], Option("--mode", metavar="MODE", help="Actuation mode; repeatable. Default: all that both have.")
+    ] = field(default_factory=list)
+    out: Annotated[str | None, Option(metavar="DIR", help="Folder for compare.json and figures.")] = None
+    force: Force = False
+    json: Annotated[bool, Option("--json", help="Print the numbers as JSON.")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
 class ExportRequest:
     """What `paraflex export` is asked for."""
 

@@ -124,7 +124,7 @@ class VerifyRequest:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompareRequest:
+class CompareMethodsRequest:
     """What `paraflex compare-methods` is asked for."""
 
     model: ModelChoice = field(default_factory=ModelChoice)

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import typer
 
 from paraflex.cli.commands.models import InfoRequest, MethodsRequest, ModesRequest, NewRequest, SchemaRequest
-from paraflex.cli.commands.results import AnimateRequest, ExportRequest, PlotRequest, ReportRequest
-from paraflex.cli.commands.runs import CompareRequest, RunRequest, VerifyRequest
+from paraflex.cli.commands.results import AnimateRequest, CompareRequest, ExportRequest, PlotRequest, ReportRequest
+from paraflex.cli.commands.runs import CompareMethodsRequest, RunRequest, VerifyRequest
 from paraflex.cli.commands.studies import IndicesRequest, SearchRequest, SensitivityRequest, SweepRequest
 from paraflex.cli.signals import exit_code, is_taken, raised
 
@@ -58,7 +58,7 @@ COMMANDS = (
         Writes report.html, verify.json, verify.nc and figures/."""),
     ListedCommand("report", ReportRequest, "report.report_command", """
         Write the report of results that are there: one HTML file that needs no network."""),
-    ListedCommand("compare-methods", CompareRequest, "compare.compare_command", """
+    ListedCommand("compare-methods", CompareMethodsRequest, "compare_methods.compare_methods_command", """
         Time every method of integration against its error; write compare-methods.json and figures/."""),
     ListedCommand("sensitivity", SensitivityRequest, "sensitivity.sensitivity_command", """
         Differentiate what runs are judged by; write sensitivity.json, a table and figures/."""),
@@ -78,6 +78,10 @@ COMMANDS = (
         Tell which parameters metrics depend on: first-order and total Sobol indices over their ranges.
 
         Writes indices.json, indices.parquet, results.parquet and figures/."""),
+    ListedCommand("compare", CompareRequest, "compare.compare_command", """
+        Compare two runs: numbers, settings and motions that differ.
+
+        With --out it writes compare.json and figures/ with the curves of both."""),
     ListedCommand("animate", AnimateRequest, "animate.animate_command", """
         Make a film of a run: mp4, gif, animated svg, or pictures."""),
     ListedCommand("plot", PlotRequest, "plot.plot_command", """

@@ -84,9 +84,10 @@ const charts = (() => {
     };
   }
 
+  // A chart is never sent anywhere: no button offers it, and there is no address.
   const config = {
-    displaylogo: false, responsive: true,
-    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "zoomIn2d", "zoomOut2d", "pan2d"],
+    displaylogo: false, responsive: true, showSendToCloud: false, showEditInChartStudio: false, plotlyServerURL: "",
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "zoomIn2d", "zoomOut2d", "pan2d", "sendDataToCloud", "sendChartToCloud"],
   };
 
   async function draw(chart) {

@@ -32,7 +32,6 @@ const begin = (() => {
       select.addEventListener("change", () => selectRun(Number(select.value)));
       holder.append(select);
     } else {
-      if (told.runs.every((name) => /^[+-]+$/.test(name))) holder.classList.add("signs");
       told.runs.forEach((name, k) => {
         const radio = element("input", { type: "radio", name: "run", value: k });
         radio.addEventListener("change", () => selectRun(k));
@@ -60,6 +59,7 @@ const begin = (() => {
     show();
     // Paper is white.
     let before = null;
+    addEventListener("beforeprint", () => { for (const one of document.querySelectorAll("details")) one.open = true; });
     addEventListener("beforeprint", () => { if (report.isDark()) { before = document.documentElement.dataset.theme; report.setTheme("light", false); } });
     addEventListener("afterprint", () => { if (before) { report.setTheme(before, false); before = null; } });
   }
@@ -88,6 +88,22 @@ const begin = (() => {
     });
   }
 
+  // Tables that are wider than the screen fade where they go on, and a line says that they scroll.
+  function showScrolling() {
+    for (const holder of document.querySelectorAll(".scroll")) {
+      const hint = element("p", { class: "swipe", "aria-hidden": "true", hidden: "" }, "the table scrolls sideways →");
+      holder.before(hint);
+      const show = () => {
+        const left = holder.scrollWidth - holder.clientWidth;
+        hint.hidden = left < 2;
+        holder.classList.toggle("goes-on", holder.scrollLeft < left - 2);
+      };
+      holder.addEventListener("scroll", show, { passive: true });
+      new ResizeObserver(show).observe(holder);
+      show();
+    }
+  }
+
   function loadPlotly() {
     const script = element("script");
     script.textContent = byId("plotly").textContent;
@@ -97,6 +113,7 @@ const begin = (() => {
   async function open() {
     makeSelector();
     makeTheme();
+    showScrolling();
     byId("keyed").textContent = told.selecting;
     listen();
     await report.readSeries();

@@ -1,0 +1,119 @@
+"""`paraflex compare-methods`: time, work and error of every method of integration on one motion."""
+
+from __future__ import annotations
+
+import time
+
+from paraflex.cli.bars import counting
+from paraflex.cli.commands.runs import CompareMethodsRequest
+from paraflex.cli.compare_methods_tables import print_comparison
+from paraflex.cli.ending import exit_code, say_where, tell
+from paraflex.cli.motion import own_motion, start_of
+from paraflex.cli.replacing import hold_results
+from paraflex.cli.request import (
+    at_fault,
+    find_mode,
+    find_path,
+    flagged,
+    of_assembly,
+    plan_study,
+)
+from paraflex.cli.tables import plain_console
+from paraflex.cli.writing import write_drawn
+from paraflex.compilation import compile_kernels_for
+from paraflex.dynamics import build_system, consistent_state
+from paraflex.errors import AssemblyError, InputError
+from paraflex.files import Model, load
+from paraflex.folders import COMPARISON, ResultsFolder
+from paraflex.integrators import METHODS
+from paraflex.integrators.methods import find_method
+from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_case, tracking_case
+
+
+def compare_methods_command(request: CompareMethodsRequest) -> int:
+    """Run all methods, write what they took and how far off they are; the exit code."""
+    model = load(request.model.name)
+    options, methods = _options(request), _methods(request)
+    # Every check that needs no computing comes before the first minute is spent.
+    mode = _mode(model, request)
+    with hold_results(request.out, COMPARISON, force=request.force) as folder:
+        return _compare(request, model, mode, methods, options, folder)
+
+
+def _compare(
+    request: CompareMethodsRequest,
+    model: Model,
+    mode: str | None,
+    methods: list[str],
+    options: ComparisonOptions,
+    folder: ResultsFolder,
+) -> int:
+    """Run all methods in a mode, None without a path; write results into a folder that is held."""
+    console = plain_console(stderr=True)
+    compile_kernels_for(model.mechanism, console.print)
+    began = time.perf_counter()
+    if mode is None:
+        case = _motion(model, request)
+    else:
+        path, name = find_path(model, request.path)
+        case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
+    asked = {"mechanism": model.source, "limit": options.limit, "repetitions": options.repetitions}
+    asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
+    study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
+    with counting(console) as report:
+        comparison = study.run(on_progress=report)
+    summary = comparison.to_dict()
+    if comparison.measurements:
+        comparison.save_in(folder)
+    tell(summary, lambda out: print_comparison(out, summary), as_json=request.json, doubts=())
+    if comparison.measurements:
+        write_drawn(summary, folder)
+        if not request.json:
+            say_where(began, "numbers and figure", folder.path)
+    done = any(run.status == "complete" for run in comparison.measurements)
+    return exit_code(done, interrupted=comparison.interrupted)
+
+
+def _options(request: CompareMethodsRequest) -> ComparisonOptions:
+    default = ComparisonOptions()
+    with flagged(request):
+        return ComparisonOptions(
+            # A step alone asks for fixed steps alone.
+            tolerances=tuple(request.tolerances) or (() if request.steps else default.tolerances),
+            steps=tuple(request.steps),
+            limit=default.limit if request.limit is None else request.limit,
+        )
+
+
+def _methods(request: CompareMethodsRequest) -> list[str]:
+    try:
+        return [find_method(name).name for name in request.methods or METHODS]
+    except InputError as error:
+        raise error.at("--method") from None
+
+
+def _mode(model: Model, request: CompareMethodsRequest) -> str | None:
+    """The one mode to compare in: that asked for, or the study's with most motors; None for a model without a path."""
+    if model.paths or request.path is not None:
+        return find_mode(model, [] if request.mode is None else [request.mode]).name
+    if request.mode is not None:
+        raise InputError(
+            "a model without a path has no actuation modes, its torques are constant",
+            field="--mode", value=request.mode,
+            remedy="leave it out, or add a [path.NAME] table",
+        )  # fmt: skip
+    return None
+
+
+def _motion(model: Model, request: CompareMethodsRequest) -> Case:
+    study, mechanism = own_motion(model, request.plan), model.mechanism
+    assert study.duration is not None
+    try:
+        start = start_of(model, mechanism, study.assembly, balanced=False)
+        if start is None:
+            start = consistent_state(build_system(mechanism), mechanism.assembly(study.assembly))
+        return motion_case(mechanism, study.duration, samples=study.samples, torques=study.torques, start=start)
+    except AssemblyError as error:
+        raise of_assembly(error, model) from error
+    except InputError as error:
+        raise at_fault(error, model) from None
