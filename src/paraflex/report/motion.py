@@ -12,6 +12,7 @@ from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.curves import TIPS, bending, energies, followed, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
+from paraflex.report.loads import load_panel, load_tables
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import count, number, pairs, quantity
@@ -39,7 +40,7 @@ def motion_page(data: xr.Dataset) -> Page:
         facts=common_facts(data),
         command=run_command_line(asked(data)),
         figures=_figures(data),
-        tables=[("Run", _table(data))],
+        tables=[("Run", _table(data)), *load_tables(data)],
         panels=_panels(few),
         time=few["time"].values,
         runs=_ALONE,
@@ -89,7 +90,7 @@ def _panels(data: xr.Dataset) -> list[Panel]:
     panels = [Panel("Motion", motion), Panel("Energies", [energies(run, _ALONE)])]
     if data.sizes["joint"]:
         panels.append(Panel("Joints", [_joint_forces(data)]))
-    return [*panels, Panel("Coordinates", [_coordinates(data, bodies)])]
+    return [*panels, *load_panel(run, _ALONE), Panel("Coordinates", [_coordinates(data, bodies)])]
 
 
 def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:

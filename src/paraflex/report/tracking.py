@@ -30,6 +30,7 @@ from paraflex.report.curves import (
     torque_unit,
 )
 from paraflex.report.film import NO_SHAPES, animation
+from paraflex.report.loads import load_panel, load_tables
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
@@ -66,8 +67,11 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
         command=run_command_line(run),
         figures=_figures(data),
-        tables=[("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {}))],
-        panels=_panels(few, runs),
+        tables=[
+            ("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {})),
+            *load_tables(data, default_mode(data)),
+        ],
+        panels=[*_panels(few, runs), *load_panel(few, runs)],
         time=few["time"].values,
         runs=runs,
         selected=runs.index(default_mode(data)),
