@@ -100,6 +100,7 @@ _DOUBTFUL = {
     "frequency-low": "A link vibrates on its own far slower than links do.",
     "torque-large": "Torques or forces are far beyond what mass, size and speed make plausible.",
     "force-large": "Forces of joints or drives are far beyond what mass, acceleration and loads make plausible.",
+    "stress-over-strength": "The stress in a beam exceeds the strength of its material: the safety factor is below 1.",
     "deflection-large": "A link bends so far that it is more a spring than a link.",
     "speed-large": "A body moves, or a drive turns, as fast as no mechanism does.",
     "error-large": "The tracking error is of the size of the path.",

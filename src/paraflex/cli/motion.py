@@ -23,7 +23,7 @@ from paraflex.cli.request import (
     at_fault,
     of_assembly,
 )
-from paraflex.cli.tables import DONE_STATUSES, plain_console, validity
+from paraflex.cli.tables import DONE_STATUSES, loads, plain_console, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
@@ -196,3 +196,4 @@ def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
         f"imbalance of energy {summary['energy_balance_max']:.1e} J"
     )
     validity(out, {"": summary["validity"]})
+    loads(out, {"": summary["loads"]})

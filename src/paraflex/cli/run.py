@@ -28,7 +28,7 @@ from paraflex.cli.request import (
     plan_study,
     with_frames,
 )
-from paraflex.cli.tables import failures, plain_console, print_study, validity, warn_of
+from paraflex.cli.tables import failures, loads, plain_console, print_study, validity, warn_of
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
@@ -104,6 +104,7 @@ def _run_along(
     def show(out: Console) -> None:
         print_study(out, summary, task, _model_name(request, mechanism))
         validity(out, {name: mode.get("validity") for name, mode in summary["modes"].items()})
+        loads(out, {name: mode.get("loads", {}) for name, mode in summary["modes"].items()})
 
     tell(summary, show, as_json=request.json)
     try:

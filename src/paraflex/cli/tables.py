@@ -127,6 +127,15 @@ def validity(console: Console, verdicts: Mapping[str, Any]) -> None:
         console.print(line, soft_wrap=True)
 
 
+def loads(console: Console, figures: Mapping[str, Any]) -> None:
+    """The largest stress of all runs, and what prescribed motions need."""
+    from paraflex.results.loads import effort_lines, stress_line
+
+    lines = [line for name, one in figures.items() for line in effort_lines(one, name)]
+    for line in filter(None, [stress_line(figures), *lines]):
+        console.print(line, soft_wrap=True)
+
+
 def failures(console: Console, result: StudyResult) -> None:
     """One line for each mode that did not run to its end."""
     for reason in result.failed.values():

@@ -23,6 +23,13 @@ from .phase import link_phases as link_phases, phase_diagrams as phase_diagrams
 from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
 from .spectra import numerical_damping as numerical_damping
+from .stress import (
+    beam_stresses as beam_stresses,
+    drive_efforts as drive_efforts,
+    frame_loads as frame_loads,
+    joint_motions as joint_motions,
+    stress_envelope as stress_envelope,
+)
 from .time_series import (
     end_effector_motion as end_effector_motion,
     joint_forces as joint_forces,

@@ -61,6 +61,37 @@ _RUN = (
     CatalogueFigure(
         "joint_forces", "time_series", "magnitude of the force in every joint", "mode", variables=("joint_force",)
     ),
+    CatalogueFigure(
+        "beam_stresses", "stress", "largest stress along every beam in time", "mode", variables=("stress",)
+    ),
+    CatalogueFigure(
+        "stress_envelope",
+        "stress",
+        "largest stress over the run along every beam",
+        "mode",
+        variables=("section_moment",),
+    ),
+    CatalogueFigure(
+        "joint_motions",
+        "stress",
+        "angle or travel of every joint, and its rate",
+        "mode",
+        variables=("joint_coordinate",),
+    ),
+    CatalogueFigure(
+        "drive_efforts",
+        "stress",
+        "torque, speed and power of motors and prescribed motions",
+        "mode",
+        variables=("motor_power",),
+    ),
+    CatalogueFigure(
+        "frame_loads",
+        "stress",
+        "shaking force and moment: of the mechanism on the ground",
+        "mode",
+        variables=("frame_force",),
+    ),
     CatalogueFigure("link_deflections", "time_series", "transverse displacement of the ends of all links", "mode"),
     CatalogueFigure("link_phases", "phase", "angular velocity over angle of every body", "mode"),
 )

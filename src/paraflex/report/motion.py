@@ -12,8 +12,9 @@ from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.curves import TIPS, bending, energies, energy_scale, followed, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
+from paraflex.report.loads import load_panel, load_tables
 from paraflex.report.page import Chart, Curve, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
+from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import count, number, pairs, quantity
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import check_kind
@@ -40,7 +41,7 @@ def motion_page(data: xr.Dataset) -> Page:
         facts=common_facts(data),
         command=run_command_line(asked(data)),
         figures=_figures(data),
-        more=[("Integration", _table(data))],
+        more=[*load_tables(data), ("Integration", _table(data))],
         panels=_panels(few),
         time=few["time"].values,
         runs=_ALONE,
@@ -91,7 +92,7 @@ def _panels(data: xr.Dataset) -> list[Panel]:
     panels = [Panel("Motion", motion), Panel("Energies", [energies(run, _ALONE)])]
     if data.sizes["joint"]:
         panels.append(Panel("Joints", [_joint_forces(data)]))
-    return [*panels, Panel("Coordinates", [_coordinates(data, bodies)])]
+    return [*panels, *load_panel(run, _ALONE), Panel("Coordinates", [_coordinates(data, bodies)])]
 
 
 def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:

@@ -31,8 +31,9 @@ from paraflex.report.curves import (
     torque_unit,
 )
 from paraflex.report.film import NO_SHAPES, animation
+from paraflex.report.loads import load_panel, load_tables
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
+from paraflex.report.provenance import asked, common_facts, run_command_line
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
@@ -70,9 +71,10 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         figures=_figures(data),
         more=[
             ("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {})),
+            *load_tables(data, default_mode(data)),
             ("Integration", solver_table(data)),
         ],
-        panels=_panels(few, runs),
+        panels=[*_panels(few, runs), *load_panel(few, runs)],
         time=few["time"].values,
         runs=runs,
         selected=runs.index(default_mode(data)),

@@ -15,7 +15,15 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.results.doubts import MODE, keep_findings
 from paraflex.results.following import KEPT_METRICS, ErrorSpan, Part, metric_variables, too_short
-from paraflex.results.labelled import Variables, label, link_coordinates, link_variables, padded, provenance
+from paraflex.results.labelled import (
+    Variables,
+    label,
+    link_coordinates,
+    link_variables,
+    padded,
+    provenance,
+    with_totals,
+)
 from paraflex.results.record import BRAKE_ENERGY, RUN_FIGURES, Record, record
 from paraflex.results.validity import validity_variables
 from paraflex.tracking import TrackingRun
@@ -51,8 +59,8 @@ def tracking_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end; units and signs in the
-        attributes of every variable. `shape` and what else drawings are made from is float32.
+        Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end, section, drive;
+        units and signs in the attributes of every variable. `shape` and what else drawings are made from is float32.
     """
     if not runs:
         raise InputError("no run to keep", field="runs", remedy="simulate at least one mode")
@@ -81,9 +89,8 @@ def tracking_dataset(
     data[BRAKE_ENERGY] = (("mode",), np.array([one.figures.get(BRAKE_ENERGY, 0.0) for one in records]))
     for name, values in validity_variables([one.validity for one in records]).items():
         data[name] = (("mode",), values)
-    coordinates = {"mode": [one.mode for one in records], "time": motion.t, **link_coordinates(task.system)}
-    out = xr.Dataset(data, coords=coordinates)
-    out["motor_power"] = out["torque"] * out["motor_speed"]
+    coordinates = {"mode": [one.mode for one in records], "time": motion.t, **link_coordinates(task.system, records[0])}
+    out = with_totals(xr.Dataset(data, coords=coordinates))
     out = out.assign(metric_variables(out, KEPT_METRICS, task.path.duration))
     label(out, mechanism)
     out.attrs = provenance(mechanism, records[0].method, options or IntegrationOptions(), parameters) | {

@@ -20,6 +20,7 @@ from paraflex.folders import added_to
 from paraflex.results.parquet import read_parquet, write_parquet
 from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.results.storage import save_results
+from paraflex.results.stress import SECTION
 from paraflex.writing import whole_file
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 EXPORT_FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
-TIME_SERIES, FIGURES_TABLE, SHAPES = "time_series", "figures", "shapes"
+TIME_SERIES, FIGURES_TABLE, SHAPES, SECTIONS = "time_series", "figures", "shapes", "sections"
 # Dimensions that rows of tables are of, outermost first.
 _ROW_DIMENSIONS = ("model", "mode", "time")
 # MATLAB takes longer names apart.
@@ -44,18 +45,20 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     data : xarray.Dataset
         Of a run, with a path or without, or of a verification.
     shapes : bool
-        Also the deformed shapes: many rows.
+        Also the deformed shapes, and section forces along beams: many rows.
 
     Returns
     -------
     dict of str to pandas.DataFrame
         `time_series`: a row a model (of a verification), mode and time; a variable of more dimensions makes a column
         for each of their labels, `torque_tau1` or `joint_force_B1_x`. `figures`: a row a model and mode. `shapes`: a
-        row a model, mode, time and drawn point. Their `attrs` hold `units` and `meanings` of columns.
+        row a model, mode, time and drawn point; `sections`: a row a model, mode, time and place along a beam. Their
+        `attrs` hold `units` and `meanings` of columns.
     """
     drawn = [name for name in data.data_vars if "station" in data[name].dims]
-    over_time = [name for name in data.data_vars if "time" in data[name].dims and name not in drawn]
-    single = [name for name in data.data_vars if name not in drawn and name not in over_time]
+    forces = [name for name in data.data_vars if SECTION in data[name].dims]
+    over_time = [name for name in data.data_vars if "time" in data[name].dims and name not in (*drawn, *forces)]
+    single = [name for name in data.data_vars if name not in (*drawn, *forces, *over_time)]
     tables = {
         TIME_SERIES: _table(data, over_time, _ROW_DIMENSIONS),
         FIGURES_TABLE: _table(data, single, _ROW_DIMENSIONS[:2]),
@@ -63,6 +66,9 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     if shapes and drawn:
         stations = data.assign_coords(station=np.arange(data.sizes["station"]))
         tables[SHAPES] = _table(stations, ["station_body", *drawn], (*_ROW_DIMENSIONS, "station"))
+    if shapes and forces:
+        stations = data.assign_coords({SECTION: np.arange(data.sizes[SECTION])})
+        tables[SECTIONS] = _table(stations, ["section_body", "section_place", *forces], (*_ROW_DIMENSIONS, SECTION))
     return tables
 
 

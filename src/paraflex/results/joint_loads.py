@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import System, axis_angle
+from paraflex.dynamics import System, axis_angle, inputs_of
 from paraflex.dynamics.constraints import Term, row_order
 from paraflex.dynamics.coordinates import transverse_pieces
 from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.points import point_motion
 from paraflex.kernel.packed import ANGLE, POINT
 from paraflex.mechanism import Joint
 
@@ -78,6 +79,69 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
         else:
             moment[:, i] += torque
     return JointLoads(force, moment)
+
+
+def drive_torques(system: System, multipliers: Array) -> Array:
+    """Torque [N m] or force [N] of every prescribed motion (k, drives), on its joint's second body."""
+    mechanism = system.mechanism
+    numbers = {signal: k for k, signal in enumerate(inputs_of(mechanism).prescribed)}
+    torques, row = np.zeros((len(multipliers), len(numbers))), 0
+    for constraint in row_order(mechanism, system.index):
+        if constraint.signal in numbers:
+            torques[:, numbers[constraint.signal]] = -multipliers[:, row]
+        row += len(constraint.labels)
+    return torques
+
+
+class FrameLoad(NamedTuple):
+    """What a mechanism does to the ground, its shaking force and moment.
+
+    Attributes
+    ----------
+    force : (k, 2) array
+        [N]
+    moment : (k,) array
+        About the origin of the ground frame, positive anticlockwise [N m].
+    """
+
+    force: Array
+    moment: Array
+
+
+def frame_load(system: System, places: Array, loads: JointLoads, q: Array, v: Array) -> FrameLoad:
+    """Sum of what joints and springs between points do to the ground.
+
+    Parameters
+    ----------
+    system : System
+    places : (k, joints, 2) array
+        Of the joints of `loads`, on their second bodies [m].
+    loads : JointLoads
+        Of the first joints of the system's mechanism, those that are on the ground among them.
+    q, v : (k, n) arrays
+    """
+    mechanism = system.mechanism
+    force, moment = np.zeros((len(q), 2)), np.zeros(len(q))
+    for i, joint in enumerate(mechanism.joints[: places.shape[1]]):
+        sign = float(joint.b.on_ground) - float(joint.a.on_ground)
+        force += sign * loads.force[:, i]
+        moment += sign * (loads.moment[:, i] + _cross(places[:, i], loads.force[:, i]))
+    for spring in mechanism.linear_springs:
+        if spring.a.on_ground or spring.b.on_ground:
+            fixed, moving = (spring.a, spring.b) if spring.a.on_ground else (spring.b, spring.a)
+            at, there = np.array(mechanism.ground[fixed.point]), point_motion(system, moving, q, v, np.zeros_like(v))
+            line = there.position - at
+            distance = np.linalg.norm(line, axis=1)
+            along = line / np.where(distance > 0.0, distance, 1.0)[:, None]
+            rate = np.sum(along * there.velocity, axis=1)
+            pull = (spring.stiffness * (distance - spring.length) + spring.damping * rate)[:, None] * along
+            force += pull
+            moment += _cross(np.broadcast_to(at, pull.shape), pull)
+    return FrameLoad(force, moment)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _direction(system: System, term: Term, q: Array) -> Array:

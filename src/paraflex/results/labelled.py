@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from importlib.metadata import version
 from typing import Any
 
@@ -18,63 +19,87 @@ from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.storage import SCHEMA
+from paraflex.results.stress import (
+    COMMENTS as STRESS_COMMENTS,
+    MOMENT,
+    UNITS as STRESS_UNITS,
+    largest_stresses,
+    section_coordinates,
+    section_variables,
+)
 from paraflex.results.validity import UNITS as VALIDITY_UNITS
 
 # Dimensions besides time, and values at the samples reached.
 Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
 
-UNITS = {
-    "time": ("time", "s"),
-    "end_effector": ("end-effector position", "m"),
-    "end_effector_velocity": ("end-effector velocity", "m/s"),
-    "end_effector_acceleration": ("end-effector acceleration", "m/s^2"),
-    "torque": ("motor torque", "N m"),
-    "motor_speed": ("rate of a motor's joint", "rad/s"),
-    "motor_power": ("power of a motor", "W"),
-    "angle": ("link angle", "rad"),
-    "angular_velocity": ("link angular velocity", "rad/s"),
-    "angular_acceleration": ("link angular acceleration", "rad/s^2"),
-    "chord_angle": ("angle from a link's first end to its last", "rad"),
-    "chord_velocity": ("rate of the angle from a link's first end to its last", "rad/s"),
-    "deflection": ("largest deflection along a link from its chord", "m"),
-    "tip_axial": ("axial tip displacement", "m"),
-    "tip_transverse": ("transverse tip displacement", "m"),
-    "tip_slope": ("tip slope", "rad"),
-    "point_position": ("position of a named point", "m"),
-    "joint_force": ("force of a joint's first body on its second, ground frame", "N"),
-    "joint_moment": ("moment of a joint's first body on its second", "N m"),
-    "multiplier": ("multiplier of a constraint row; torque or force of a spring, damper, friction or gear", "N, N m"),
-    "kinetic_energy": ("kinetic energy", "J"),
-    "strain_energy": ("strain energy of links and springs", "J"),
-    "work": ("work of motors, prescribed motion, weight and loads, less what dampers and friction take", "J"),
-    "actuation_condition": ("condition number of the actuation matrix", "1"),
-    "shape": ("drawn points of the bodies, deformed", "m"),
-    "shape_base": ("drawn points of the bodies, stiff between the joints that hold them", "m"),
-    "joint_position": ("position of a joint, on its second body", "m"),
-    "joint_direction": ("direction of the axis of a joint that slides", "rad"),
-    "spring_position": ("ends of a spring between points", "m"),
-    "station_body": ("body of a drawn point", "1"),
-    "station_place": ("place of a drawn point in the undeformed body, in its frame", "m"),
-    "point_station": ("drawn point that a named point is", "1"),
-    "joint_kind": ("kind of joint", "1"),
-    "joint_grounded": ("whether the joint is on the ground", "1"),
-    "spring_station": ("drawn points that a spring is at; -1 on the ground", "1"),
-    "gear_joint": ("joints that a gear or another relation relates, counted from 0", "1"),
-    "gear_radius": ("pitch radii of wheels that mesh outside, or of a pinion and its rack, then infinite", "m"),
-    "status": ("how the run ended", "1"),
-    "message": ("why it is not complete", "1"),
-    "factorisations": ("factorisations of the iteration matrix", "1"),
-    "wall_time": ("wall time of the integration", "s"),
-    "constraint_velocity_max": ("largest constraint violation in velocity", "m/s"),
-    "brake_energy": ("energy that brakes took as they engaged after the motion", "J"),
-    "event": ("event that stopped the run", "1"),
-    "event_time": ("when it was stopped", "s"),
-    **{metric.name: (metric.meaning, metric.unit) for metric in METRICS.values() if metric.of_solver},
-    "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
-    "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
-    "point_velocity": ("velocity of a named point", "m/s"),
-    "applied_torque": ("constant motor torque", "N m"),
-} | VALIDITY_UNITS
+UNITS = (
+    {
+        "time": ("time", "s"),
+        "end_effector": ("end-effector position", "m"),
+        "end_effector_velocity": ("end-effector velocity", "m/s"),
+        "end_effector_acceleration": ("end-effector acceleration", "m/s^2"),
+        "torque": ("motor torque", "N m"),
+        "motor_speed": ("rate of a motor's joint", "rad/s"),
+        "motor_power": ("power of a motor", "W"),
+        "motor_energy": ("integral of the magnitude of a motor's power, from the samples", "J"),
+        "joint_coordinate": ("angle or travel of a joint", "rad, m"),
+        "joint_speed": ("rate of a joint's angle or travel", "rad/s, m/s"),
+        "drive_torque": ("torque of a prescribed motion", "N m"),
+        "drive_speed": ("rate of a prescribed motion's joint", "rad/s"),
+        "drive_power": ("power of a prescribed motion", "W"),
+        "drive_energy": ("integral of the magnitude of a prescribed motion's power, from the samples", "J"),
+        "frame_force": ("force of the mechanism on the ground: shaking force", "N"),
+        "frame_moment": ("moment of the mechanism on the ground about its origin: shaking moment", "N m"),
+        "angle": ("link angle", "rad"),
+        "angular_velocity": ("link angular velocity", "rad/s"),
+        "angular_acceleration": ("link angular acceleration", "rad/s^2"),
+        "chord_angle": ("angle from a link's first end to its last", "rad"),
+        "chord_velocity": ("rate of the angle from a link's first end to its last", "rad/s"),
+        "deflection": ("largest deflection along a link from its chord", "m"),
+        "tip_axial": ("axial tip displacement", "m"),
+        "tip_transverse": ("transverse tip displacement", "m"),
+        "tip_slope": ("tip slope", "rad"),
+        "point_position": ("position of a named point", "m"),
+        "joint_force": ("force of a joint's first body on its second, ground frame", "N"),
+        "joint_moment": ("moment of a joint's first body on its second", "N m"),
+        "multiplier": (
+            "multiplier of a constraint row; torque or force of a spring, damper, friction or gear",
+            "N, N m",
+        ),
+        "kinetic_energy": ("kinetic energy", "J"),
+        "strain_energy": ("strain energy of links and springs", "J"),
+        "work": ("work of motors, prescribed motion, weight and loads, less what dampers and friction take", "J"),
+        "actuation_condition": ("condition number of the actuation matrix", "1"),
+        "shape": ("drawn points of the bodies, deformed", "m"),
+        "shape_base": ("drawn points of the bodies, stiff between the joints that hold them", "m"),
+        "joint_position": ("position of a joint, on its second body", "m"),
+        "joint_direction": ("direction of the axis of a joint that slides", "rad"),
+        "spring_position": ("ends of a spring between points", "m"),
+        "station_body": ("body of a drawn point", "1"),
+        "station_place": ("place of a drawn point in the undeformed body, in its frame", "m"),
+        "point_station": ("drawn point that a named point is", "1"),
+        "joint_kind": ("kind of joint", "1"),
+        "joint_grounded": ("whether the joint is on the ground", "1"),
+        "spring_station": ("drawn points that a spring is at; -1 on the ground", "1"),
+        "gear_joint": ("joints that a gear or another relation relates, counted from 0", "1"),
+        "gear_radius": ("pitch radii of wheels that mesh outside, or of a pinion and its rack, then infinite", "m"),
+        "status": ("how the run ended", "1"),
+        "message": ("why it is not complete", "1"),
+        "factorisations": ("factorisations of the iteration matrix", "1"),
+        "wall_time": ("wall time of the integration", "s"),
+        "constraint_velocity_max": ("largest constraint violation in velocity", "m/s"),
+        "brake_energy": ("energy that brakes took as they engaged after the motion", "J"),
+        "event": ("event that stopped the run", "1"),
+        "event_time": ("when it was stopped", "s"),
+        **{metric.name: (metric.meaning, metric.unit) for metric in METRICS.values() if metric.of_solver},
+        "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
+        "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
+        "point_velocity": ("velocity of a named point", "m/s"),
+        "applied_torque": ("constant motor torque", "N m"),
+    }
+    | VALIDITY_UNITS
+    | STRESS_UNITS
+)
 
 # Conventions of variables: body, frame, sign.
 _COMMENTS = {
@@ -98,10 +123,14 @@ _COMMENTS = {
     "angle": "of the body frame's x axis against the ground's, anticlockwise",
     "tip_transverse": "across the tangent at the first end of the link, positive to its left: anticlockwise",
     "tip_slope": "anticlockwise",
-}
+    "joint_coordinate": "of the joint's second body against its first: anticlockwise, or along the joint's axis",
+    "drive_torque": "as `torque`: on the joint's second body",
+    "drive_power": "torque or force times the rate of the joint: positive drives the mechanism, negative brakes it",
+    "frame_force": "of all joints and springs between points that are on the ground",
+} | STRESS_COMMENTS
 
 
-# Variables that are forces where all motors slide.
+# Variables that are forces where all motors, or prescribed motions, slide.
 _TORQUES = ("torque", "peak_torque", "rms_torque", "applied_torque")
 
 
@@ -126,7 +155,33 @@ def link_variables(links: Links, mechanism: Mechanism) -> Variables:
         "strain_energy": ((), links.strain_energy),
         "work": ((), links.work),
         **{name: (dims, x.astype(np.float32)) for name, (dims, x) in drawing_variables(links.drawing).items()},
+        **_load_variables(links, mechanism),
     }
+
+
+def _load_variables(links: Links, mechanism: Mechanism) -> Variables:
+    """What only models with coordinates of their own give: joints, prescribed motions, loads of frame and sections."""
+    out: Variables = {}
+    for name, dim in (("joint_coordinate", "joint"), ("joint_speed", "joint"), ("drive_torque", "drive"),
+                      ("drive_speed", "drive")):  # fmt: skip
+        values = getattr(links, name)
+        if values is not None and (dim == "joint" or values.shape[1]):
+            out[name] = ((dim,), values)
+    if links.frame_load is not None:
+        out |= {"frame_force": (("axis",), links.frame_load.force), "frame_moment": ((), links.frame_load.moment)}
+    if links.sections is not None:
+        out |= section_variables(links.sections, [body.name for body in mechanism.bodies])
+    return out
+
+
+def with_totals(data: xr.Dataset) -> xr.Dataset:
+    """A dataset with what follows from its variables: powers, energies, the largest stresses."""
+    for torque, name in (("torque", "motor"), ("applied_torque", "motor"), ("drive_torque", "drive")):
+        if torque in data:
+            power = data[torque] * data[f"{name}_speed"]
+            data[f"{name}_power"] = power.transpose(..., "time", name)
+            data[f"{name}_energy"] = abs(power).fillna(0.0).integrate("time")
+    return data.assign(largest_stresses(data)) if MOMENT in data else data
 
 
 def padded(values: NDArray[Any], total: int) -> NDArray[Any]:
@@ -136,8 +191,9 @@ def padded(values: NDArray[Any], total: int) -> NDArray[Any]:
     return out
 
 
-def link_coordinates(system: System) -> dict[str, Any]:
+def link_coordinates(system: System, links: Links) -> dict[str, Any]:
     """Labels of the dimensions that the variables of links have."""
+    drives = [one.name for one in system.mechanism.prescribed]
     mechanism = system.mechanism
     return {
         "axis": ["x", "y"],
@@ -147,6 +203,8 @@ def link_coordinates(system: System) -> dict[str, Any]:
         "row": list(system.rows),
         "point": [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points],
         **drawing_coordinates(mechanism),
+        **({"drive": drives} if drives and links.drive_torque is not None else {}),
+        **({} if links.sections is None else section_coordinates(links.sections.sections)),
     }
 
 
@@ -159,10 +217,22 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
             data[name].attrs = {"long_name": meaning if name == plain else f"desired {meaning}", "units": unit}
         if plain in _COMMENTS:
             data[name].attrs["comment"] = _COMMENTS[plain]
-    units = sorted(set(mechanism.motor_units()), reverse=True) or ["N m"]
+    drives = ["N" if mechanism.slides(one.joint) else "N m" for one in mechanism.prescribed]
+    _name_efforts(data, mechanism.motor_units(), "motor_speed", _TORQUES)
+    _name_efforts(data, drives, "drive_speed", ("drive_torque",))
+    for name, of_angle, of_travel in (("joint_coordinate", "rad", "m"), ("joint_speed", "rad/s", "m/s")):
+        if name in data:
+            kinds = sorted({joint.slides for joint in mechanism.joints})
+            data[name].attrs["units"] = ", ".join(of_travel if slides else of_angle for slides in kinds)
+
+
+def _name_efforts(data: xr.Dataset, units: Iterable[str], speed: str, names: Iterable[str]) -> None:
+    """Units of torques or forces and of the speeds of their joints."""
+    units = sorted(set(units), reverse=True) or ["N m"]
     speeds = {"N m": "rad/s", "N": "m/s"}
-    data["motor_speed"].attrs["units"] = ", ".join(speeds[unit] for unit in units)
-    for name in (each for each in _TORQUES if each in data):
+    if speed in data:
+        data[speed].attrs["units"] = ", ".join(speeds[unit] for unit in units)
+    for name in (each for each in names if each in data):
         data[name].attrs["units"] = ", ".join(units)
         if units == ["N"]:
             data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")

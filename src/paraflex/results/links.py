@@ -14,8 +14,9 @@ from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, t
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, drawing, system_drawing
-from paraflex.results.joint_loads import joint_loads
+from paraflex.results.joint_loads import FrameLoad, drive_torques, frame_load, joint_loads
 from paraflex.results.outlines import outline_motion, outlines, segment_motion
+from paraflex.results.stress import SectionResult, section_result
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,14 @@ class Links:
         [J]
     drawing : Drawing
         Deformed shapes of all bodies.
+    joint_coordinate, joint_speed : (k, joints) arrays, optional
+        Angle of each joint [rad], or travel along its axis [m], and its rate; None of models that do not give them.
+    drive_torque, drive_speed : (k, drives) arrays, optional
+        Torque [N m] or force [N] of each prescribed motion on its joint's second body, and the rate of that joint.
+    frame_load : FrameLoad, optional
+        What the mechanism does to the ground.
+    sections : SectionResult, optional
+        Section forces of beams; None of models without shape functions, and where no beam is flexible.
     """
 
     angle: Array
@@ -69,6 +78,12 @@ class Links:
     strain_energy: Array
     work: Array
     drawing: Drawing
+    joint_coordinate: Array | None = None
+    joint_speed: Array | None = None
+    drive_torque: Array | None = None
+    drive_speed: Array | None = None
+    frame_load: FrameLoad | None = None
+    sections: SectionResult | None = None
 
 
 def system_links(
@@ -103,7 +118,9 @@ def system_links(
     points = [point_motion(system, cut.there(ref), q, v, a).position for ref in named]
     speeds = [joint_coordinate(system, motor.joint, q, v).rate for motor in mechanism.motors]
     multipliers = solution.multipliers[:samples]
+    joints = [joint_coordinate(system, joint.name, q, v) for joint in mechanism.joints]
     loads = joint_loads(system, [joint.name for joint in mechanism.joints], q, multipliers, torques[:samples])
+    drawn = _drawing(cut, q)
     return Links(
         angle=q[:, first],
         rate=v[:, first],
@@ -115,12 +132,22 @@ def system_links(
         joint_force=loads.force,
         joint_moment=loads.moment,
         multiplier=_multipliers(system, cut.whole, multipliers),
-        motor_speed=np.stack(speeds, axis=1) if speeds else np.zeros((samples, 0)),
+        motor_speed=_stacked(speeds, samples),
         kinetic_energy=solution.kinetic_energy[:samples],
         strain_energy=solution.strain_energy[:samples],
         work=solution.work[:samples],
-        drawing=_drawing(cut, q),
+        drawing=drawn,
+        joint_coordinate=_stacked([each.value for each in joints], samples),
+        joint_speed=_stacked([each.rate for each in joints], samples),
+        drive_torque=drive_torques(system, multipliers),
+        drive_speed=_stacked([joint_coordinate(system, one.joint, q, v).rate for one in mechanism.prescribed], samples),
+        frame_load=frame_load(system, drawn.joints, loads, q, v),
+        sections=section_result(system, q, v, a),
     )
+
+
+def _stacked(columns: list[Array], samples: int) -> Array:
+    return np.stack(columns, axis=1) if columns else np.zeros((samples, 0))
 
 
 @dataclass(frozen=True)

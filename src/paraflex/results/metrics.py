@@ -102,6 +102,40 @@ def _motor_energy(run: Any, nominal: Any) -> Any:
     return integral(run.t, np.sum(np.sign(nominal.power) * run.power, axis=1))
 
 
+def _stress_where(used_up: Callable[[Any], Trace]) -> Formula:
+    """Largest magnitude of the stress in the section where the nominal run has most of something; NaN if it has none.
+
+    Of |N| / A + |M| c / I with the signs of the nominal run, over what `used_up` divides it by.
+    """
+
+    def value(run: Any, nominal: Any) -> Any:
+        if run.sections is None or nominal.sections is None:
+            return np.nan
+        (here, loads), (there, nominal_loads) = (
+            (each.sections.sections, each.sections.loads) for each in (run, nominal)
+        )
+        most = there.stress(nominal_loads) / np.real(used_up(there))
+        if not np.isfinite(most).any():
+            return np.nan
+        k, s = np.unravel_index(np.nanargmax(most), most.shape)
+        bending = np.sign(nominal_loads.moment[k, s]) * loads.moment[k, s] / here.modulus[s]
+        force = nominal_loads.force[k, s]
+        axial = 0.0 if np.isnan(force) else np.sign(force) * loads.force[k, s] / here.area[s]
+        return (bending + axial) / used_up(here)[s]
+
+    return value
+
+
+def _section_moment(run: Any, nominal: Any) -> Any:
+    if run.sections is None or nominal.sections is None:
+        return np.nan
+    return _largest_magnitude(lambda x: x.sections.loads.moment)(run, nominal)
+
+
+_stress = _stress_where(lambda sections: np.ones(len(sections.bodies)))
+_use = _stress_where(lambda sections: sections.strength)
+
+
 def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = False) -> Metric:
     """A number of the solution of the same name."""
     formula = _as_it_is(lambda x: getattr(x.run.solution, name))
@@ -150,6 +184,12 @@ _ALL = (
            _largest(lambda x: x.run.solution.strain_energy), "largest strain energy"),
     Metric("kinetic_energy_max", "largest kinetic energy", "J",
            _largest(lambda x: x.run.solution.kinetic_energy), "largest kinetic energy"),
+    Metric("stress_max", "largest magnitude of the stress in any beam, bending and axial; sections need outer_fibre",
+           "Pa", _stress, "largest stress"),
+    Metric("safety_factor_min", "least strength over stress of any beam; materials need strength", "1",
+           lambda run, nominal: 1.0 / _use(run, nominal), "least safety factor"),
+    Metric("section_moment_max", "largest magnitude of the bending moment in any beam", "N m",
+           _section_moment, "largest bending moment"),
     Metric("total_mass", "mass of all bodies", "kg",
            _as_it_is(lambda x: np.sum([body.integrals.m for body in x.run.task.system.bodies])), "mass"),
     Metric("actuation_condition_max", "largest condition number of the actuation matrix", "1",

@@ -18,8 +18,17 @@ from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
-from paraflex.results.labelled import Variables, label, link_coordinates, link_variables, padded, provenance
+from paraflex.results.labelled import (
+    Variables,
+    label,
+    link_coordinates,
+    link_variables,
+    padded,
+    provenance,
+    with_totals,
+)
 from paraflex.results.links import system_links
+from paraflex.results.loads import load_figures
 from paraflex.results.record import RUN_FIGURES
 from paraflex.results.summary import finite_or_none
 from paraflex.results.validity import validity_summary, validity_variables
@@ -51,8 +60,8 @@ def motion_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end; units and signs in
-        the attributes of every variable.
+        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end, section, drive;
+        units and signs in the attributes of every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v, a = solution.q, solution.v, solution.a
@@ -74,9 +83,8 @@ def motion_dataset(
     data |= {name: getattr(solution, name) for name in RUN_FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
     data["applied_torque"] = (("motor",), torques)
-    coordinates = {"time": run.times, "coordinate": _coordinate_names(run), **link_coordinates(system)}
-    out = xr.Dataset(data, coords=coordinates)
-    out["motor_power"] = out["motor_speed"] * out["applied_torque"]
+    coordinates = {"time": run.times, "coordinate": _coordinate_names(run), **link_coordinates(system, links)}
+    out = with_totals(xr.Dataset(data, coords=coordinates))
     label(out, mechanism)
     out.attrs = provenance(mechanism, title_of(solution.method), options or IntegrationOptions(), parameters) | {
         "kind": "motion",
@@ -100,6 +108,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         **numbers,
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
+        "loads": load_figures(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]) if reached.size else None,

@@ -11,6 +11,7 @@ from paraflex.dynamics import joint_coordinate
 from paraflex.dynamics.points import point_motion
 from paraflex.results.formulas import length
 from paraflex.results.outlines import deflections
+from paraflex.results.stress import SectionResult, section_result
 from paraflex.results.traces import Trace, Traces
 from paraflex.tracking import TrackingRun
 
@@ -31,6 +32,12 @@ class RunTraces(Traces):
     def deflection(self) -> Trace:
         """Deflections of the stations of all flexible bodies from their chords (k, stations) [m], signed."""
         return deflections(self.run.task.system, self.run.solution.q)
+
+    @cached_property
+    def sections(self) -> SectionResult | None:
+        """Section forces of the beams; None where none is flexible."""
+        solution = self.run.solution
+        return section_result(self.run.task.system, solution.q, solution.v, solution.a)
 
     @property
     def condition(self) -> Trace:

@@ -12,6 +12,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.results.doubts import verdict_of
 from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import check_kind
+from paraflex.results.loads import load_figures
 from paraflex.results.metrics import METRICS
 from paraflex.results.traces import data_traces
 from paraflex.results.validity import validity_summary
@@ -42,10 +43,10 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     -------
     dict
         `modes.<mode>` with tracking errors during the motion, after it and over all, vibration and drift, peak_torque
-        and rms_torque per motor, end_effector_final, the solver's figures and validity (None of rigid bodies); `error`,
-        which of the errors ranks the modes; `verdict`, with the level and all findings; `after`, what the motors do
-        after the path; `part`, how much of the path a run did that was too short for all of it, else None;
-        `parameters`; `version`. A figure not reached is None.
+        and rms_torque per motor, end_effector_final, the solver's figures, validity (None of rigid bodies) and `loads`
+        (see `loads.load_figures`); `error`, which of the errors ranks the modes; `verdict`, with the level and all
+        findings; `after`, what the motors do after the path; `part`, how much of the path a run did that was too short
+        for all of it, else None; `parameters`; `version`. A figure not reached is None.
     """
     check_kind(data, "tracking")
     modes, part = {}, part_run(data)
@@ -67,6 +68,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         numbers["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
         numbers["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
         numbers["validity"] = validity_summary(run)
+        numbers["loads"] = load_figures(run)
         modes[str(name)] = numbers
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}

@@ -117,6 +117,9 @@ class Verification(Result):
             tracking_dataset([records[name] for records in kept.values()], parameters=self.parameters, error=self.error)
             for name in names
         ]
+        # Models differ in what they give besides: section forces, angles of joints.
+        common = set.intersection(*(set(part.variables) for part in parts))
+        parts = [part.drop_vars(set(part.variables) - common) for part in parts]
         methods = [part.attrs.pop("method") for part in parts]
         data = xr.concat(parts, xr.Variable("model", names), combine_attrs="drop_conflicts", join="exact")
         data.attrs["reference"] = reference_model(names)

@@ -12,6 +12,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.rank import joint_of_row
+from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import CONSTRAINT
@@ -108,6 +109,7 @@ def doubtful_results(
     where = _Where("" if driven is None else f"mode {driven.mode}", mechanism)
     found = [
         *_large_slopes(where, system, solution),
+        *_overstressed(where, system, solution),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
     ]
@@ -136,6 +138,25 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
             "deflection-large", where.place,
             f"{worst} bends by {slopes[worst][k]:.2g} rad at t = {solution.t[k]:.4g} s: more a spring than a link",
             blame,
+        )  # fmt: skip
+
+
+def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+    """Beams that their loads stress beyond the strength of their material."""
+    sections = sections_of(system)
+    if sections is None or not np.isfinite(sections.strength).any():
+        return
+    stress = sections.stress(sections.loads(system, solution.q, solution.v, solution.a))
+    used = np.nan_to_num(stress / sections.strength)
+    k, station = np.unravel_index(np.argmax(used), used.shape)
+    if used[k, station] > 1.0:
+        name = sections.bodies[station]
+        yield Finding(
+            "stress-over-strength", where.place,
+            f"a stress of {1e-6 * stress[k, station]:.3g} MPa in {name} at {sections.x[station]:.3g} m, "
+            f"t = {solution.t[k]:.4g} s: its material bears {1e-6 * sections.strength[station]:.3g} MPa, the safety "
+            f"factor is {1.0 / used[k, station]:.2g}",
+            where.blame(name) or f"give {name} a stronger section or material, or move and load it less",
         )  # fmt: skip
 
 
