@@ -36,7 +36,7 @@ def test_expressions_are_arithmetic(text, value):
     ("text", "says"),
     [
         ("l1 -", "neither a number nor an expression"),
-        ("0.25 m", "neither a number nor an expression"),
+        ("0.25 metres", "unknown unit"),
         ("", "neither a number nor an expression"),
         ("l1; la", "neither a number nor an expression"),
         ("((((", "neither a number nor an expression"),

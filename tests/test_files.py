@@ -42,8 +42,8 @@ BROKEN = [
     ("length = 0.250 # m", "length = 0", "body.link1.length: must be positive", "in m"),
     (
         "length = 0.250 # m",
-        'length = "250 mm"',
-        "body.link1.length: neither a number nor an expression (got '250 mm')",
+        'length = "250 metres"',
+        "body.link1.length: unknown unit \"metres\" (got '250 metres')",
         "in m",
     ),
     ("length = 0.250 # m", "length = true", "body.link1.length", "give the length in m"),

@@ -36,6 +36,7 @@ from paraflex.mechanism import (
     RayleighDamping,
     RevoluteJoint,
     RigidBody,
+    Round,
     SampledAngle,
     Section,
     SlidingJoint,
@@ -324,7 +325,7 @@ def test_bodies_that_a_file_cannot_say(tmp_path):
             r"^body.ritz.transverse: a model file cannot say this .*give the sines from 1",
         ),
         (replace(ritz, lumps=(*ritz.lumps, LumpedMass("Q", 1.0))), r"^body.ritz.lumps: .*make one lump"),
-        (replace(ritz, section=Section(1.0, 1.0, (1.0, 2.0))), r"^body.ritz.section: .*give Section.rectangle"),
+        (replace(ritz, section=Section(1.0, 1.0, Round(2.0))), r"^body.ritz.section: .*give Section.rectangle"),
     ]:
         with pytest.raises(InputError, match=message):
             pf.Model(everything().with_bodies([body])).save(tmp_path / "not.toml")

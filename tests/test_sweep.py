@@ -15,10 +15,10 @@ import paraflex
 from paraflex.campaign import journal, tables
 from paraflex.campaign.journal import read_journal
 from paraflex.designs.measure import metrics_of
-from paraflex.designs.overlay import find_place, number_places, overlaid
 from paraflex.designs.run import Outcome, Task, run_task
 from paraflex.errors import InputError, OutputError
 from paraflex.files import Model, load, load_data
+from paraflex.files.overlay import find_place, number_places, overlaid
 from paraflex.results import load_results, summary, tracking_dataset
 from paraflex.results.metrics import METRICS
 from paraflex.studies import load_sweep, sweep

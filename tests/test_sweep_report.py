@@ -200,7 +200,7 @@ def test_units_are_those_of_the_files_schema():
         ("material", "x", "density"): "kg/m^3", ("path", "square", "max_acceleration"): "m/s^2",
         ("integration", "tolerance"): "m", ("parameters", "l1"): "", ("body", "a", "points", "P"): "m",
     }  # fmt: skip
-    assert {place: unit_of(place) for place in expected} == expected
+    assert {place: unit_of({}, place) for place in expected} == expected
 
 
 def test_the_best_are_chosen_by_each_metric_and_from_the_front():

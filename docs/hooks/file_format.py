@@ -16,14 +16,11 @@ HEAD = """# The model file, field by field
 This page is made from the schema that files are checked by; `paraflex schema` prints the same as JSON Schema, for
 editors. [Your own mechanism](../model-file.md) explains the tables with examples.
 
-SI units and radians throughout. Wherever a *number* may stand, so may an expression in quotes, `"l1 - 0.5 * l2"`: of
-numbers, names from `[parameters]`, `pi`, `+ - * / **`, brackets, and of one argument `sin cos tan asin acos atan`
+Plain numbers are in SI units and radians. Wherever a *number* may stand, so may one with a unit, `"80 mm"`, and an expression
+in quotes, `"l1 - 0.5 * l2"`: of numbers, names from `[parameters]`, `pi`, `+ - * / **`, brackets, and of one argument `sin cos tan asin acos atan`
 `sinh cosh tanh exp log sqrt`. Where *of the time* is said it may hold `t` as well. NAME stands for one that you choose.
 
 """
-
-# Two tables of a kind, a heading apart: what tells them.
-_KINDS = {"SectionTable": "rectangle", "GeneralSectionTable": "by its properties"}
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -65,7 +62,7 @@ class _Writer:
         definition = self.definitions[kind]
         named = f"{name}.NAME" if "additionalProperties" in field else name
         tag = definition.get("properties", {}).get("type", {}).get("const")
-        told = f', type = "{tag}"' if tag else f", {_KINDS[kind]}" if kind in _KINDS else ""
+        told = f', type = "{tag}"' if tag else ""
         head = f"{level} `[{named}]`{told}\n\n{_sentence(definition.get('description', ''))}"
         return head + self.fields(definition.get("properties", {}), definition.get("required", []), skip_type=bool(tag))
 

@@ -20,6 +20,7 @@ from .mechanism import (
     PointRef as PointRef,
     Motor as Motor,
     EndEffector as EndEffector,
+    Payload as Payload,
     ActuationMode as ActuationMode,
     Assembly as Assembly,
     Start as Start,

@@ -8,6 +8,7 @@ from typing import Any
 
 from paraflex.files import Model
 from paraflex.findings import Finding
+from paraflex.units import without_quantities
 
 _NAME = re.compile(r"[^\W\d]\w*")
 
@@ -36,7 +37,7 @@ def _unused(data: Mapping[str, Any]) -> Iterator[Finding]:
     Any text of the file that holds the name counts as a use of it.
     """
     texts = list(_texts(data))
-    words = {word for text in texts for word in _NAME.findall(text)}
+    words = {word for text in texts for word in _NAME.findall(without_quantities(text))}
     names = set(texts)
     used = {
         "parameters": lambda name: name in words,

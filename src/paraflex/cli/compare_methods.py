@@ -11,6 +11,7 @@ from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
+    asked_model,
     at_fault,
     find_mode,
     find_path,
@@ -23,7 +24,7 @@ from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import AssemblyError, InputError
-from paraflex.files import Model, load
+from paraflex.files import Model
 from paraflex.folders import COMPARISON, ResultsFolder
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
@@ -32,7 +33,7 @@ from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_ca
 
 def compare_methods_command(request: CompareMethodsRequest) -> int:
     """Run all methods, write what they took and how far off they are; the exit code."""
-    model = load(request.model.name)
+    model = asked_model(request.model)
     options, methods = _options(request), _methods(request)
     # Every check that needs no computing comes before the first minute is spent.
     mode = _mode(model, request)
@@ -57,7 +58,12 @@ def _compare(
     else:
         path, name = find_path(model, request.path)
         case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-    asked = {"mechanism": model.source, "limit": options.limit, "repetitions": options.repetitions}
+    asked = {
+        "mechanism": model.source,
+        "set": dict(model.settings),
+        "limit": options.limit,
+        "repetitions": options.repetitions,
+    }
     asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
     study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
     with counting(console) as report:

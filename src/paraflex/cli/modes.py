@@ -14,11 +14,11 @@ from rich.table import Table
 from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
 from paraflex.cli.commands.models import ModesRequest
-from paraflex.cli.request import find_path
+from paraflex.cli.request import asked_model, find_path
 from paraflex.cli.tables import plain_console
 from paraflex.dynamics import build_system, closure_of, mobility, reach
 from paraflex.errors import ActuationError
-from paraflex.files import Model, load
+from paraflex.files import Model
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
 
 # Samples of the path at which modes are judged.
@@ -32,7 +32,7 @@ def modes_command(request: ModesRequest) -> None:
 
     Of a model that names none: the sets of motors that could be asked for.
     """
-    model, path = load(request.model.name), request.path
+    model, path = asked_model(request.model), request.path
     effort = _effort(model, path)
     named = _named_modes(model)
     rows, more = [_row(mode, effort) for mode in named], 0

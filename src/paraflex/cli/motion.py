@@ -82,7 +82,13 @@ def _run_held(
     run = _simulate(console, model, mechanism, options, balanced=request.balanced)
     parameters = {
         "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "duration": study.duration, "samples": study.samples} | how,
+        "run": {
+            "mechanism": model.source,
+            "set": dict(model.settings),
+            "duration": study.duration,
+            "samples": study.samples,
+        }
+        | how,
     }
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))

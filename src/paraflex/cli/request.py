@@ -6,14 +6,26 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 
-from paraflex.cli.commands.options import FramesChoice, PlanChoice
+from paraflex.cli.commands.options import FramesChoice, ModelChoice, PlanChoice
 from paraflex.cli.commands.requests import flags
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
-from paraflex.files import Model, load_path
+from paraflex.files import Model, load, load_path
+from paraflex.files.overlay import value_of
 from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.tracking import TrackingTask
 from paraflex.validity import to_blame
+
+
+def asked_model(choice: ModelChoice) -> Model:
+    """The model that a command is to take, with what --set says."""
+    found = {}
+    for text in choice.settings:
+        name, equals, value = text.partition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise InputError("no field and value", field="--set", value=text, remedy='say "link1.length=0.3"')
+        found[name.strip()] = value_of(value.strip())
+    return load(choice.name, set=found)
 
 
 def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:

@@ -21,6 +21,7 @@ from paraflex.cli.integration import check_stops, given_flags, integration_optio
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
+    asked_model,
     at_fault,
     find_modes,
     find_path,
@@ -33,7 +34,7 @@ from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
-from paraflex.files import Model, load
+from paraflex.files import Model
 from paraflex.folders import RUN, ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path
@@ -46,7 +47,7 @@ from paraflex.tracking import TrackingRun, TrackingTask, simulate
 def run_command(request: RunRequest) -> int:
     """Run a study and write its results; the exit code."""
     console = plain_console(stderr=True)
-    model = load(request.model.name)
+    model = asked_model(request.model)
     _check_fidelity(request)
     options = integration_options(request, model.study)
     how = {} if request.ked else integration_parameters(options, request.stop_at)
@@ -190,6 +191,7 @@ def _parameters(
         "model": dict(model.parameters),
         "run": {
             "mechanism": model.source,
+            "set": dict(model.settings),
             "path": path,
             "modes": [mode.name for mode in modes],
             "duration": float(task.motion.t[-1]),

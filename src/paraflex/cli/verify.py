@@ -13,6 +13,7 @@ from paraflex.cli.commands.runs import VerifyRequest
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
+    asked_model,
     find_mode,
     find_modes,
     find_path,
@@ -25,7 +26,7 @@ from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
-from paraflex.files import Model, load
+from paraflex.files import Model
 from paraflex.folders import VERIFICATION, ResultsFolder
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry
@@ -34,7 +35,7 @@ from paraflex.studies import FIDELITIES, VerificationOptions, VerificationStudy,
 
 def verify_command(request: VerifyRequest) -> int:
     """Run all models, write what they say of each other; the exit code."""
-    model = load(request.model.name)
+    model = asked_model(request.model)
     path, path_name = find_path(model, request.path)
     modes = find_modes(model, request.modes) if request.modes else [find_mode(model, [])]
     _options(request)
@@ -63,7 +64,12 @@ def _verify(
     task = plan_study(model, mechanism, path, path_name, request.plan)
     parameters = {
         "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "path": path_name, "modes": [mode.name for mode in modes]}
+        "run": {
+            "mechanism": model.source,
+            "set": dict(model.settings),
+            "path": path_name,
+            "modes": [mode.name for mode in modes],
+        }
         | asdict(request.frames)
         | asdict(options)
         | {"method": options.method.name, "method_parameters": options.method.values},

@@ -11,11 +11,11 @@ import xarray as xr
 
 from paraflex.campaign import STUDY, read_study
 from paraflex.designs.measure import measure
-from paraflex.designs.overlay import Place
 from paraflex.designs.run import Abandoned, Task, plan_task
 from paraflex.designs.samples import Varied
 from paraflex.designs.setting import Setting, digest, versions
 from paraflex.errors import InputError
+from paraflex.files.overlay import Place
 from paraflex.results import tracking_dataset
 from paraflex.tracking import simulate
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from paraflex.files.read import naming, read_toml, validate
-from paraflex.files.schema import Count, Number, Text, Yes
+from paraflex.files.schema import Count, Number, NumberOfFields, Text, Yes
 
 T = TypeVar("T", bound=BaseModel)
 
@@ -25,9 +25,9 @@ class VaryTable(Table):
     """A parameter."""
 
     fields: list[Text] = Field(default=[], description="fields of the mechanism's file, all given the same number")
-    values: list[Any] | None = Field(default=None, description="a list of numbers")
-    low: Number | None = Field(default=None, description="the smallest value")
-    high: Number | None = Field(default=None, description="the largest value")
+    values: list[Any] | None = Field(default=None, description="a list of numbers, in the unit of its fields")
+    low: NumberOfFields | None = Field(default=None, description="the smallest value, in the unit of its fields")
+    high: NumberOfFields | None = Field(default=None, description="the largest value, in the unit of its fields")
     number: Count | None = Field(default=None, description="how many values of a grid from low to high")
     scale: Literal["linear", "log"] = Field(default="linear", description='"linear" or "log"')
     whole: Yes = Field(default=False, description="true for whole numbers only")

@@ -12,14 +12,17 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from paraflex.designs.measure import metrics_of
-from paraflex.designs.overlay import Place, find_place, overlaid
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, VaryTable
+from paraflex.designs.units import check_unit_of
 from paraflex.errors import InputError, suggestion
 from paraflex.files import Model, library_names, model_from
+from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.generators import is_generated
 from paraflex.files.model import read_model
+from paraflex.files.overlay import Place, find_place, overlaid
 from paraflex.files.read import exists
+from paraflex.files.schema import NumberOfText
 from paraflex.findings import Verdict
 from paraflex.integrators import IntegrationOptions, check_times
 from paraflex.limits import WHOLE, at_most, of_size
@@ -154,12 +157,12 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
     """
     model = read_model(_mechanism(table.mechanism, folder))
     data = model.parameters
-    parameters = tuple(_varied(name, entry) for name, entry in table.vary.items())
+    parameters = tuple(_varied(name, entry, data) for name, entry in table.vary.items())
     setting = Setting(
         data=data,
         source=model.source,
         names=tuple(parameter.name for parameter in parameters),
-        places=tuple(_places(data, parameter) for parameter in parameters),
+        places=tuple(_places(data, parameter.name, parameter.fields) for parameter in parameters),
         whole=tuple(parameter.whole for parameter in parameters),
         paths=_paths(model, table.paths),
         modes=_modes(model, table.modes),
@@ -193,13 +196,15 @@ def _mechanism(name: str, folder: FilePath) -> str:
     return str(beside) if name not in library_names() and not is_generated(name) and exists(beside) else name
 
 
-def _varied(name: str, entry: VaryTable) -> Varied:
-    values = entry.values
-    for value in values or []:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise InputError("not a number", field=f"vary.{name}.values", value=value, remedy="give a list of numbers")
-        of_size(value, f"vary.{name}.values")
-    whole = entry.whole or (bool(values) and all(isinstance(value, int) for value in values))
+def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> Varied:
+    fields = tuple(entry.fields) or (name,)
+    for place in _places(data, name, fields):
+        for key in ("low", "high", "start"):
+            value = getattr(entry, key, None)
+            if isinstance(value, NumberOfText):
+                check_unit_of(data, place, value.text, f"vary.{name}.{key}")
+    values = None if entry.values is None else [_value(name, value, data, fields) for value in entry.values]
+    whole = entry.whole or (bool(values) and all(isinstance(value, int) for value in values or ()))
     if entry.whole and any(value % 1 for value in values or []):
         raise InputError(
             "not all of them whole", field=f"vary.{name}.values", value=values, remedy="leave out whole = true"
@@ -208,21 +213,39 @@ def _varied(name: str, entry: VaryTable) -> Varied:
         at_most(abs(value), WHOLE, f"vary.{name}", "too large for a whole number")
     return Varied(
         name=name,
-        fields=tuple(entry.fields) or (name,),
+        fields=fields,
         values=None if values is None else tuple(map(float, values)),
-        low=entry.low,
-        high=entry.high,
+        low=None if entry.low is None else float(entry.low),
+        high=None if entry.high is None else float(entry.high),
         number=entry.number,
         log=entry.scale == "log",
         whole=whole,
     )
 
 
-def _places(data: Mapping[str, Any], parameter: Varied) -> tuple[Place, ...]:
+def _value(name: str, value: Any, data: Mapping[str, Any], fields: tuple[str, ...]) -> float | int:
+    """A value of a list, in SI units."""
+    field, remedy = f"vary.{name}.values", "give a list of numbers"
+    if isinstance(value, str):
+        try:
+            number = evaluate(value, {})
+        except ExpressionError as error:
+            why = f"{remedy} ({error.problem}; {error.remedy})"
+            raise InputError("not a number", field=field, value=value, remedy=why) from None
+        for place in _places(data, name, fields):
+            check_unit_of(data, place, value, field)
+        value = number
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError("not a number", field=field, value=value, remedy=remedy)
+    of_size(value, field)
+    return value
+
+
+def _places(data: Mapping[str, Any], name: str, fields: tuple[str, ...]) -> tuple[Place, ...]:
     try:
-        return tuple(_place(data, field) for field in parameter.fields)
+        return tuple(_place(data, field) for field in fields)
     except InputError as error:
-        given = f"vary.{parameter.name}.fields" if parameter.fields != (parameter.name,) else f"vary.{parameter.name}"
+        given = f"vary.{name}.fields" if fields != (name,) else f"vary.{name}"
         raise InputError(error.problem, field=given, value=error.field, remedy=error.remedy) from None
 
 

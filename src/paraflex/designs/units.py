@@ -1,56 +1,34 @@
-"""Units of the numbers of a mechanism's file, from the descriptions in its schema."""
+"""Units of the numbers that designs vary, from the descriptions in the schemas of files."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from functools import cache
-from typing import Any, get_args, get_origin
+from collections.abc import Mapping
+from typing import Any
 
 from pydantic import BaseModel
 
-from paraflex.designs.overlay import Place
-from paraflex.designs.schema import IntegrationTable, SweepTable
+from paraflex.designs.schema import SweepTable
+from paraflex.files.fields import Place, check_unit, field_at, units_at
 from paraflex.files.schema import ModelTable
 
-_FILE_UNITS = (
-    "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad", "N s/m", "N m", "N/m", "m/s^2", "m^4", "m^2", "m/s",
-    "rad/s", "rad", "Pa", "1/s", "m", "s", "N",
-)  # fmt: skip
-# Of "the length in m", "the torque in N m, or force in N": the first; the longest that fits stands first in the list.
-_UNIT = re.compile(rf"\bin ({'|'.join(map(re.escape, _FILE_UNITS))})(?=[\s,.)]|$)")
+
+def unit_of(data: Mapping[str, Any], place: Place) -> str:
+    """The unit of a number of a mechanism's file, or of a study's [integration]; empty if it has none, or any."""
+    units = units_at(_schema(place), data, place) or ()
+    return units[0] if len(units) == 1 else ""
 
 
-@cache
-def unit_of(place: Place) -> str:
-    """The unit of a number of a mechanism's file, or of a study's [integration]; empty if it has none."""
-    descriptions = list(_descriptions((ModelTable, IntegrationTable, SweepTable), place))
-    found = [match.group(1) for match in map(_UNIT.search, descriptions) if match]
-    return found[0] if found and len(set(found)) == 1 else ""
+def check_unit_of(data: Mapping[str, Any], place: Place, text: str, field: str) -> None:
+    """Check the unit of an expression that a study gives for a number of a mechanism's file.
+
+    Raises
+    ------
+    InputError
+        See `files.fields.check_unit`.
+    """
+    schema = _schema(place)
+    check_unit(text, {}, units_at(schema, data, place), field, field_at(schema, data, place).description)
 
 
-def _descriptions(kinds: tuple[Any, ...], place: Place) -> Iterator[str]:
-    """Descriptions of the field at a place, by each of the tables that may be there."""
-    key, *rest = place
-    for kind in kinds:
-        field = kind.model_fields.get(str(key)) if isinstance(kind, type) and issubclass(kind, BaseModel) else None
-        if field is None:
-            continue
-        models, depth = _inside(field.annotation)
-        inner = tuple(rest[depth:])
-        if field.description and not (models and inner):
-            yield field.description
-        elif models and inner:
-            yield from _descriptions(models, inner)
-
-
-def _inside(annotation: Any) -> tuple[tuple[Any, ...], int]:
-    """The tables within an annotation, and the number of keys of dicts and lists that lead to them."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return (annotation,), 0
-    arguments = get_args(annotation)
-    container = get_origin(annotation) in (dict, list)
-    inner = [_inside(each) for each in (arguments[-1:] if container else arguments)]
-    models = tuple(model for each, _ in inner for model in each)
-    depth = max((deep for each, deep in inner if each), default=0)
-    return models, depth + (1 if container else 0)
+def _schema(place: Place) -> type[BaseModel]:
+    return SweepTable if place[0] == "integration" else ModelTable

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import MISSING, fields
 from typing import Any
 
 from paraflex.errors import InputError
@@ -11,10 +12,10 @@ from paraflex.files.schema import (
     AssumedModesTable,
     BeamTable,
     DampingTable,
-    GeneralSectionTable,
     ModalTable,
     ModelTable,
     RigidTable,
+    SectionTable,
 )
 from paraflex.limits import SHAPE_FUNCTIONS, at_most
 from paraflex.mechanism import (
@@ -37,6 +38,7 @@ from paraflex.mechanism import (
     Sine,
 )
 from paraflex.mechanism.quantities import known
+from paraflex.mechanism.sections import SHAPES
 
 
 def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | ModalTable, table: ModelTable) -> Body:
@@ -79,22 +81,44 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
 
 
 def _section(body: str, name: str, table: ModelTable) -> Section:
-    section = _named(table.section, name, f"body.{body}.section", "section")
-    if isinstance(section, GeneralSectionTable):
-        return Section(**dict(section))
-    _check_sides(section.width, section.thickness, f"section.{name}")
-    return Section.rectangle(section.width, section.thickness)
+    return read_section(name, _named(table.section, name, f"body.{body}.section", "section"))
+
+
+def read_section(name: str, table: SectionTable) -> Section:
+    """A section from its table.
+
+    Raises
+    ------
+    InputError
+        A field that sections of its shape do not have, or one that they need, or numbers that cannot be.
+    """
+    given = {key: value for key, value in table if value is not None}
+    kind = given.pop("shape", None)
+    if kind is None and "diameter" in given:
+        raise InputError("is missing", field=f"section.{name}.shape", remedy='say "round" or "tube"')
+    if kind is None and not given.keys() & {"area", "second_moment"}:
+        kind = "rectangle"
+    made: Any = Section if kind is None else SHAPES[kind]
+    own = {each.name: each for each in fields(made) if each.name != "shape"}
+    for key, value in given.items():
+        if key not in own:
+            what = kind or "section by its area"
+            raise InputError(
+                f"a {what} has no {key}", field=f"section.{name}.{key}", value=value, remedy="leave it out"
+            )
+    for key, each in own.items():
+        if each.default is MISSING and key not in given:
+            remedy = f"give {SectionTable.model_fields[key].description}"
+            raise InputError("is missing", field=f"section.{name}.{key}", remedy=remedy)
+    try:
+        return Section(**given) if kind is None else Section.of(made(**given))
+    except InputError as error:
+        raise error.at(f"section.{name}.{error.field.rpartition('.')[2]}") from None
 
 
 def _material(body: str, name: str, table: ModelTable) -> Material:
     material = _named(table.material, name, f"body.{body}.material", "material")
     return Material(**dict(material))
-
-
-def _check_sides(width: float, thickness: float, name: str) -> None:
-    for side, value in (("width", width), ("thickness", thickness)):
-        if not value > 0.0:
-            raise InputError("must be positive", field=f"{name}.{side}", value=value, remedy="give it in m")
 
 
 def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:

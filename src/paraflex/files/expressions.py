@@ -1,4 +1,7 @@
-"""Parameters of a model file and expressions of them, such as "l1 - la" or "a * sin(w * t)": no code is run."""
+"""Parameters of a model file and expressions of them, such as "l1 - la", "30 deg" or "a * sin(w * t)".
+
+No code is run. A unit stands directly behind a number; a name anywhere else is a parameter, a function or the time.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,9 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError, suggestion
 from paraflex.files.jets import FUNCTIONS, Jet
 from paraflex.limits import EXPRESSION_LETTERS, PARAMETER_CHAIN
+from paraflex.units import UNITS, divisors_in, quantities_in, unknown_unit
 
-_CONSTANTS = {"pi": math.pi}
+CONSTANTS = {"pi": math.pi}
 # The name of time in an expression of it.
 TIME_NAME = "t"
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
@@ -42,11 +46,14 @@ class ExpressionError(ValueError):
 def evaluate(text: str, parameters: Mapping[str, float]) -> float:
     """Value of an expression of numbers, parameters, pi, + - * / **, brackets and the functions of `jets`.
 
+    Numbers may have units, which `dimensions` checks.
+
     Raises
     ------
     ExpressionError
         It does not parse, has anything else in it, names an unknown parameter, or has no finite value.
     """
+    _refuse_ambiguous(text, parameters)
     return _evaluate(text, lambda name: _look_up(name, parameters))
 
 
@@ -89,7 +96,7 @@ def is_constant(text: str) -> bool:
 
 def names_in(text: str) -> set[str]:
     """What an expression speaks of: parameters, functions, time."""
-    return {node.id for node in ast.walk(_parse(text)) if isinstance(node, ast.Name)}
+    return {node.id for node in ast.walk(tree_of(text)) if isinstance(node, ast.Name)}
 
 
 def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
@@ -103,10 +110,10 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
     values: dict[str, float] = {}
 
     def value_of(name: str, open_names: tuple[str, ...]) -> float:
-        if name in values or name in _CONSTANTS:
-            return values.get(name, _CONSTANTS.get(name, 0.0))
+        if name in values or name in CONSTANTS:
+            return values.get(name, CONSTANTS.get(name, 0.0))
         if name not in table:
-            raise ExpressionError(f'unknown parameter "{name}"', suggestion(name, table))
+            raise _unknown(name, table)
         if name in open_names:
             circle = " -> ".join([*open_names[open_names.index(name) :], name])
             raise ExpressionError(f"a circle of parameters, {circle}", "give one of them a number")
@@ -115,6 +122,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
             raise ExpressionError("a chain of too many parameters", remedy)
         entry = table[name]
         if isinstance(entry, str):
+            _refuse_ambiguous(entry, table)
             values[name] = _evaluate(entry, lambda other: value_of(other, (*open_names, name)))
         else:
             values[name] = _float(entry)
@@ -122,7 +130,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
 
     for name, entry in table.items():
         field = f"parameters.{name}"
-        if not name.isidentifier() or name in _CONSTANTS:
+        if not name.isidentifier() or name in CONSTANTS:
             raise InputError("not usable as a name", field=field, value=name, remedy="letters, digits and _; not pi")
         if isinstance(entry, bool) or not isinstance(entry, (int, float, str)):
             raise InputError("neither a number nor an expression", field=field, value=entry, remedy="give one of them")
@@ -140,6 +148,8 @@ def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64])
         raise ExpressionError(
             f'"{TIME_NAME}" is the time in this expression', f'give the parameter "{TIME_NAME}" another name'
         )
+
+    _refuse_ambiguous(text, parameters)
 
     def value_of(name: str) -> Any:
         return Jet.time(t) if name == TIME_NAME else _look_up(name, parameters)
@@ -166,18 +176,54 @@ def _float(number: float) -> float:
         raise ExpressionError("too large a number", "check its digits") from None
 
 
-def _parse(text: str) -> ast.AST:
+def tree_of(text: str) -> ast.AST:
+    """The syntax tree of an expression; 80 mm is 0.08 @ "mm" in it.
+
+    Raises
+    ------
+    ExpressionError
+        It does not parse.
+    """
     if len(text) > EXPRESSION_LETTERS:
         remedy = f"at most {EXPRESSION_LETTERS} letters; name its parts as parameters"
         raise ExpressionError("too long for an expression", remedy)
     try:
-        return ast.parse(text.strip(), mode="eval").body
+        return ast.parse(_without_units(text).strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ExpressionError("neither a number nor an expression", 'write it like "l1 - 0.5 * la"') from None
+        unknown = unknown_unit(text)
+        if unknown is not None:
+            raise ExpressionError(f'unknown unit "{unknown[0]}"', unknown[1]) from None
+        remedy = 'write it like "l1 - 0.5 * la", or "80 mm" with the unit behind a number'
+        raise ExpressionError("neither a number nor an expression", remedy) from None
+    except OverflowError:
+        raise ExpressionError("too large a number", "check its digits") from None
+
+
+def _without_units(text: str) -> str:
+    """An expression with its quantities as products that Python can parse."""
+    if "@" in text:
+        raise SyntaxError
+    out, end = "", 0
+    for found in quantities_in(text):
+        if math.isinf(found.value):
+            raise OverflowError
+        out += f'{text[end : found.start]}({found.value!r} @ "{found.unit}")'
+        end = found.end
+    return out + text[end:]
+
+
+def _refuse_ambiguous(text: str, parameters: Mapping[str, Any]) -> None:
+    for found in quantities_in(text) if parameters else ():
+        for name in sorted(divisors_in(found.unit) & parameters.keys()):
+            written = text[found.start : found.end]
+            raise ExpressionError(
+                f'"{name}" in "{written}" is a unit and a parameter',
+                f"put what is divided by the parameter in brackets, or give the parameter another name than {name}",
+            )
 
 
 def _arithmetic(text: str, value_of: Callable[[str], Any]) -> Any:
-    tree = _parse(text)
+    tree = tree_of(text)
     try:
         return _value(tree, value_of)
     except ZeroDivisionError:
@@ -192,6 +238,8 @@ def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
             return _float(number)
         case ast.Name(id=name):
             return value_of(name)
+        case ast.BinOp(left=number, op=ast.MatMult()):
+            return _value(number, value_of)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
             value = _BINARY[type(op)](_value(left, value_of), _value(right, value_of))
             if isinstance(value, complex):  # a negative number to a broken power
@@ -223,8 +271,15 @@ def _call(name: str, arguments: list[Any]) -> Any:
 def _look_up(name: str, parameters: Mapping[str, float]) -> float:
     if name in parameters:
         return parameters[name]
-    if name in _CONSTANTS:
-        return _CONSTANTS[name]
+    if name in CONSTANTS:
+        return CONSTANTS[name]
     if name in FUNCTIONS:
         raise ExpressionError(f"{name} is a function", f"write {name}(...)")
-    raise ExpressionError(f'unknown parameter "{name}"', suggestion(name, parameters))
+    raise _unknown(name, parameters)
+
+
+def _unknown(name: str, parameters: Mapping[str, Any]) -> ExpressionError:
+    remedy = suggestion(name, parameters)
+    if name in UNITS:
+        remedy = f'a unit stands behind a number, units with a space between them: "1 {name}", "5 N m"'
+    return ExpressionError(f'unknown parameter "{name}"', remedy)

@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.files.bodies import read_body
+from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import quantities, read_law
 from paraflex.files.schema import AssemblyTable, JointTable, ModelTable, PathTable, PrescribedTable
@@ -21,6 +21,7 @@ from paraflex.mechanism import (
     Joint,
     Mechanism,
     Motor,
+    Payload,
     PointRef,
     PrescribedAngle,
     RevoluteJoint,
@@ -39,6 +40,8 @@ def read_mechanism(table: ModelTable) -> Mechanism:
     InputError
         Anything in it that does not fit together.
     """
+    for name, section in table.section.items():
+        read_section(name, section)
     effector = table.end_effector
     made: dict[str, Any] = {
         key: getattr(table, key) for key in ("name", "description", "geometry", "ground", "gravity")
@@ -46,7 +49,7 @@ def read_mechanism(table: ModelTable) -> Mechanism:
     for field, group in groups_of(Mechanism).items():
         if group.kinds:
             made[field] = [_member(group, name, dict(one)) for name, one in getattr(table, group.table).items()]
-    return Mechanism(
+    mechanism = Mechanism(
         **made,
         bodies=tuple(read_body(name, body, table) for name, body in table.body.items()),
         joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
@@ -56,6 +59,7 @@ def read_mechanism(table: ModelTable) -> Mechanism:
         assemblies=tuple(_assembly(name, one) for name, one in table.assembly.items()),
         modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
     )
+    return mechanism if table.payload is None else mechanism.with_payload(Payload(**dict(table.payload)))
 
 
 def _joint(name: str, entry: list[str] | JointTable) -> Joint:

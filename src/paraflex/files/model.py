@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -13,6 +13,7 @@ from paraflex.files.generators import generated_text, generator_names, is_genera
 from paraflex.files.library import library_file, library_names
 from paraflex.files.mechanism import read_mechanism, read_path
 from paraflex.files.merge import merged, same
+from paraflex.files.overlay import with_values
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
 from paraflex.files.rows import with_names, with_rows
 from paraflex.files.schema import ModelTable, PathFile
@@ -45,6 +46,8 @@ class Model(CheckedFields):
         Deflection and velocity at the start of a run without a path; None for a start undeformed and at rest.
     text : str
         The file's text, which `save` keeps the comments of.
+    settings : mapping
+        What `load` has set in place of what the file says, by field.
     """
 
     mechanism: Mechanism
@@ -54,6 +57,7 @@ class Model(CheckedFields):
     parameters: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     start: Start | None = None
     text: str = field(default="", repr=False, compare=False)
+    settings: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -238,13 +242,16 @@ def plan(
 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
-def load(name_or_file: str | FilePath) -> Model:
+def load(name_or_file: str | FilePath, *, set: Mapping[str, Any] | None = None) -> Model:
     """Read a model from the library or from a TOML file; numbers that are not plausible issue a `ModelWarning` each.
 
     Parameters
     ----------
     name_or_file : str or Path
         A name of `library_names()`, one with a number ("four_bars:3"), or a file.
+    set : mapping of str to Any, optional
+        Values in place of what the file says, by field: `{"body.link1.length": 0.3, "section.bar.width": "80 mm"}`. The
+        table may be left out where one alone has the name: "link1.length".
 
     Returns
     -------
@@ -255,15 +262,18 @@ def load(name_or_file: str | FilePath) -> Model:
     InputError
         Unknown name, unreadable file, or anything in it that does not fit: it names file, field, value and remedy.
     """
-    model = read_model(name_or_file)
+    model = read_model(name_or_file, set or {})
     warn_of(doubtful_numbers(model.mechanism, model.study.duration))
     return model
 
 
-def read_model(name_or_file: str | FilePath) -> Model:
+def read_model(name_or_file: str | FilePath, settings: Mapping[str, Any] | None = None) -> Model:
     """What `load` reads, without its warnings."""
     text, source, folder = _read(name_or_file)
-    return model_from(_parsed(text, source, folder), source, text)
+    data = _parsed(text, source, folder)
+    with naming(source):
+        data = with_values(data, settings or {})
+    return replace(model_from(data, source, text), settings=dict(settings or {}))
 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
@@ -363,6 +373,9 @@ def _data(model: Model) -> dict[str, Any]:
     data = dict(model.parameters)
     if not data:
         return _checked(model, _tables(model))
+    if "payload" in data and _carrier(model_from(data, model.source)) != _carrier(model):
+        # The body's own numbers, which are written, then include the payload.
+        data.pop("payload")
     for each in (False, True, True):
         found = model_from(data, model.source)
         now, wanted = (_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
@@ -370,6 +383,12 @@ def _data(model: Model) -> dict[str, Any]:
             return data
         data = merged(data, now, wanted)
     return _checked(model, data)
+
+
+def _carrier(model: Model) -> tuple[Any, ...]:
+    """The end-effector's point, and the body that carries it."""
+    effector = model.mechanism.end_effector
+    return effector, [body for body in model.mechanism.bodies if effector and body.name == effector.point.body]
 
 
 def _tables(model: Model, **options: Any) -> dict[str, Any]:

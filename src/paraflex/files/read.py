@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from paraflex.errors import InputError, listed
 from paraflex.files.expressions import evaluate_parameters
+from paraflex.files.fields import check_units, field_at
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
 
 # A key of more parts than any has: the parser would take minutes for thousands of them.
@@ -156,29 +157,30 @@ def naming(source: str) -> Iterator[None]:
 
 
 def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
-    """Check parsed data against a schema; numbers may be expressions of the data's [parameters].
+    """Check parsed data against a schema; numbers may be expressions of the data's [parameters], and have units.
 
     Raises
     ------
     InputError
-        The first field that does not fit.
+        The first field that does not fit, or a unit that is none of the field's.
     """
     table = data.get("parameters", {})
-    try:
+    with naming(source):
         parameters = evaluate_parameters(table if isinstance(table, dict) else {})
-    except InputError as error:
-        raise error.in_file(source) from None
-    try:
-        return schema.model_validate(data, context={"parameters": parameters})
-    except ValidationError as error:
-        raise _first_problem(schema, data, error, source) from None
+        try:
+            checked = schema.model_validate(data, context={"parameters": parameters})
+        except ValidationError as error:
+            raise _first_problem(schema, data, error, source) from None
+        check_units(schema, data)
+    return checked
 
 
 def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
     problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
     location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)
-    model, description = _look_up(schema, data, location)
+    place = field_at(schema, data, location)
+    model, description = place.owner, place.description
     kind, value = problem["type"], problem.get("input")
     if kind == "missing":
         return InputError("is missing", field=field, remedy=f"give {description}", source=source)
@@ -259,7 +261,7 @@ def _tag_position(schema: type[BaseModel], table: Any) -> int | None:
 def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
     """How well a problem explains itself: a misspelt name best, for it explains the missing one beside it."""
     location = _fields(schema, data, problem)
-    model, _ = _look_up(schema, data, location)
+    model = field_at(schema, data, location).owner
     known = set(model.model_fields) if model is not None else set()
     name = str(location[-1]) if location else ""
     if problem["type"] == "extra_forbidden":
@@ -277,46 +279,3 @@ def _is_variant(part: Any) -> bool:
     return isinstance(part, str) and (
         part.endswith("Table") or "[" in part or part in ("int", "constrained-int", "str", "constrained-str")
     )
-
-
-def _look_up(schema: type[BaseModel], data: Any, location: list) -> tuple[type[BaseModel] | None, str]:
-    """The model a field belongs to and the field's description, found by walking the annotations."""
-    model: Any = schema
-    owner: type[BaseModel] | None = schema
-    description = "a value"
-    for part in location:
-        data = data.get(part) if isinstance(data, dict) else None
-        if isinstance(model, type) and issubclass(model, BaseModel):
-            owner = model
-            info = model.model_fields.get(str(part))
-            if info is None:
-                return owner, description
-            description = info.description or f"a [{part}.NAME] table"
-            model = info.annotation
-        else:
-            model = _inner(model, data)
-        model = _resolve(model, data)
-    return owner, description
-
-
-def _inner(annotation: Any, data: Any) -> Any:
-    """What a dict or list annotation holds."""
-    arguments = typing.get_args(annotation)
-    return arguments[-1] if typing.get_origin(annotation) in (dict, list) and arguments else annotation
-
-
-def _resolve(annotation: Any, data: Any) -> Any:
-    """Strip Annotated, and of a union take the model whose `type` or fields the data has."""
-    while typing.get_origin(annotation) is typing.Annotated:
-        annotation = typing.get_args(annotation)[0]
-    members = [_resolve(member, data) for member in typing.get_args(annotation)]
-    models = [member for member in members if isinstance(member, type) and issubclass(member, BaseModel)]
-    if typing.get_origin(annotation) in (dict, list) or not models:
-        return annotation
-    if isinstance(data, dict):
-        for model in models:
-            kind = model.model_fields.get("type")
-            if kind is not None and data.get("type") in typing.get_args(kind.annotation):
-                return model
-        return max(models, key=lambda model: len(set(model.model_fields) & set(data)))
-    return models[0]

@@ -1,12 +1,12 @@
 """The model file as pydantic sees it: which fields there are, of what type and unit.
 
-SI units and radians throughout. What a field must satisfy beyond its type (positive lengths, points that exist) is
-checked once, in `mechanism.checks` and by the paths themselves.
+SI units and radians throughout; a number with another unit is a text, "80 mm". What a field must satisfy beyond its
+type (positive lengths, points that exist) is checked once, in `mechanism.checks` and by the paths themselves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, fields
 from enum import Enum
 from functools import reduce
@@ -15,13 +15,24 @@ from operator import or_
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo, create_model
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    WrapValidator,
+    create_model,
+)
 from pydantic_core import PydanticCustomError
 
 from paraflex.files.expressions import ExpressionError, check_in_time, evaluate
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
 from paraflex.mechanism.quantities import joint_pair
+from paraflex.mechanism.sections import SHAPES
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -50,6 +61,20 @@ def _function(value: Any, info: ValidationInfo) -> Any:
     return float(value)
 
 
+class NumberOfText(float):
+    """The value of an expression, with its text: the unit is checked where its field is known."""
+
+    text: str = ""
+
+
+def _with_text(value: Any, number: Callable[[Any], float]) -> float:
+    found = number(value)
+    if isinstance(value, str):
+        found = NumberOfText(found)
+        found.text = value
+    return found
+
+
 def _parameters(info: ValidationInfo) -> dict[str, float]:
     return (info.context or {}).get("parameters", {})
 
@@ -58,12 +83,14 @@ def _refused(problem: str, remedy: str) -> PydanticCustomError:
     return PydanticCustomError("expression", "{problem}", {"problem": problem, "remedy": remedy})
 
 
-# A number, or an expression of parameters in quotes.
+# A number, or an expression of parameters and numbers with units in quotes.
 Number = Annotated[
     float,
     Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST),
     BeforeValidator(_number, json_schema_input_type=float | str),
 ]
+# A number of a study that stands for fields of a mechanism's file.
+NumberOfFields = Annotated[Number, WrapValidator(_with_text)]
 # A number, or an expression of parameters and the time t in quotes.
 FunctionOfTime = Annotated[Any, BeforeValidator(_function, json_schema_input_type=float | str)]
 Count = Annotated[int, Field(strict=True, ge=-WHOLE, le=WHOLE)]
@@ -142,17 +169,17 @@ def _joint_table() -> Any:
 
 
 class SectionTable(_Table):
-    """A rectangular cross-section."""
+    """A cross-section, by its shape or by its properties: what one shape needs others do not have."""
 
-    width: Number = Field(description="the width out of the plane of motion in m")
-    thickness: Number = Field(description="the thickness in the plane of motion in m")
-
-
-class GeneralSectionTable(_Table):
-    """A cross-section by its properties."""
-
-    area: Number = Field(description="the area in m^2")
-    second_moment: Number = Field(description="the second moment of area in m^4")
+    shape: Literal[tuple(SHAPES)] | None = Field(  # type: ignore[valid-type]
+        default=None, description='"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
+    )
+    width: Number | None = Field(default=None, description="the width out of the plane of motion in m")
+    thickness: Number | None = Field(default=None, description="the thickness in the plane of motion in m")
+    diameter: Number | None = Field(default=None, description="the outer diameter in m")
+    wall: Number | None = Field(default=None, description="the thickness of the wall of a hollow section in m")
+    area: Number | None = Field(default=None, description="the area in m^2")
+    second_moment: Number | None = Field(default=None, description="the second moment of area in m^4")
     outer_fibre: Number | None = Field(
         default=None, description="the distance of the outermost fibre from the neutral axis in m"
     )
@@ -323,6 +350,8 @@ class AssemblyTable(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, Number] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
+    extra_description: ClassVar[str] = "the angle of the body in rad"
+
     points: dict[str, Pair] = Field(default={}, description='[x, y] in m for each "body.point"')
 
     @property
@@ -340,13 +369,24 @@ class DeflectionTable(_Table):
 
 
 class CoordinatesTable(_Table):
-    """All coordinates of a body, or their rates."""
+    """All coordinates of a body."""
 
-    x: Number = Field(description="x of the body frame's origin in m, or its rate in m/s")
-    y: Number = Field(description="y of the body frame's origin in m, or its rate in m/s")
-    phi: Number = Field(description="the angle of the body frame in rad, or its rate in rad/s")
+    x: Number = Field(description="x of the body frame's origin in m")
+    y: Number = Field(description="y of the body frame's origin in m")
+    phi: Number = Field(description="the angle of the body frame in rad")
     flexible: list[Number] | None = Field(
-        default=None, description="the body's own flexible coordinates, or their rates; zeros by default"
+        default=None, description="the body's own flexible coordinates; zeros by default"
+    )
+
+
+class RatesTable(_Table):
+    """Rates of all coordinates of a body."""
+
+    x: Number = Field(description="the rate of x of the body frame's origin in m/s")
+    y: Number = Field(description="the rate of y of the body frame's origin in m/s")
+    phi: Number = Field(description="the rate of the angle of the body frame in rad/s")
+    flexible: list[Number] | None = Field(
+        default=None, description="the rates of the body's own flexible coordinates; zeros by default"
     )
 
 
@@ -365,7 +405,7 @@ class StartTable(_Table):
     )
     velocity: VelocityTable = VelocityTable()
     coordinates: dict[str, CoordinatesTable] = Field(default={}, description="x, y, phi and flexible of bodies")
-    rates: dict[str, CoordinatesTable] = Field(default={}, description="rates of x, y, phi and flexible of bodies")
+    rates: dict[str, RatesTable] = Field(default={}, description="rates of x, y, phi and flexible of bodies")
 
 
 class EndEffectorTable(_Table):
@@ -373,6 +413,18 @@ class EndEffectorTable(_Table):
 
     point: Text = Field(description='"body.point"')
     coordinates: list[Text] = Field(default=["x", "y"], description='task coordinates from "x", "y", "angle"')
+
+
+class PayloadTable(_Table):
+    """What the end-effector carries, fixed to its point."""
+
+    mass: Number = Field(description="the mass in kg")
+    inertia: Number = Field(default=0.0, description="the moment of inertia about its centre of mass in kg m^2")
+    offset: Pair = Field(
+        default=[0.0, 0.0],
+        description="[x, y] in m from the end-effector's point to its centre of mass, in the frame of the body that "
+        "carries it",
+    )
 
 
 class PolygonTable(_Table):
@@ -457,7 +509,7 @@ class _Parts(_Table):
         description='curvature of beams at lumped moments of inertia: "separate", or "shared" as in the paper',
     )
     parameters: dict[str, Any] = Field(default={}, description="numbers by name, for expressions of them in quotes")
-    section: dict[str, SectionTable | GeneralSectionTable] = {}
+    section: dict[str, SectionTable] = {}
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}
     ground: dict[str, Pair] = Field(default={}, description="[x, y] of each ground point in m")
@@ -482,6 +534,7 @@ class ModelTable(_WithGroups):
 
     gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
     end_effector: EndEffectorTable | None = None
+    payload: PayloadTable | None = None
     assembly: dict[str, AssemblyTable] = Field(
         default={}, description="approximate angles of all bodies in rad for each assembly, or places of points in m"
     )

@@ -76,7 +76,7 @@ def model_tables(
         "geometry": "" if mechanism.geometry.value == "second-order" else mechanism.geometry.value,
         **{key: value for key, value in shared.items() if value != _SHARED[key]},
         "parameters": law_parameters(mechanism.prescribed),
-        "section": {name: _section(section) for name, section in names["section"].values.items()},
+        "section": {name: _section(one, name, file or {}) for name, one in names["section"].values.items()},
         "material": {name: _fields(material) for name, material in names["material"].values.items()},
         "lump": {name: {"mass": mass, "inertia": inertia} for name, (mass, inertia) in names["lump"].values.items()},
         "ground": mechanism.ground,
@@ -206,9 +206,10 @@ def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
                 out[body.name, lump.point] = (lump.mass, lump.inertia)
         else:
             for k, each in enumerate(given if isinstance(given, tuple) else (given,)):
-                sides = getattr(each, "sides", None)
-                if sides is not None and Section.rectangle(*sides) != each:
-                    raise _unwritable(f"body.{body.name}.section", each, "give Section.rectangle(...), or no sides")
+                shape = getattr(each, "shape", None)
+                if shape is not None and Section.of(shape) != each:
+                    remedy = "give Section.rectangle(...), round(...) or tube(...), or no shape"
+                    raise _unwritable(f"body.{body.name}.section", each, remedy)
                 out[body.name, k] = each
     return out
 
@@ -222,8 +223,13 @@ def _name_at(file: Mapping[str, Any], field: str, body: str, place: Any) -> str 
     return listed[place] if isinstance(place, int) and place < len(listed) else None
 
 
-def _section(section: Section) -> dict[str, Any]:
-    return _fields(section) if section.sides is None else dict(zip(("width", "thickness"), section.sides, strict=True))
+def _section(section: Section, name: str, file: Mapping[str, Any]) -> dict[str, Any]:
+    """The table of a section; a rectangle says so where the file's does."""
+    shape = section.shape
+    if shape is None:
+        return _fields(section)
+    said = shape.kind != "rectangle" or "shape" in file.get("section", {}).get(name, {})
+    return ({"shape": shape.kind} if said else {}) | _fields(shape)
 
 
 def _body(body: Body, names: Mapping[str, _Names], shared: Mapping[str, str]) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from paraflex.mechanism.bodies import (
     LumpedMass as LumpedMass,
     Material as Material,
     RigidBody as RigidBody,
-    Section as Section,
     given_shapes as given_shapes,
 )
 from paraflex.mechanism.checks import check_mechanism as check_mechanism
@@ -67,10 +66,18 @@ from paraflex.mechanism.members import (
     Geometry as Geometry,
 )
 from paraflex.mechanism.modal import ModalBody as ModalBody, ModalPoint as ModalPoint
+from paraflex.mechanism.payload import Payload as Payload
 from paraflex.mechanism.poses import Pose as Pose, approximate_poses as approximate_poses, placed_poses as placed_poses
 from paraflex.mechanism.quantities import joints_named as joints_named
 from paraflex.mechanism.raparm import raparm_i as raparm_i
 from paraflex.mechanism.rows import chain_of_segments as chain_of_segments, four_bars_in_a_row as four_bars_in_a_row
+from paraflex.mechanism.sections import (
+    Rectangle as Rectangle,
+    Round as Round,
+    Section as Section,
+    Shape as Shape,
+    Tube as Tube,
+)
 from paraflex.mechanism.segments import (
     FIRST_END as FIRST_END,
     LAST_END as LAST_END,

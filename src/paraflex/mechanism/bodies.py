@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import TypeVar
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError, as_enum
 from paraflex.fem import (
     AssumedShapes,
@@ -23,39 +23,9 @@ from paraflex.fem import (
 )
 from paraflex.mechanism.damping import Damping
 from paraflex.mechanism.modal import ModalBody
+from paraflex.mechanism.sections import Section
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Section(CheckedFields):
-    """Cross-section of a beam.
-
-    Attributes
-    ----------
-    area : float
-        [m^2]
-    second_moment : float
-        Of area, about the axis normal to the plane of motion [m^4].
-    sides : (width, thickness), optional
-        Of a rectangle: out of the plane of motion and in it [m].
-    outer_fibre : float, optional
-        Distance of the outermost fibre from the neutral axis, in the plane of motion [m]; without it there are no
-        bending stresses.
-    """
-
-    _table = "section"
-
-    area: float
-    second_moment: float
-    sides: tuple[float, float] | None = None
-    outer_fibre: float | None = None
-
-    @classmethod
-    @checked_arguments()
-    def rectangle(cls, width: float, thickness: float) -> Section:
-        """A rectangle: width out of the plane of motion, thickness in it [m]."""
-        return cls(width * thickness, width * thickness**3 / 12.0, (width, thickness), thickness / 2.0)
 
 
 @dataclass(frozen=True)

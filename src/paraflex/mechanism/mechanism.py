@@ -14,6 +14,7 @@ from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
+from paraflex.mechanism.payload import Payload, loaded
 from paraflex.mechanism.phases import with_phases
 from paraflex.mechanism.quantities import known
 
@@ -90,6 +91,23 @@ class Mechanism(Members, Shown):
         """The same mechanism with other bodies in place of those of the same names."""
         new = {body.name: body for body in bodies}
         return replace(self, bodies=tuple(new.get(body.name, body) for body in self.bodies))
+
+    @checked_arguments()
+    def with_payload(self, payload: Payload) -> Mechanism:
+        """The mechanism with a payload at its end-effector, in addition to what the body there has.
+
+        A rigid body gets the mass, centre of mass and moment of inertia of both; a beam a lump at the point, or a
+        heavier one; a body of given matrices those with the payload.
+
+        Raises
+        ------
+        InputError
+            No end-effector; an offset on a flexible body.
+        """
+        effector = self.end_effector
+        if effector is None:
+            raise InputError("there is no end-effector to carry it", field="payload", remedy="name the end-effector")
+        return self.with_bodies([loaded(self.body(effector.point.body), effector.point.point, payload)])
 
     @checked_arguments()
     def rigid(self, names: Sequence[str] | None = None) -> Mechanism:

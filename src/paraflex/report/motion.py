@@ -14,7 +14,7 @@ from paraflex.report.curves import TIPS, bending, energies, energy_scale, follow
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables
 from paraflex.report.page import Chart, Curve, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line
+from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import count, number, pairs, quantity
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import check_kind

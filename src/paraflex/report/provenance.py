@@ -73,7 +73,7 @@ def run_command_line(run: dict[str, Any]) -> str:
     """The `paraflex run` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
-    words = ["paraflex", "run", "--mechanism", mechanism_argument(run["mechanism"])]
+    words = ["paraflex", "run", *_model(run)]
     if "path" in run:
         words += ["--path", run["path"], *_modes(run.get("modes", []))]
     for name, flag in _GIVEN.items():
@@ -97,7 +97,7 @@ def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence
     """The `paraflex verify` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
-    words = ["paraflex", "verify", "--mechanism", mechanism_argument(run["mechanism"]), "--path", run["path"]]
+    words = ["paraflex", "verify", *_model(run), "--path", run["path"]]
     words += _modes(run.get("modes", []))
     for name in (str(model) for model in data["model"].values):
         words += ["--engine" if name in engines else "--model", name]
@@ -107,6 +107,14 @@ def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence
         if run.get(name) is not None:
             words += [_GIVEN[name], str(run[name])]
     return shlex.join(words)
+
+
+def _model(run: dict[str, Any]) -> list[str]:
+    """The options of a model, with what was set of it."""
+    words = ["--mechanism", mechanism_argument(run["mechanism"])]
+    for name, value in (run.get("set") or {}).items():
+        words += ["--set", f"{name}={value if isinstance(value, str) else json.dumps(value)}"]
+    return words
 
 
 def _modes(names: Sequence[str]) -> list[str]:

@@ -33,7 +33,7 @@ from paraflex.report.curves import (
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line
+from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import headline, ranked_by_motion

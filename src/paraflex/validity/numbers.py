@@ -13,7 +13,7 @@ import numpy as np
 
 from paraflex.errors import InputError
 from paraflex.findings import Finding
-from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, RigidBody, Section
+from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, Rectangle, RigidBody, Section
 from paraflex.mechanism.bodies import Body, Material
 from paraflex.mechanism.poses import local_points
 from paraflex.validity.actions import doubtful_actions
@@ -262,10 +262,11 @@ def _section(place: str, length: float, section: Section) -> Iterator[Finding]:
             f"{thickness:.3g} m thick in the plane and {length:.3g} m long: {length / thickness:.3g} times",
             "lengths are in m, sections in m, m^2 and m^4: are all of them?",
         )  # fmt: skip
-    if section.sides is not None and section.sides[1] > TURNED * section.sides[0]:
+    shape = section.shape
+    if isinstance(shape, Rectangle) and shape.thickness > TURNED * shape.width:
         yield Finding(
             "section-turned", place,
-            f"{section.sides[1]:.3g} m thick in the plane and only {section.sides[0]:.3g} m wide out of it: "
+            f"{shape.thickness:.3g} m thick in the plane and only {shape.width:.3g} m wide out of it: "
             "it bends out of the plane first, which no planar model shows",
             "width counts out of the plane of motion, thickness in it: is the section turned by 90 degrees?",
         )  # fmt: skip

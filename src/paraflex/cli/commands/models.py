@@ -7,7 +7,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from paraflex.cli.commands.options import AssemblyOption, Json, ModelChoice, PathOption
+from paraflex.cli.commands.options import SECONDS, AssemblyOption, Json, ModelChoice, PathOption
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class InfoRequest:
     assembly: AssemblyOption = None
     path: PathOption = None
     at: Annotated[
-        float | None, Option(metavar="S", help="Frequencies where the path, or prescribed angles, lead by then.")
+        float | None,
+        Option(metavar="S", parser=SECONDS, help="Frequencies where the path, or prescribed angles, lead by then."),
     ] = None
     balanced: Annotated[
         bool, Option("--balanced", help="Frequencies about static equilibrium, motors held; else undeformed.")

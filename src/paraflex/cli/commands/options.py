@@ -2,16 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Argument, Option
+from typer import Argument, BadParameter, Option
 
 from paraflex.errors import InputError
 
 if TYPE_CHECKING:
     from paraflex.campaign import Workers
+
+
+def measured(unit: str) -> Callable[[Any], float]:
+    """What an option makes of a text: a number, or one with a unit of the dimension of the option's own."""
+
+    def number(text: Any) -> float:
+        try:
+            return float(text)
+        except ValueError:
+            from paraflex.files.fields import number_in  # not for the help
+
+            try:
+                return number_in(text, unit)
+            except InputError as error:
+                raise BadParameter(f"{error.problem}: {text!r}; {error.remedy}") from None
+
+    return number
+
+
+SECONDS, METRES, PER_SECOND = measured("s"), measured("m"), measured("1/s")
 
 # What a command runs of which no model is named.
 DEFAULT_MODEL = "raparm_i"
@@ -50,6 +71,11 @@ class ModelChoice:
         str | None, Option("--mechanism", "-m", metavar="NAME|FILE", help="The same, named by an option.")
     ] = None
 
+    settings: Annotated[
+        list[str],
+        Option("--set", metavar="FIELD=VALUE", help='In place of the file\'s, "link1.length=80 mm"; repeatable.'),
+    ] = field(default_factory=list)
+
     def __post_init__(self) -> None:
         if self.source is not None and self.mechanism is not None and self.source != self.mechanism:
             raise InputError(
@@ -72,7 +98,7 @@ class ModelChoice:
 class PlanChoice:
     """What `Model.plan` takes of the command line; None takes the model's."""
 
-    duration: Annotated[float | None, Option(metavar="S", help="Duration, dwell included.")] = None
+    duration: Annotated[float | None, Option(metavar="S", parser=SECONDS, help="Duration, dwell included.")] = None
     samples: Annotated[int | None, Option(metavar="N", help="Samples kept.")] = None
     assembly: AssemblyOption = None
 

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from paraflex.cli.commands.options import SECONDS
+
 Results = Annotated[str, Argument(metavar="RESULTS", help="A folder or file that paraflex wrote.")]
 Force = Annotated[bool, Option("--force", help="Write over what is there.")]
 
@@ -44,7 +46,9 @@ class AnimateRequest:
     ] = None
     size: Annotated[str | None, Option(metavar="WIDTHxHEIGHT", help="In pixels. Default: what fits.")] = None
     theme: Annotated[str, Option(metavar="light|dark", help="Colours.")] = "light"
-    at: Annotated[float | None, Option(metavar="S", help="Time of one picture. Default: half way.")] = None
+    at: Annotated[float | None, Option(metavar="S", parser=SECONDS, help="Time of one picture. Default: half way.")] = (
+        None
+    )
     model: Annotated[str | None, Option(metavar="NAME", help="Of a verification. Default: its reference.")] = None
     force: Force = False
 

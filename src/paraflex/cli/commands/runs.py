@@ -8,6 +8,9 @@ from typing import Annotated
 from typer import Option
 
 from paraflex.cli.commands.options import (
+    METRES,
+    PER_SECOND,
+    SECONDS,
     FramesChoice,
     Json,
     MethodOption,
@@ -33,12 +36,12 @@ class RunRequest:
             help="Actuation mode: signs (+-+-) or motor names (tau1,tau5); repeatable. Default: the study's.",
         ),
     ] = field(default_factory=list)
-    tolerance: Annotated[float | None, Option("--tol", metavar="METRES", help="Tolerance; the study's, else 1e-5.")] = (
-        None
-    )
+    tolerance: Annotated[
+        float | None, Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 1e-5.")
+    ] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
-    alpha: Annotated[float | None, Option(metavar="1/S", help="Baumgarte coefficient alpha.")] = None
-    beta: Annotated[float | None, Option(metavar="1/S", help="Baumgarte coefficient beta.")] = None
+    alpha: Annotated[float | None, Option(metavar="1/S", parser=PER_SECOND, help="Baumgarte coefficient alpha.")] = None
+    beta: Annotated[float | None, Option(metavar="1/S", parser=PER_SECOND, help="Baumgarte coefficient beta.")] = None
     max_steps: Annotated[
         int | None, Option(metavar="N", help="Steps before a run is given up. Default: ten million.")
     ] = None
@@ -47,7 +50,8 @@ class RunRequest:
         list[str], Option("--method-parameter", metavar="NAME=VALUE", help="A parameter of the method; repeatable.")
     ] = field(default_factory=list)
     step: Annotated[
-        float | None, Option(metavar="S", help="A fixed step. Default: steps are chosen by their errors.")
+        float | None,
+        Option(metavar="S", parser=SECONDS, help="A fixed step. Default: steps are chosen by their errors."),
     ] = None
     constraints: Annotated[
         str | None,
@@ -111,7 +115,7 @@ class VerifyRequest:
         ),
     ] = field(default_factory=list)
     tolerance: Annotated[
-        float | None, Option("--tol", metavar="METRES", help="Tolerance of runs with error control.")
+        float | None, Option("--tol", metavar="METRES", parser=METRES, help="Tolerance of runs with error control.")
     ] = None
     method: MethodOption = None
     segments: Annotated[int | None, Option(metavar="N", help="Finite segments on the longest beam.")] = None
@@ -136,13 +140,21 @@ class CompareMethodsRequest:
         list[str], Option("--method", metavar="NAME", help="Method of integration; repeatable. Default: all of them.")
     ] = field(default_factory=list)
     tolerances: Annotated[
-        list[float], Option("--tol", metavar="METRES", help="Tolerance; repeatable. Default: 1e-3, 1e-4, 1e-5, 1e-6.")
+        list[float],
+        Option(
+            "--tol", metavar="METRES", parser=METRES, help="Tolerance; repeatable. Default: 1e-3, 1e-4, 1e-5, 1e-6."
+        ),
     ] = field(default_factory=list)
     steps: Annotated[
         list[float],
-        Option("--step", metavar="S", help="Fixed step; repeatable. Without --tol fixed steps are all there is."),
+        Option(
+            "--step",
+            metavar="S",
+            parser=SECONDS,
+            help="Fixed step; repeatable. Without --tol fixed steps are all there is.",
+        ),
     ] = field(default_factory=list)
-    limit: Annotated[float | None, Option(metavar="S", help="Wall time of a run. Default: 60.")] = None
+    limit: Annotated[float | None, Option(metavar="S", parser=SECONDS, help="Wall time of a run. Default: 60.")] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
     out: Annotated[str, Option(metavar="DIR", help="Folder for numbers and figure.")] = "comparison"
     force: ReplaceOption = False

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.designs.measure import check_smooth
-from paraflex.designs.overlay import Place, number_at
 from paraflex.designs.run import Task
 from paraflex.designs.setting import INTEGRATION, Setting
 from paraflex.dynamics import pack_signals
 from paraflex.errors import InputError
+from paraflex.files.overlay import Place, number_at
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
 from paraflex.integrators.sensitivity import check_differentiable

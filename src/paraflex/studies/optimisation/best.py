@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from paraflex.campaign.study import Result
-from paraflex.designs.overlay import overlaid
+from paraflex.files.overlay import overlaid
 from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.writing import write_text
 

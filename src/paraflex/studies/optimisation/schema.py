@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from paraflex.designs.schema import SweepTable, Table, VaryTable, Yes
-from paraflex.files.schema import Count, Number, Text
+from paraflex.files.schema import Count, Number, NumberOfFields, Text
 
 MethodName = Literal["slsqp", "trust-constr", "l-bfgs-b", "nelder-mead", "differential-evolution", "optuna"]
 GradientsName = Literal["differences", "exact"]
@@ -16,7 +16,9 @@ GradientsName = Literal["differences", "exact"]
 class ParameterTable(VaryTable):
     """A parameter of the search."""
 
-    start: Number | None = Field(default=None, description="where the search starts; the file's number by default")
+    start: NumberOfFields | None = Field(
+        default=None, description="where the search starts, in the unit of its fields; the file's number by default"
+    )
 
 
 class AtMostTable(Table):

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from paraflex.campaign.study import R_co, Study
 from paraflex.designs.measure import check_metric, metric_of
-from paraflex.designs.overlay import Place, number_at
 from paraflex.designs.samples import RANDOM, Varied
 from paraflex.designs.schema import SamplingTable
 from paraflex.designs.setting import INTEGRATION, Setting
 from paraflex.designs.sweep import SweepStudy, make_study
 from paraflex.errors import InputError, suggestion
+from paraflex.files.overlay import Place, number_at
 from paraflex.limits import DESIGNS, at_most
 from paraflex.mechanism import quantities
 from paraflex.studies.optimisation.schema import (

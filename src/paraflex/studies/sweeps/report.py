@@ -123,7 +123,7 @@ def _parameters(study: StudyFolder, designs: DesignTable) -> dict[str, VariedPar
     for name, places in zip(study.setting.names, study.setting.places, strict=True):
         values = designs.parameters[name]
         low, high, spread = study.ranges.get(name, (float(values.min()), float(values.max()), study.sampling))
-        units = {unit_of(place) for place in places}
+        units = {unit_of(study.setting.data, place) for place in places}
         fields = tuple(".".join(map(str, place)) for place in places)
         out[name] = VariedParameter(fields, units.pop() if len(units) == 1 else "", low, high, spread)
     return out

@@ -1,0 +1,116 @@
+"""Dimensions of expressions, as far as the units in them tell: a mass is no length."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from paraflex.errors import InputError
+from paraflex.files.expressions import CONSTANTS, ExpressionError, tree_of
+from paraflex.units import ANGLE, PLAIN, Dimension, spelt, unit_named
+
+# That of a name; None where it is not known, such as that of the time or of a parameter without a unit.
+_Of = Callable[[str], Dimension | None]
+
+
+def dimension_of(text: str, parameters: Mapping[str, Dimension | None]) -> Dimension | None:
+    """The dimension of an expression that has a value: `PLAIN` of pure numbers, None where it is not known.
+
+    Parameters
+    ----------
+    text : str
+    parameters : mapping
+        Of the file, each with its dimension; see `dimensions_of_parameters`.
+
+    Raises
+    ------
+    ExpressionError
+        A sum of unlike quantities, or a function of one that is no angle.
+    """
+    return _dimension(tree_of(text), lambda name: PLAIN if name in CONSTANTS else parameters.get(name))
+
+
+def dimensions_of_parameters(table: Mapping[str, Any]) -> dict[str, Dimension | None]:
+    """The dimension of each parameter of a file that `evaluate_parameters` has found right.
+
+    Raises
+    ------
+    InputError
+        See `dimension_of`.
+    """
+    found: dict[str, Dimension | None] = {}
+
+    def of(name: str) -> Dimension | None:
+        if name in CONSTANTS:
+            return PLAIN
+        if name not in found:
+            entry = table.get(name)
+            given = _dimension(tree_of(entry), of) if isinstance(entry, str) else None
+            found[name] = None if given == PLAIN else given
+        return found[name]
+
+    for name, entry in table.items():
+        try:
+            of(name)
+        except ExpressionError as error:
+            raise InputError(error.problem, field=f"parameters.{name}", value=entry, remedy=error.remedy) from None
+    return found
+
+
+def _dimension(node: ast.AST, of: _Of) -> Dimension | None:
+    match node:
+        case ast.Name(id=name):
+            return of(name)
+        case ast.BinOp(op=ast.MatMult(), right=ast.Constant(value=str() as unit)):
+            return unit_named(unit).dimension
+        case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
+            return _of_sum(_dimension(left, of), _dimension(right, of))
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
+            return _product(_dimension(left, of), _dimension(right, of), 1)
+        case ast.BinOp(left=left, op=ast.Div(), right=right):
+            return _product(_dimension(left, of), _dimension(right, of), -1)
+        case ast.BinOp(left=base, op=ast.Pow(), right=exponent):
+            return _power(_dimension(base, of), exponent)
+        case ast.UnaryOp(operand=operand):
+            return _dimension(operand, of)
+        case ast.Call(func=ast.Name(id=name), args=[argument]):
+            return _of_function(name, _dimension(argument, of))
+    return PLAIN
+
+
+def _of_sum(one: Dimension | None, other: Dimension | None) -> Dimension | None:
+    """A number without a unit is in SI units, of whatever it is added to."""
+    if one in (None, PLAIN) or other in (None, PLAIN):
+        return next(
+            (each for each in (one, other) if each not in (None, PLAIN)), None if None in (one, other) else PLAIN
+        )
+    if one != other:
+        raise ExpressionError(f"a sum of quantities in {spelt(one)} and in {spelt(other)}", "check their units")
+    return one
+
+
+def _product(one: Dimension | None, other: Dimension | None, sign: int) -> Dimension | None:
+    if one is None or other is None:
+        return None
+    return tuple(a + sign * b for a, b in zip(one, other, strict=True))  # type: ignore[return-value]
+
+
+def _power(base: Dimension | None, exponent: ast.AST) -> Dimension | None:
+    if base is None or base == PLAIN:
+        return base
+    match exponent:
+        case ast.Constant(value=int() as power):
+            return tuple(power * each for each in base)  # type: ignore[return-value]
+    return None
+
+
+def _of_function(name: str, given: Dimension | None) -> Dimension | None:
+    if given in (None, PLAIN, ANGLE):
+        return PLAIN
+    if name == "sqrt":
+        return tuple(each // 2 for each in given) if not any(each % 2 for each in given) else None  # type: ignore[return-value]
+    raise ExpressionError(
+        f"{name} of a quantity in {spelt(given)}",
+        f"write * between a number and a name; {name} takes a number or an angle",
+    )

@@ -1,0 +1,236 @@
+"""Fields of a file by their places: what the schema says of each, the units that it takes, and whether it has one."""
+
+from __future__ import annotations
+
+import re
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel
+
+from paraflex.errors import InputError
+from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
+from paraflex.files.expressions import ExpressionError, evaluate
+from paraflex.mechanism import JOINT_KINDS
+from paraflex.units import FIELD_UNITS, PLAIN, Dimension, spelt, unit_named
+
+# A place in parsed TOML: keys of tables and indices of lists.
+Place = tuple[str | int, ...]
+
+_SI = f"(?:{'|'.join(map(re.escape, FIELD_UNITS))})"
+# "in m", "in rad/s or m/s", "in s and rad or m"; the longest unit that fits stands first in the list.
+_IN_UNITS = re.compile(rf"\bin ({_SI}(?:,? (?:or|and) {_SI})*)(?=[\s,.)]|$)")
+# What a spring's stiffness, a rest, a torque or a speed at a joint is where the joint slides.
+_WHERE_IT_SLIDES = {"N m/rad": "N/m", "N m s/rad": "N s/m", "N m": "N", "rad": "m", "rad/s": "m/s"}
+_WHERE_IT_TURNS = {slides: turns for turns, slides in _WHERE_IT_SLIDES.items()}
+
+
+class FileField(NamedTuple):
+    """What a schema says of a field.
+
+    Attributes
+    ----------
+    owner : type of BaseModel, or None
+        The table it is in.
+    description : str
+    annotation : Any
+        Its type; None for a field that the table does not have.
+    """
+
+    owner: type[BaseModel] | None
+    description: str
+    annotation: Any = None
+
+
+def field_at(schema: type[BaseModel], data: Any, place: Sequence[Any]) -> FileField:
+    """The field at a place, found by walking the annotations."""
+    model: Any = schema
+    owner: type[BaseModel] | None = schema
+    description = "a value"
+    for part in place:
+        data = _below(data, part)
+        if is_table(model):
+            owner = model
+            info = model.model_fields.get(str(part))
+            if info is None and model.model_config.get("extra") == "allow":
+                return FileField(owner, getattr(model, "extra_description", description), float)
+            if info is None:
+                return FileField(owner, description)
+            description = info.description or f"a [{part}.NAME] table"
+            model = info.annotation
+        else:
+            model = _inner(model, data)
+        model = _resolve(model, data)
+    return FileField(owner, description, model)
+
+
+def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> tuple[str, ...] | None:
+    """Units that the number at a place may have: none for a plain number; None where any may stand there.
+
+    Parameters
+    ----------
+    schema : type of BaseModel
+    data : mapping
+        As parsed: it says of which kind a table is, and whether the joint that it names turns or slides.
+    place : tuple
+    """
+    found = field_at(schema, data, place)
+    if place[0] == "parameters" or "unit of" in found.description:
+        return None
+    units = _units_in(found.description, _row(data, place), place[-1])
+    slides = _slides(data, place)
+    if slides is None:
+        return units
+    other = _WHERE_IT_SLIDES if slides else _WHERE_IT_TURNS
+    return tuple(dict.fromkeys(other.get(unit, unit) for unit in units))
+
+
+def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
+    """Check that units in data that fit a schema are those of the fields.
+
+    Raises
+    ------
+    InputError
+        One that is not, or a sum of unlike quantities.
+    """
+    table = data.get("parameters", {})
+    parameters = dimensions_of_parameters(table if isinstance(table, dict) else {})
+    for place, text in _texts(data, ()):
+        found = field_at(schema, data, place)
+        if _is_number(found.annotation):
+            units = units_at(schema, data, place)
+            check_unit(text, parameters, units, ".".join(map(str, place)), found.description)
+
+
+def check_unit(
+    text: str,
+    parameters: Mapping[str, Dimension | None],
+    units: tuple[str, ...] | None,
+    field: str,
+    description: str,
+) -> None:
+    """Check the unit of an expression against those of its field; see `units_at`.
+
+    Raises
+    ------
+    InputError
+        Of another dimension, or a sum of unlike quantities.
+    """
+    try:
+        given = dimension_of(text, parameters)
+    except ExpressionError as error:
+        raise InputError(error.problem, field=field, value=text, remedy=error.remedy) from None
+    if units is None or given in (None, PLAIN) or given in [unit_named(unit).dimension for unit in units]:
+        return
+    asked = f"one in {' or '.join(units)}" if units else "a number without a unit"
+    raise InputError(
+        f"a quantity in {spelt(given)} where {asked} is asked for", field=field, value=text,
+        remedy=f"give {description}",
+    )  # fmt: skip
+
+
+def number_in(text: str, unit: str) -> float:
+    """The number of a text in an SI unit, where the text has that or another one of its dimension, or none.
+
+    Raises
+    ------
+    InputError
+        It is no number, or of another dimension.
+    """
+    try:
+        number = evaluate(text, {})
+    except ExpressionError as error:
+        raise InputError("not a number", field="value", value=text, remedy=error.remedy) from None
+    check_unit(text, {}, (unit,), "value", f"it in {unit}")
+    return number
+
+
+def _texts(data: Any, place: Place) -> Iterator[tuple[Place, str]]:
+    """Every text of data, and its place."""
+    if isinstance(data, str):
+        yield place, data
+    elif isinstance(data, (dict, list)):
+        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+            yield from _texts(value, (*place, key))
+
+
+def _is_number(annotation: Any) -> bool:
+    """Whether what is annotated may be a number with an expression for it, or a function of time."""
+    return annotation in (float, Any) or any(map(_is_number, typing.get_args(annotation)))
+
+
+def _units_in(description: str, row: Sequence[Any] | None, key: str | int) -> tuple[str, ...]:
+    """Units that a description names; of a number in a row those of its place in it."""
+    found = [(description[: match.start()], match[1]) for match in _IN_UNITS.finditer(description)]
+    if row is not None and isinstance(key, int):
+        for before, units in found:
+            names = before[before.rfind("[") :].split("]")[0].split(",")
+            if len(names) == len(row):
+                first, _, last = units.rpartition(" and ")
+                return _alternatives(last if key == len(row) - 1 or not first else first)
+    return tuple(dict.fromkeys(unit for _, units in found for unit in _alternatives(units)))
+
+
+def _alternatives(units: str) -> tuple[str, ...]:
+    return tuple(re.findall(_SI, units))
+
+
+def _row(data: Any, place: Place) -> Sequence[Any] | None:
+    """The list that holds the number at a place."""
+    for key in place[:-1]:
+        data = _below(data, key)
+    return data if isinstance(data, list) else None
+
+
+def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
+    """Whether the joint slides that a number is about; None where there is none, or the field's name says it."""
+    if len(place) < 3 or {"angle", "displacement"} & set(place):
+        return None
+    table, owner, key = place[:3]
+    of_motor = (table, owner) == ("study", "torques")
+    name = _below(_below(data, "motor"), key) if of_motor else _below(_below(_below(data, table), owner), "joint")
+    joint = _below(_below(data, "joint"), name) if isinstance(name, str) else None
+    if joint is None:
+        return None
+    kind = JOINT_KINDS.get(str(_below(joint, "type")))
+    return kind is not None and kind.slides
+
+
+def is_table(annotation: Any) -> bool:
+    """Whether an annotation is that of a table with fields of its own."""
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def has_tables(annotation: Any) -> bool:
+    """Whether there are such tables within an annotation."""
+    return is_table(annotation) or any(map(has_tables, typing.get_args(annotation)))
+
+
+def _below(data: Any, key: Any) -> Any:
+    if isinstance(data, dict):
+        return data.get(key)
+    return data[key] if isinstance(data, list) and isinstance(key, int) and key < len(data) else None
+
+
+def _inner(annotation: Any, data: Any) -> Any:
+    """What a dict or list annotation holds."""
+    arguments = typing.get_args(annotation)
+    return arguments[-1] if typing.get_origin(annotation) in (dict, list) and arguments else annotation
+
+
+def _resolve(annotation: Any, data: Any) -> Any:
+    """Strip Annotated, and of a union take the model whose `type` or fields the data has."""
+    while typing.get_origin(annotation) is typing.Annotated:
+        annotation = typing.get_args(annotation)[0]
+    members = [_resolve(member, data) for member in typing.get_args(annotation)]
+    models = [member for member in members if is_table(member)]
+    if typing.get_origin(annotation) in (dict, list) or not models:
+        return annotation
+    if isinstance(data, dict):
+        for model in models:
+            kind = model.model_fields.get("type")
+            if kind is not None and data.get("type") in typing.get_args(kind.annotation):
+                return model
+        return max(models, key=lambda model: len(set(model.model_fields) & set(data)))
+    return models[0]

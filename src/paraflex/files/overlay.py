@@ -1,0 +1,225 @@
+"""Values of a model file by name: found, and replaced before the file is checked."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from paraflex.errors import InputError, suggestion
+from paraflex.files.expressions import ExpressionError, evaluate, evaluate_parameters
+from paraflex.files.fields import Place, field_at, has_tables, is_table
+from paraflex.files.schema import ModelTable
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
+_PART = re.compile(r'\s*(?:"([^"]*)"|\'([^\']*)\'|([^."\'\s]+))\s*(\.|\Z)')
+
+
+def find_place(data: Mapping[str, Any], field: str) -> Place:
+    """Place of a number in a model's data.
+
+    Parameters
+    ----------
+    data : mapping
+        A model file as parsed.
+    field : str
+        Keys and list indices joined by points, "body.link1.length" or "ground.A1.0"; a key with a point in quotes. The
+        table may be left out where one alone has the name: "link1.length".
+
+    Raises
+    ------
+    InputError
+        There is no such field, which names the nearest; several fit; or it is no number.
+    """
+    parts = _in_full(data, field)
+    place = _followed(data, parts)
+    if len(place) < len(parts):
+        raise InputError(
+            "no such number in the mechanism's file", field=field,
+            remedy=suggestion(field, [_spelt(each) for each in number_places(data)]),
+        )  # fmt: skip
+    found = _at(data, place)
+    if not _is_number(found, data):
+        raise InputError("not a number in the mechanism's file", field=field, value=found, remedy=_below(data, field))
+    return place
+
+
+def with_values(data: dict[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """A model's data with other values of fields, which the file need not have; see `find_place` for their names.
+
+    Parameters
+    ----------
+    data : dict
+        As parsed; left as it is.
+    values : mapping of str to Any
+        Numbers, expressions, numbers with units, names, truth values, or lists of these.
+
+    Raises
+    ------
+    InputError
+        No such field; several fit; or it is a table.
+    """
+    for field, value in values.items():
+        place = _place_to_set(data, field)
+        if isinstance(value, Mapping):
+            raise InputError("a table", field=field, value=value, remedy="set its fields one by one")
+        data = overlaid(data, [(place, list(value) if isinstance(value, tuple) else value)])
+    return data
+
+
+def value_of(text: str) -> Any:
+    """What a text stands for in a file: a number, truth value, list, or text without its quotes."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return text
+
+
+def _place_to_set(data: Mapping[str, Any], field: str) -> Place:
+    parts = _in_full(data, field)
+    place = _followed(data, parts)
+    for part in parts[len(place) :]:
+        if isinstance(_at(data, place), list) or not _may_have(data, place, part):
+            raise InputError(
+                "no such field in the model's file", field=field,
+                remedy=suggestion(_spelt((*place, part)), _known_below(data, place)),
+            )  # fmt: skip
+        place = (*place, part)
+    if isinstance(_at(data, place), dict):
+        raise InputError("a table of the model's file", field=field, remedy=_below(data, field))
+    return place
+
+
+def _may_have(data: Mapping[str, Any], place: Place, part: str) -> bool:
+    """Whether the table at a place may have a field that is not there: one of the schema, or a number by a new name."""
+    annotation = field_at(ModelTable, data, place).annotation if place else ModelTable
+    if is_table(annotation):
+        return part in annotation.model_fields or annotation.model_config.get("extra") == "allow"
+    return place[0] != "parameters" and not has_tables(annotation)
+
+
+def _known_below(data: Mapping[str, Any], place: Place) -> list[str]:
+    """Fields that the table at a place has or may have; all numbers where the name of no table is known."""
+    if not place:
+        return [_spelt(each) for each in number_places(data)]
+    annotation, inside = field_at(ModelTable, data, place).annotation, _at(data, place)
+    there = list(inside) if isinstance(inside, dict) else range(len(inside)) if isinstance(inside, list) else []
+    possible = list(annotation.model_fields) if is_table(annotation) else []
+    return [_spelt((*place, key)) for key in dict.fromkeys([*there, *possible])]
+
+
+def _in_full(data: Mapping[str, Any], field: str) -> list[str]:
+    """The parts of a name, with the table that it leaves out."""
+    parts = _parts(field)
+    if parts[0] in data or parts[0] in ModelTable.model_fields:
+        return parts
+    fits = [
+        [table, *parts]
+        for table, members in data.items()
+        if isinstance(members, dict) and parts[0] in members
+        and (isinstance(members[parts[0]], (dict, list)) == (len(parts) > 1))
+    ]  # fmt: skip
+    whole = [each for each in fits if len(_followed(data, each)) == len(each)]
+    if len(whole or fits) > 1:
+        names = ", ".join(_spelt(tuple(each)) for each in whole or fits)
+        raise InputError("the name of several", field=field, remedy=f"choose from {names}")
+    return (whole or fits or [parts])[0]
+
+
+def _followed(data: Mapping[str, Any], parts: Sequence[str]) -> Place:
+    """The place of a name as far as data have it."""
+    place: list[str | int] = []
+    inside: Any = data
+    for part in parts:
+        key: str | int = int(part) if isinstance(inside, list) and part.isdigit() else part
+        if not ((isinstance(inside, dict) and key in inside) or (isinstance(inside, list) and _has(inside, key))):
+            break
+        inside = inside[key]  # pyright: ignore[reportArgumentType, reportCallIssue]
+        place.append(key)
+    return tuple(place)
+
+
+def _at(data: Any, place: Place) -> Any:
+    for key in place:
+        if isinstance(data, dict) and key not in data:
+            return None
+        data = data[key]
+    return data
+
+
+def number_places(data: Mapping[str, Any]) -> Iterator[Place]:
+    """Every number of a model's data, and every expression that has a value."""
+
+    def walk(inside: Any, place: Place) -> Iterator[Place]:
+        if isinstance(inside, (dict, list)):
+            for key, value in inside.items() if isinstance(inside, dict) else enumerate(inside):
+                yield from walk(value, (*place, key))
+        elif _is_number(inside, data):
+            yield place
+
+    yield from walk(data, ())
+
+
+def number_at(data: Mapping[str, Any], place: Place) -> float:
+    """The number at a place that `find_place` found, or the value of its expression."""
+    inside = _at(data, place)
+    if isinstance(inside, str):
+        return float(evaluate(inside, evaluate_parameters(data.get("parameters", {}))))
+    return float(inside)
+
+
+def overlaid(data: dict[str, Any], values: Sequence[tuple[Place, Any]]) -> dict[str, Any]:
+    """A model's data with other values at given places; unchanged tables are shared, not copied."""
+    out: Any = dict(data)
+    for place, value in values:
+        inside: Any = out
+        for key in place[:-1]:
+            below = inside.get(key, {}) if isinstance(inside, dict) else inside[key]
+            inside[key] = dict(below) if isinstance(below, dict) else list(below)
+            inside = inside[key]
+        inside[place[-1]] = value
+    return out
+
+
+def _parts(field: str) -> list[str]:
+    parts, at = [], 0
+    while at < len(field):
+        found = _PART.match(field, at)
+        if found is None:
+            break
+        parts.append(next(group for group in found.groups()[:3] if group is not None))
+        at = found.end()
+        if found[4] == "":
+            return parts
+    raise InputError("not the name of a field", field=field, remedy='say "body.link1.length"')
+
+
+def _has(inside: list, key: str | int) -> bool:
+    return isinstance(key, int) and key < len(inside)
+
+
+def _is_number(value: Any, data: Mapping[str, Any]) -> bool:
+    if isinstance(value, bool):
+        return False
+    if isinstance(value, (int, float)):
+        return True
+    if not isinstance(value, str):
+        return False
+    table = data.get("parameters", {})
+    try:
+        evaluate(value, evaluate_parameters(table if isinstance(table, dict) else {}))
+    except (ExpressionError, InputError):
+        return False
+    return True
+
+
+def _below(data: Mapping[str, Any], field: str) -> str:
+    inside = _spelt(_followed(data, _in_full(data, field)))
+    near = [name for name in map(_spelt, number_places(data)) if name.startswith(f"{inside}.")]
+    return f'say "{near[0]}"' if near else "name a number"
+
+
+def _spelt(place: Place) -> str:
+    """A place as it is written in a study file."""
+    return ".".join(str(key) if _BARE.match(str(key)) else f'"{key}"' for key in place)

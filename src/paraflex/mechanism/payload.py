@@ -1,0 +1,99 @@
+"""A payload at the end-effector: the body that carries it, with its mass and moment of inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from paraflex.arguments import CheckedFields
+from paraflex.errors import InputError
+from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam, LumpedMass, RigidBody
+from paraflex.mechanism.modal import ModalBody
+from paraflex.mechanism.quantities import finite, not_negative
+
+
+@dataclass(frozen=True)
+class Payload(CheckedFields):
+    """A mass that the end-effector carries, fixed to its point.
+
+    Attributes
+    ----------
+    mass : float
+        [kg]
+    inertia : float
+        About its centre of mass [kg m^2].
+    offset : (x, y)
+        From the end-effector's point to its centre of mass, in the frame of the body that carries it [m].
+    """
+
+    _table = "payload"
+
+    mass: float
+    inertia: float = 0.0
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        not_negative(self.mass, "payload.mass", "kg")
+        not_negative(self.inertia, "payload.inertia", "kg m^2")
+        finite(self.offset, "payload.offset")
+
+
+def loaded(body: Body, point: str, payload: Payload) -> Body:
+    """A body with a payload at one of its points, in addition to what it has.
+
+    Raises
+    ------
+    InputError
+        An offset from the centre line of a beam, or from a point of a body of given matrices.
+    """
+    if isinstance(body, RigidBody):
+        return _merged(body, np.add(body.points[point], payload.offset), payload)
+    if any(payload.offset):
+        raise InputError(
+            f'"{body.name}" bends, and has no lumps beside its points', field="payload.offset", value=payload.offset,
+            remedy="leave it out, or weld a rigid body of that mass to the point",
+        )  # fmt: skip
+    if isinstance(body, ModalBody):
+        return _with_point_mass(body, point, payload)
+    return _with_lump(body, point, payload)
+
+
+def _with_lump(body: FlexibleBeam | AssumedModesBeam, point: str, payload: Payload) -> Body:
+    there = [lump for lump in body.lumps if lump.point == point]
+    mass, inertia = (sum(getattr(each, name) for each in [*there, payload]) for name in ("mass", "inertia"))
+    others = [lump for lump in body.lumps if lump.point != point]
+    return replace(body, lumps=(*others, LumpedMass(point, mass, inertia)))
+
+
+def _merged(body: RigidBody, place: np.ndarray, payload: Payload) -> RigidBody:
+    """Both as one, about their common centre of mass: Steiner's theorem."""
+    masses = np.array([body.mass, payload.mass])
+    places = np.array([body.centre_of_mass, place])
+    centre = masses @ places / masses.sum()
+    inertia = body.inertia + payload.inertia + masses @ np.sum((places - centre) ** 2, axis=1)
+    return replace(
+        body, mass=float(masses.sum()), inertia=float(inertia), centre_of_mass=(float(centre[0]), float(centre[1]))
+    )
+
+
+def _with_point_mass(body: ModalBody, point: str, payload: Payload) -> ModalBody:
+    """The constants of a body with what a mass element and a lumped moment of inertia at a point add to each."""
+    (x, y), (along, across), slope = body.point(point)
+    mass, inertia, shape = payload.mass, payload.inertia, np.array([along, across])
+    translation = mass * shape.T @ shape
+    mass_matrix = np.array(body.mass_matrix)
+    skew = np.outer(along, across)
+    return replace(
+        body,
+        mass=body.mass + mass,
+        first_moment=np.array(body.first_moment) + mass * np.array([x, y]),
+        inertia=body.inertia + mass * (x**2 + y**2) + inertia,
+        mass_matrix=mass_matrix + translation + inertia * np.outer(slope, slope),
+        S2=np.array(body.S2) + mass * shape,
+        I1=np.array(body.I1) + mass * (x * along + y * across),
+        G1=np.array(body.G1) + mass * (x * across - y * along) + inertia * slope,
+        G2=np.array(body.G2) + mass * (skew - skew.T),
+        I2=(mass_matrix if body.I2 is None else np.array(body.I2)) + translation,
+    )

@@ -1,0 +1,202 @@
+"""Cross-sections of beams: area and second moment of area, given themselves or by a shape."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.errors import InputError
+from paraflex.mechanism.quantities import positive
+
+
+@given_as("a shape", "Rectangle(...), Round(...) or Tube(...)")
+@dataclass(frozen=True)
+class Shape(CheckedFields, ABC):
+    """A shape of cross-sections: the base of all kinds. All its fields are lengths, `wall` that of a hollow one [m]."""
+
+    _table = "section"
+    kind: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if value is not None:
+                positive(value, f"section.{each.name}", "m")
+        wall = getattr(self, "wall", None)
+        if wall is not None and not wall < self.smallest / 2.0:
+            raise InputError(
+                f"as thick as half of the section, {self.smallest / 2.0:g} m, or thicker", field="section.wall",
+                value=wall, remedy="give a thinner wall, or leave it out for a solid section",
+            )  # fmt: skip
+
+    @property
+    @abstractmethod
+    def smallest(self) -> float:
+        """The smallest outer dimension [m]."""
+
+    @property
+    @abstractmethod
+    def area(self) -> float:
+        """The area [m^2]."""
+
+    @property
+    @abstractmethod
+    def second_moment(self) -> float:
+        """Of area, about the axis normal to the plane of motion [m^4]."""
+
+    @property
+    @abstractmethod
+    def outer_fibre(self) -> float:
+        """Distance of the outermost fibre from the neutral axis, in the plane of motion [m]."""
+
+
+@dataclass(frozen=True)
+class Rectangle(Shape):
+    """A rectangle, hollow where it has a wall: width out of the plane of motion, thickness in it [m]."""
+
+    kind: ClassVar[str] = "rectangle"
+
+    width: float
+    thickness: float
+    wall: float | None = None
+
+    @property
+    def smallest(self) -> float:
+        """The smaller side [m]."""
+        return min(self.width, self.thickness)
+
+    @property
+    def area(self) -> float:
+        """The area [m^2]."""
+        return self.width * self.thickness - self._of_hole(1)
+
+    @property
+    def second_moment(self) -> float:
+        """Of area, about the axis normal to the plane of motion [m^4]."""
+        return self.width * self.thickness**3 / 12.0 - self._of_hole(3) / 12.0
+
+    @property
+    def outer_fibre(self) -> float:
+        """Half the thickness [m]."""
+        return self.thickness / 2.0
+
+    def _of_hole(self, power: int) -> float:
+        """Width times a power of the thickness of the hole."""
+        if self.wall is None:
+            return 0.0
+        return (self.width - 2.0 * self.wall) * (self.thickness - 2.0 * self.wall) ** power
+
+
+@dataclass(frozen=True)
+class Round(Shape):
+    """A solid circle [m]."""
+
+    kind: ClassVar[str] = "round"
+
+    diameter: float
+
+    @property
+    def smallest(self) -> float:
+        """The diameter [m]."""
+        return self.diameter
+
+    @property
+    def area(self) -> float:
+        """The area [m^2]."""
+        return math.pi / 4.0 * self.diameter**2
+
+    @property
+    def second_moment(self) -> float:
+        """Of area, about a diameter [m^4]."""
+        return math.pi / 64.0 * self.diameter**4
+
+    @property
+    def outer_fibre(self) -> float:
+        """The radius [m]."""
+        return self.diameter / 2.0
+
+
+@dataclass(frozen=True)
+class Tube(Shape):
+    """A circular tube of an outer diameter and a wall [m]."""
+
+    kind: ClassVar[str] = "tube"
+
+    diameter: float
+    wall: float
+
+    @property
+    def smallest(self) -> float:
+        """The diameter [m]."""
+        return self.diameter
+
+    @property
+    def area(self) -> float:
+        """The area [m^2]."""
+        return math.pi * self.wall * (self.diameter - self.wall)
+
+    @property
+    def second_moment(self) -> float:
+        """Of area, about a diameter: the area times the sum of both squared diameters over 16 [m^4]."""
+        return self.area * (self.diameter**2 + (self.diameter - 2.0 * self.wall) ** 2) / 16.0
+
+    @property
+    def outer_fibre(self) -> float:
+        """The outer radius [m]."""
+        return self.diameter / 2.0
+
+
+# Kinds of shapes by their names in files.
+SHAPES: dict[str, type[Shape]] = {kind.kind: kind for kind in (Rectangle, Round, Tube)}
+
+
+@dataclass(frozen=True)
+class Section(CheckedFields):
+    """Cross-section of a beam.
+
+    Attributes
+    ----------
+    area : float
+        [m^2]
+    second_moment : float
+        Of area, about the axis normal to the plane of motion [m^4].
+    shape : Shape, optional
+        What it has them from.
+    outer_fibre : float, optional
+        Distance of the outermost fibre from the neutral axis, in the plane of motion [m]; without it there are no
+        bending stresses.
+    """
+
+    _table = "section"
+
+    area: float
+    second_moment: float
+    shape: Shape | None = None
+    outer_fibre: float | None = None
+
+    @classmethod
+    def of(cls, shape: Shape) -> Section:
+        """The section of a shape."""
+        return cls(shape.area, shape.second_moment, shape, shape.outer_fibre)
+
+    @classmethod
+    @checked_arguments()
+    def rectangle(cls, width: float, thickness: float, wall: float | None = None) -> Section:
+        """A rectangle: width out of the plane of motion, thickness in it; hollow with a wall [m]."""
+        return cls.of(Rectangle(width, thickness, wall))
+
+    @classmethod
+    @checked_arguments()
+    def round(cls, diameter: float) -> Section:
+        """A solid circle [m]."""
+        return cls.of(Round(diameter))
+
+    @classmethod
+    @checked_arguments()
+    def tube(cls, diameter: float, wall: float) -> Section:
+        """A circular tube of an outer diameter and a wall [m]."""
+        return cls.of(Tube(diameter, wall))

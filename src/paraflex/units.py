@@ -1,0 +1,155 @@
+"""Units of quantities: factors to SI units and dimensions, and quantities such as "80 mm" within a text."""
+
+from __future__ import annotations
+
+import math
+import re
+from difflib import get_close_matches
+from fractions import Fraction
+from functools import cache
+from typing import NamedTuple
+
+# Exponents of metre, kilogram, second and radian. An angle counts, so that a speed in rpm is none in m/s.
+Dimension = tuple[int, int, int, int]
+PLAIN: Dimension = (0, 0, 0, 0)
+ANGLE: Dimension = (0, 0, 0, 1)
+
+
+class Unit(NamedTuple):
+    """A unit: `factor` times pi to the power `pi` in SI units, exact, and its dimension."""
+
+    factor: Fraction
+    pi: int
+    dimension: Dimension
+
+    def times(self, other: Unit, power: int) -> Unit:
+        """The product with a power of another unit."""
+        dimension = tuple(one + power * two for one, two in zip(self.dimension, other.dimension, strict=True))
+        return Unit(self.factor * other.factor**power, self.pi + power * other.pi, dimension)  # type: ignore[arg-type]
+
+    def in_si(self, number: str) -> float:
+        """A number of this unit in SI units, rounded once as far as pi allows: 1.1 mm is the float 0.0011."""
+        try:
+            return float(Fraction(number) * self.factor) * math.pi**self.pi
+        except OverflowError:
+            return math.inf
+
+
+_ONE = Unit(Fraction(1), 0, PLAIN)
+
+
+def _unit(factor: str | int | Fraction, m: int = 0, kg: int = 0, s: int = 0, rad: int = 0, *, pi: int = 0) -> Unit:
+    return Unit(Fraction(factor), pi, (m, kg, s, rad))
+
+
+_PREFIXES = {"G": "1e9", "M": "1e6", "k": "1e3", "m": "1e-3", "u": "1e-6", "µ": "1e-6", "μ": "1e-6", "n": "1e-9"}
+# Units with prefixes, and units without.
+_PREFIXED = {
+    "m": _unit(1, m=1),
+    "g": _unit("1e-3", kg=1),
+    "s": _unit(1, s=1),
+    "rad": _unit(1, rad=1),
+    "N": _unit(1, m=1, kg=1, s=-2),
+    "Nm": _unit(1, m=2, kg=1, s=-2),
+    "Pa": _unit(1, m=-1, kg=1, s=-2),
+    "Hz": _unit(1, s=-1),
+}
+_SINGLE = {
+    "cm": _unit("1e-2", m=1),
+    "in": _unit("0.0254", m=1),
+    "t": _unit(1000, kg=1),
+    "min": _unit(60, s=1),
+    "h": _unit(3600, s=1),
+    "deg": _unit("1/180", rad=1, pi=1),
+    "°": _unit("1/180", rad=1, pi=1),
+    "rev": _unit(2, rad=1, pi=1),
+    "rpm": _unit("1/30", s=-1, rad=1, pi=1),
+    "Nmm": _unit("1e-3", m=2, kg=1, s=-2),
+    "bar": _unit("1e5", m=-1, kg=1, s=-2),
+    # A pound-force per square inch.
+    "psi": _unit(Fraction("4.4482216152605") / Fraction("0.0254") ** 2, m=-1, kg=1, s=-2),
+}  # fmt: skip
+UNITS: dict[str, Unit] = (
+    _PREFIXED
+    | {prefix + name: unit._replace(factor=unit.factor * Fraction(factor)) for name, unit in _PREFIXED.items()
+       for prefix, factor in _PREFIXES.items()}
+    | _SINGLE
+)  # fmt: skip
+
+_NUMBER = r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
+_POWERS = {"²": 2, "³": 3, "⁴": 4}
+
+
+def _factor(group: str) -> str:
+    """Pattern of a known unit and its power, with groups for both or without groups."""
+    known = "|".join(map(re.escape, sorted(UNITS, key=len, reverse=True)))
+    return rf"{group}{known})(?![^\W²³⁴]|\()(?:\s*\^\s*{group}-?\d)|{group}[²³⁴]))?"
+
+
+# What joins units: no *, behind which a parameter or the time t may stand; and nothing is divided by tonnes.
+_OPERATOR = r"\s*/\s*(?!t\b)|\s*·\s*|\s+"
+# A number and a unit behind it; a quotient of units may begin with 1.
+_QUANTITY = re.compile(rf"({_NUMBER})\s*((?:1\s*/\s*)?{_factor('(?:')}(?:(?:{_OPERATOR}){_factor('(?:')})*)")
+_FACTOR = re.compile(rf"({_OPERATOR}|^){_factor('(')}")
+_BEHIND_NUMBER = re.compile(rf"{_NUMBER}\s*([^\W\d]\w*)")
+
+
+class Quantity(NamedTuple):
+    """A number with a unit in a text: where it begins and ends, its value in SI units, and its unit as written."""
+
+    start: int
+    end: int
+    value: float
+    unit: str
+
+
+@cache
+def unit_named(text: str) -> Unit:
+    """The unit of a text such as "mm", "N m/rad" or "1/s": a quotient divides by the next factor alone."""
+    unit = _ONE
+    for found in _FACTOR.finditer(text.removeprefix("1")):
+        power = int(found[3] or _POWERS.get(found[4], 1))
+        unit = unit.times(UNITS[found[2]], -power if "/" in found[1] else power)
+    return unit
+
+
+def quantities_in(text: str) -> list[Quantity]:
+    """Numbers with units in a text, in their order."""
+    return [
+        Quantity(*found.span(), unit_named(found[2]).in_si(found[1]), found[2]) for found in _QUANTITY.finditer(text)
+    ]
+
+
+def without_quantities(text: str) -> str:
+    """A text without its numbers with units."""
+    return _QUANTITY.sub(" ", text)
+
+
+def divisors_in(unit: str) -> set[str]:
+    """Names in a unit that stand behind /, where a parameter of an expression could stand as well."""
+    return {found[2] for found in _FACTOR.finditer(unit) if "/" in found[1]}
+
+
+def unknown_unit(text: str) -> tuple[str, str] | None:
+    """The first word behind a number in a text that is no unit, and a remedy."""
+    for found in _BEHIND_NUMBER.finditer(text):
+        if found[1] not in UNITS:
+            near = get_close_matches(found[1], UNITS, n=1)
+            return found[1], f'did you mean "{near[0]}"?' if near else 'write units like "mm^2", "N m/rad" or "rpm"'
+    return None
+
+
+# Units of fields of files, as their descriptions name them.
+FIELD_UNITS = (
+    "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad", "N s/m", "N m", "N/m", "m/s^2", "m^4", "m^2", "m/s",
+    "rad/s", "rad", "Pa", "Hz", "1/s", "m", "s", "N",
+)  # fmt: skip
+
+
+def spelt(dimension: Dimension) -> str:
+    """The SI unit of a dimension."""
+    for unit in FIELD_UNITS:
+        if unit_named(unit).dimension == dimension:
+            return unit
+    powers = zip(("kg", "m", "s", "rad"), (dimension[k] for k in (1, 0, 2, 3)), strict=True)
+    return " ".join(name if power == 1 else f"{name}^{power}" for name, power in powers if power) or "1"

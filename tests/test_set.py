@@ -1,0 +1,144 @@
+"""Values set in place of a file's: their names, what they may be, and that results and commands tell them."""
+
+import json
+import re
+import shlex
+
+import pytest
+
+import paraflex as pf
+from paraflex.files import load_data
+from paraflex.files.overlay import find_place, value_of, with_values
+from paraflex.report.provenance import asked, run_command_line
+from shell import paraflex
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "place"),
+    [
+        ("section.bar.thickness", 0.006, ("section", "bar", "thickness")),
+        ("bar.thickness", "6 mm", ("section", "bar", "thickness")),
+        ("distal1.length", "2 * 125 mm", ("body", "distal1", "length")),
+        ("distal1.points.C", 0.2, ("body", "distal1", "points", "C")),
+        ("ground.A1.0", "-80 mm", ("ground", "A1", 0)),
+        ("l1", 0.26, ("parameters", "l1")),
+        ("gravity", [0.0, -9.81], ("gravity",)),
+        ("study.tolerance", "2 um", ("study", "tolerance")),
+        ("study.torques.left", "3 N m", ("study", "torques", "left")),
+        ("payload.mass", "0.1 kg", ("payload", "mass")),
+        ("geometry", "linear", ("geometry",)),
+        ("distal1.modes", 2, ("body", "distal1", "modes")),
+        ("outward.distal1", "40 deg", ("assembly", "outward", "distal1")),
+    ],
+)
+def test_fields_are_set_by_their_names(field, value, place):
+    data, _ = load_data("five_bar")
+    changed = with_values(data, {field: value})
+    inside = changed
+    for key in place:
+        inside = inside[key]
+    assert inside == value
+    assert data == load_data("five_bar")[0]
+    pf.load("five_bar", set={field: value})
+
+
+def test_a_model_set_is_that_of_a_file_that_says_so(tmp_path):
+    model = pf.load("five_bar", set={"bar.width": "40 mm", "distal1.elements": 2})
+    bodies = model.mechanism.bodies
+    assert {body.section.shape.width for body in bodies} == {0.04}
+    assert [body.elements for body in bodies if body.name.startswith("distal")] == [2, 3]
+    assert model.settings == {"bar.width": "40 mm", "distal1.elements": 2}
+    assert model.parameters["section"]["bar"]["width"] == "40 mm"
+    model.save(tmp_path / "set.toml")
+    assert '"40 mm"' in (tmp_path / "set.toml").read_text()
+    assert pf.load(tmp_path / "set.toml").mechanism == model.mechanism
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        (
+            {"distal1.lenght": 0.3},
+            r"distal1.lenght: no such field in the model's file; did you mean \"body.distal1.length",
+        ),
+        ({"body.distal9.length": 0.3}, r"body.distal9.length: no such field"),
+        ({"parameters.l9": 0.3}, r"parameters.l9: no such field"),
+        ({"nothing": 0.3}, r"nothing: no such field"),
+        ({"body.distal1": 0.3}, r'body.distal1: a table of the model\'s file; say "body.distal1.length"'),
+        ({"distal1.points": {"C": 1.0}}, r"distal1.points: a table"),
+        ({"ground.A1.2": 0.3}, r"ground.A1.2: no such field"),
+        ({"distal1.length": "80 kg"}, r"body.distal1.length: a quantity in kg where one in m"),
+        ({"distal1.length": [1.0]}, r"body.distal1.length: should be a valid number"),
+        ({"": 0.3}, r".*: not the name of a field"),
+        ({"distal1..length": 0.3}, r".*: not the name of a field"),
+    ],
+)
+def test_what_cannot_be_set_is_refused(settings, says):
+    with pytest.raises(pf.InputError, match=f"^five_bar.toml: {says}"):
+        pf.load("five_bar", set=settings)
+
+
+def test_a_name_of_several_tables_is_refused():
+    data = {"section": {"bar": {"width": 1.0}}, "body": {"bar": {"length": 1.0, "width": 2.0}}}
+    assert find_place(data, "bar.length") == ("body", "bar", "length")
+    says = "bar.width: the name of several; choose from section.bar.width, body.bar.width"
+    with pytest.raises(pf.InputError, match=says):
+        find_place(data, "bar.width")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("0.3", 0.3), ("4", 4), ("true", True), ("[0, -9.81]", [0, -9.81]), ("30 deg", "30 deg"), ("circle", "circle"),
+     ('"4"', "4"), ("-l1 / 2", "-l1 / 2"), (".5", ".5"), ("[" * 9999, "[" * 9999)],
+)  # fmt: skip
+def test_texts_of_a_shell_stand_for_values(text, value):
+    found = value_of(text)
+    assert found == value
+    assert type(found) is type(value)
+
+
+def test_commands_set_values_and_results_tell_them(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = ["--set", "bar.thickness=6 mm", "--set", "study.samples=11"]
+    out = paraflex("run", "five_bar", *given, "--duration", "0.05", "--mode", "++", "--out", "set")
+    assert out.returncode == 0, out.stderr
+    data = pf.load_results("set")
+    told = json.loads(data.attrs["parameters"])
+    assert told["model"]["section"]["bar"]["thickness"] == "6 mm"
+    assert told["run"]["set"] == {"bar.thickness": "6 mm", "study.samples": 11}
+    assert data.sizes["time"] == 11
+    words = shlex.split(run_command_line(asked(data)))
+    assert words[:8] == ["paraflex", "run", "--mechanism", "five_bar", *given]
+    again = paraflex(*words[1:], "--out", "again")
+    assert again.returncode == 0, again.stderr
+    assert pf.load_results("again")["deflection"].equals(data["deflection"])
+    facts = json.loads(paraflex("info", "five_bar", "--set", "distal1.elements=1", "--json").stdout)
+    plain = json.loads(paraflex("info", "five_bar", "--json").stdout)
+    assert json.dumps(facts) != json.dumps(plain)
+
+
+@pytest.mark.parametrize("command", ["run", "verify", "compare-methods", "modes", "info"])
+def test_every_command_that_takes_a_model_takes_settings(command):
+    wrong = paraflex(command, "five_bar", "--set", "bar.thickness=6 kg")
+    assert wrong.returncode == 2
+    assert "five_bar.toml: section.bar.thickness: a quantity in kg where one in m is asked for" in wrong.stderr
+    for text in ("bar.thickness", "=3", "bar.thickness="):
+        wrong = paraflex(command, "five_bar", "--set", text)
+        assert wrong.returncode == 2
+        assert "--set: no field and value" in wrong.stderr
+
+
+def test_options_take_units(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = paraflex("info", "four_bar", "--at", "10 ms", "--json")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == paraflex("info", "four_bar", "--at", "0.01", "--json").stdout
+    for given, says in [
+        ("10 mm", "a quantity in m where one in s"),
+        ("soon", "not a number"),
+        ("3 parsec", "not a number"),
+    ]:
+        wrong = paraflex("run", "four_bar", "--duration", given)
+        assert wrong.returncode == 2
+        assert "--duration" in wrong.stderr
+        assert re.search(says, " ".join(wrong.stderr.split()))
