@@ -9,23 +9,27 @@ from typing import Any
 from paraflex.errors import InputError
 from paraflex.files.bodies import read_body
 from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.laws import quantities, read_law
-from paraflex.files.schema import AssemblyTable, JointTable, ModelTable, PathTable, PrescribedTable
+from paraflex.files.laws import quantities, read_components, read_law
+from paraflex.files.schema import AssemblyTable, JointTable, ModelTable, PathTable, PrescribedTable, TorqueTable
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
 from paraflex.mechanism import (
     JOINT_KINDS,
     ActuationMode,
+    AppliedTorque,
     Assembly,
     EndEffector,
     Group,
     Joint,
+    Load,
     Mechanism,
     Motor,
+    PointForce,
     PointRef,
     PrescribedAngle,
     RevoluteJoint,
     groups_of,
 )
+from paraflex.mechanism.loads import InTime
 
 # What paths are called in files.
 PATHS: dict[str, Callable[..., Path]] = {"polygon": Polygon, "line": Line, "circle": Circle, "points": PointPath}
@@ -45,7 +49,8 @@ def read_mechanism(table: ModelTable) -> Mechanism:
     }
     for field, group in groups_of(Mechanism).items():
         if group.kinds:
-            made[field] = [_member(group, name, dict(one)) for name, one in getattr(table, group.table).items()]
+            make = _load if group.table == "load" else _member
+            made[field] = [make(group, name, one, table) for name, one in getattr(table, group.table).items()]
     return Mechanism(
         **made,
         bodies=tuple(read_body(name, body, table) for name, body in table.body.items()),
@@ -108,8 +113,39 @@ def _assembly(name: str, entry: AssemblyTable) -> Assembly:
     return Assembly(name, entry.angles, points)
 
 
-def _member(group: Group, name: str, said: dict[str, Any]) -> Any:
+def _load(_: Group, name: str, entry: Any, table: ModelTable) -> Load:
+    """A load from its table."""
+    kind = {"force": PointForce, "torque": AppliedTorque}[entry.type]
+    try:
+        given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
+    except InputError as error:
+        raise error.within(f"load.{name}") from None
+    return kind(name, entry.point, *(given if entry.type == "torque" else (given,)))
+
+
+def read_torques(table: ModelTable) -> dict[str, InTime]:
+    """Torques of motors that the study gives.
+
+    Raises
+    ------
+    InputError
+        A law that makes no sense.
+    """
+    parameters, torques = evaluate_parameters(table.parameters), {}
+    for name, given in table.study.torques.items():
+        place, whole = f"study.torques.{name}", isinstance(given, TorqueTable)
+        entry = given if whole else TorqueTable.model_construct(torque=given)
+        try:
+            (torques[name],) = read_components(entry, "torque", parameters, table.study.duration)
+        except InputError as error:
+            # An expression alone stands where the table would.
+            raise (error.within(place) if whole else error.at(place)) from None
+    return torques
+
+
+def _member(group: Group, name: str, entry: Any, _: ModelTable) -> Any:
     """A member of a group from its table."""
+    said = dict(entry)
     kinds = {getattr(kind, "kind", None): kind for kind in group.kinds}
     kind = kinds[said.pop("type")] if "type" in said else group.kinds[0]
     points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in said.pop("points", ())]

@@ -11,7 +11,7 @@ from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, suggestion
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
-from paraflex.files.mechanism import read_mechanism, read_path
+from paraflex.files.mechanism import read_mechanism, read_path, read_torques
 from paraflex.files.merge import merged, same
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
 from paraflex.files.rows import with_names, with_rows
@@ -345,7 +345,11 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
             paths[name] = read_path(entry)
         except InputError as error:
             raise error.within(f"path.{name}") from error
-    said = dict(table.study) | {"modes": tuple(table.study.modes), "orientation": table.study.orientation or 0.0}
+    said = dict(table.study) | {
+        "modes": tuple(table.study.modes),
+        "orientation": table.study.orientation or 0.0,
+        "torques": read_torques(table),
+    }
     study = StudyDefaults(**said)
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
