@@ -194,7 +194,7 @@ class _Packer:
             return
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
             if not ref.on_ground:
-                record = {"marker": self.add_marker(ref), "signal": signal, "sign": sign}
+                record: dict[str, float] = {"marker": self.add_marker(ref), "signal": signal, "sign": sign}
                 self.motor_sides[self.index[ref.body]].append(record)
 
 
@@ -220,7 +220,12 @@ def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float
     """Components of loads that are numbers, and the signals of those that are laws in time."""
     signals, made = iter(inputs_of(mechanism).loads), []
     for load in mechanism.loads:
-        record = {"marker": packer.add_marker(load.point), "x_signal": -1, "y_signal": -1, "torque_signal": -1}
+        record: dict[str, float] = {
+            "marker": packer.add_marker(load.point),
+            "x_signal": -1,
+            "y_signal": -1,
+            "torque_signal": -1,
+        }
         names = (("fx", "x_signal"), ("fy", "y_signal")) if load.kind == "force" else (("torque", "torque_signal"),)
         for (number, signal), given in zip(names, load.components, strict=True):
             if isinstance(given, AngleLaw):

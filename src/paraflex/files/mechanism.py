@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from typing import Any
 
@@ -10,8 +10,17 @@ from paraflex.errors import InputError
 from paraflex.files.bodies import read_body
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import quantities, read_components, read_law
-from paraflex.files.schema import AssemblyTable, JointTable, ModelTable, PathTable, PrescribedTable, TorqueTable
-from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
+from paraflex.files.schema import (
+    AssemblyTable,
+    JointTable,
+    ModelTable,
+    PathTable,
+    PrescribedTable,
+    SequenceTable,
+    TabulatedPathTable,
+    TorqueTable,
+)
+from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
 from paraflex.mechanism import (
     JOINT_KINDS,
     ActuationMode,
@@ -30,9 +39,17 @@ from paraflex.mechanism import (
     groups_of,
 )
 from paraflex.mechanism.loads import InTime
+from paraflex.mechanism.quantities import known
 
 # What paths are called in files.
-PATHS: dict[str, Callable[..., Path]] = {"polygon": Polygon, "line": Line, "circle": Circle, "points": PointPath}
+PATHS: dict[str, Callable[..., Path]] = {
+    "polygon": Polygon,
+    "line": Line,
+    "circle": Circle,
+    "points": PointPath,
+    "table": TabulatedPath,
+    "sequence": SequencePath,
+}
 
 
 def read_mechanism(table: ModelTable) -> Mechanism:
@@ -152,12 +169,47 @@ def _member(group: Group, name: str, entry: Any, _: ModelTable) -> Any:
     return kind(name, *points, *said.pop("joints", ()), **said)
 
 
-def read_path(table: PathTable) -> Path:
-    """A path from its table.
+def read_paths(tables: Mapping[str, PathTable]) -> dict[str, Path]:
+    """Paths from their tables, by name.
 
     Raises
     ------
     InputError
-        Numbers that make no path.
+        See `read_path`; or a sequence of what is no path, or is one that follows it in the file.
     """
-    return PATHS[table.type](**{name: value for name, value in table if name != "type"})
+    found: dict[str, Path] = {}
+    # Sequences name the others.
+    for name in sorted(tables, key=lambda name: tables[name].type == "sequence"):
+        try:
+            found[name] = read_path(tables[name], found)
+        except InputError as error:
+            raise error.within(f"path.{name}") from error
+    return {name: found[name] for name in tables}
+
+
+def read_path(table: PathTable, others: Mapping[str, Path] | None = None) -> Path:
+    """A path from its table, and those that it may name.
+
+    Raises
+    ------
+    InputError
+        Numbers that make no path, or unknown names.
+    """
+    said = {name: value for name, value in table if name != "type"}
+    if isinstance(table, SequenceTable):
+        for name in table.paths:
+            known(name, others or {}, "paths", "path")
+        said["paths"] = tuple((others or {})[name] for name in table.paths)
+    if isinstance(table, TabulatedPathTable):
+        rows = said.pop("table")
+        if len({len(row) for row in rows}) > 1:
+            raise InputError(
+                "some points have a time and some do not", field="table", remedy="give all as [x, y], or as [x, y, t]"
+            )
+        said["points"] = [row[:2] for row in rows]
+        said["times"] = [row[2] for row in rows] if rows and len(rows[0]) > 2 else None
+    try:
+        return PATHS[table.type](**said)
+    except InputError as error:
+        at_table = isinstance(table, TabulatedPathTable) and error.field in ("points", "times")
+        raise (error.at("table") if at_table else error) from None

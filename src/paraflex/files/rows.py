@@ -13,8 +13,14 @@ from typing import Any
 from paraflex.errors import InputError
 from paraflex.files.read import text_of
 
-_COUNTS = {2: "two", 3: "three"}
-_VALUES = {2: "a value", 3: "two values"}
+# Columns that a file may have: what they are called, and what stands in them.
+_TWO, _THREE, _PATH = (2,), (3,), (2, 3)
+_COUNTS = {_TWO: "two", _THREE: "three", _PATH: "two or three"}
+_VALUES = {
+    _TWO: "a time in s and a value",
+    _THREE: "a time in s and two values",
+    _PATH: "x and y in m, and perhaps a time",
+}
 _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
 
 
@@ -55,13 +61,20 @@ def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
     return data
 
 
-def _entries(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], int]]:
+def _entries(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], tuple[int, ...]]]:
     """The tables of a model's data that may name a file as their `table`: where each is, itself, and columns."""
     for group in ("prescribed", "load"):
         for name, entry in _tables(data.get(group)):
-            yield f"{group}.{name}", entry, 3 if group == "load" and entry.get("type") == "force" else 2
+            yield f"{group}.{name}", entry, _THREE if group == "load" and entry.get("type") == "force" else _TWO
     for name, entry in _tables(_of_study(data)):
-        yield f"study.torques.{name}", entry, 2
+        yield f"study.torques.{name}", entry, _TWO
+    paths: Any = data.get("path")
+    # A file of one path has it in place of its name.
+    if isinstance(paths, dict) and isinstance(paths.get("type"), str):
+        yield "path", paths, _PATH
+        return
+    for name, entry in _tables(paths):
+        yield f"path.{name}", entry, _PATH
 
 
 def _of_study(data: dict[str, Any]) -> Any:
@@ -72,7 +85,7 @@ def _tables(given: Any) -> list[tuple[str, dict[str, Any]]]:
     return [(name, one) for name, one in given.items() if isinstance(one, dict)] if isinstance(given, dict) else []
 
 
-def _read_rows(path: Path, name: str, field: str, columns: int) -> list[list[float]]:
+def _read_rows(path: Path, name: str, field: str, columns: tuple[int, ...]) -> list[list[float]]:
     count = _COUNTS[columns]
     unread, wrong = "name a file, seen from the model file's folder", f"save {count} columns as CSV"
     lines = text_of(path, field, name, unread=unread, wrong=wrong).splitlines()
@@ -81,22 +94,22 @@ def _read_rows(path: Path, name: str, field: str, columns: int) -> list[list[flo
     for number, line in enumerate(lines, start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
-        row = _numbers(line, columns)
+        row = _numbers(line, (len(rows[0]),) if rows else columns)
         if row is None and not rows and not headed and not any(map(_is_number, _SEPARATOR.split(line.strip()))):
             headed = True
         elif row is None:
             raise InputError(
                 f"line {number} of {name} is not {count} numbers", field=field, value=line.strip(),
-                remedy=f"give a time in s and {_VALUES[columns]} in every line below the headings",
+                remedy=f"give {_VALUES[columns]} in every line below the headings",
             )  # fmt: skip
         else:
             rows.append(row)
     return rows
 
 
-def _numbers(line: str, columns: int) -> list[float] | None:
+def _numbers(line: str, columns: tuple[int, ...]) -> list[float] | None:
     parts = _SEPARATOR.split(line.strip())
-    return [float(part) for part in parts] if len(parts) == columns and all(map(_is_number, parts)) else None
+    return [float(part) for part in parts] if len(parts) in columns and all(map(_is_number, parts)) else None
 
 
 def _is_number(text: str) -> bool:

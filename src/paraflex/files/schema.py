@@ -73,6 +73,10 @@ Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 # Rows of two or three numbers; the name of a file stands for its rows, which `rows.with_rows` has put in its place.
 Rows = Annotated[list[Pair], BeforeValidator(lambda value: value, json_schema_input_type=list[Pair] | str)]
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+PathRows = Annotated[
+    list[Annotated[list[Number], Field(min_length=2, max_length=3)]],
+    BeforeValidator(lambda value: value, json_schema_input_type=list[Pair] | list[Triple] | str),
+]
 ForceRows = Annotated[list[Triple], BeforeValidator(lambda value: value, json_schema_input_type=list[Triple] | str)]
 
 
@@ -110,11 +114,14 @@ _IN_TIME: dict[Any, tuple[Any, Any, Any, str]] = {
 def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
     """Fields of a table for what may be a law in time."""
     written, piece, rows, columns = _IN_TIME[hint]
-    pieces = Annotated[list[piece], Field(min_length=1)] | None
+    pieces: Any = Annotated[list[piece], Field(min_length=1)]
     example = f"a list of {{ until = s, {name} = ... }}, the last without until"
     return {
-        name: (written | None, Field(default=None, description=f"{description}, numbers or expressions of the time t")),
-        "pieces": (pieces, Field(default=None, description=example)),
+        name: (
+            written | None,
+            Field(default=None, description=f"{description}, numbers or expressions of the time t"),
+        ),
+        "pieces": (pieces | None, Field(default=None, description=example)),
         "table": (rows | None, Field(default=None, description=f"a list of {columns} such columns")),
     }
 
@@ -459,7 +466,32 @@ class PointsTable(_Table):
     motion_time: Number = Field(description="the time from the first point to the last in s")
 
 
-PathTable = Annotated[PolygonTable | LineTable | CircleTable | PointsTable, Field(discriminator="type")]
+class TabulatedPathTable(_Table):
+    """A smooth curve through many points, such as those of a file."""
+
+    type: Literal["table"]
+    table: PathRows = Field(
+        description="a list of [x, y] in m, or of [x, y, t] in m and s, or the name of a file with such columns"
+    )
+    motion_time: Number | None = Field(default=None, description="the time from the first point to the last in s")
+    max_acceleration: Number | None = Field(
+        default=None, description="the largest acceleration along the path in m/s^2"
+    )
+    max_speed: Number | None = Field(default=None, description="the largest speed along the path in m/s")
+
+
+class SequenceTable(_Table):
+    """Paths one after another in one motion."""
+
+    type: Literal["sequence"]
+    paths: list[Text] = Field(description="names of other [path.NAME] tables, in order")
+    dwell: Number = Field(default=0.0, description="the rest between two of them in s")
+
+
+PathTable = Annotated[
+    PolygonTable | LineTable | CircleTable | PointsTable | TabulatedPathTable | SequenceTable,
+    Field(discriminator="type"),
+]
 
 
 class TorqueTable(_Table):

@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
 from paraflex.files.study import StudyDefaults
-from paraflex.kinematics import Path
+from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
     AngleLaw,
     AppliedTorque,
@@ -92,7 +92,7 @@ def model_tables(
         "end_effector": {} if mechanism.end_effector is None else _fields(mechanism.end_effector),
         "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
         "mode": {mode.name: mode.motors for mode in mechanism.modes},
-        "path": {name: _path(path, name) for name, path in paths.items()},
+        "path": {name: _path(path, name, paths) for name, path in paths.items()},
         "start": {} if start is None else _start(start),
         "study": _fields(study) | ({"torques": _torques(study)} if study.torques else {}),
     }
@@ -283,11 +283,21 @@ def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, 
     return {"joint": prescribed.joint} | law
 
 
-def _path(path: Path, name: str) -> dict[str, Any]:
+def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
+    if isinstance(path, SequencePath):
+        names = [next((other for other, one in paths.items() if one == part), "") for part in path.paths]
+        if not all(names):
+            raise _unwritable(f"path.{name}.paths", "a path without a name", "put each of its paths among the model's")
+        return {"type": "sequence", "paths": names} | _fields(path, "paths")
+    if isinstance(path, TabulatedPath):
+        columns = [*zip(*path.points, strict=True), *([] if path.times is None else [path.times])]
+        return {"type": "table", "table": [*zip(*columns, strict=True)]} | _fields(path, "points", "times")
     for kind, made in PATHS.items():
         if type(path) is made:
             return {"type": kind} | _fields(path)
-    raise _unwritable(f"path.{name}", type(path).__name__, "give a Polygon, Line, Circle or PointPath")
+    raise _unwritable(
+        f"path.{name}", type(path).__name__, "give a Polygon, Line, Circle, PointPath, TabulatedPath or SequencePath"
+    )
 
 
 def _torques(study: StudyDefaults) -> dict[str, Any]:
