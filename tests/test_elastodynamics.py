@@ -364,8 +364,8 @@ def test_twice_the_load_is_twice_the_response(short, short_run, monkeypatch):
     # Nothing comes back from the displacements to the motion: the response is linear in the load to rounding.
     forces = elastodynamics.motion_forces
 
-    def doubled(packed, q, v, a, f, points):
-        forces(packed, q, v, a, f, points)
+    def doubled(packed, q, v, a, loads, f, points):
+        forces(packed, q, v, a, loads, f, points)
         f *= 2.0
 
     monkeypatch.setattr(elastodynamics, "motion_forces", doubled)

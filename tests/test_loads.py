@@ -41,6 +41,8 @@ from paraflex.tracking import plan_tracking
 from test_second_order import chain, random_state
 
 MASS, INERTIA, REACH, G = 1.3, 0.02, 0.4, 9.81
+# Of loads in time, at one instant.
+NO_LOADS = np.zeros((1, 0))
 
 
 def pendulum(**changes):
@@ -103,7 +105,7 @@ def test_a_clamped_beam_sags_as_the_textbook_says():
     ):
         system = build_system(Mechanism("clamped", {}, (beam,), (), **acting))
         forces, still = np.zeros((1, system.n)), np.zeros((1, system.n))
-        motion_forces(system.packed, still, still, still, forces, make_scratch(system.packed))
+        motion_forces(system.packed, still, still, still, NO_LOADS, forces, make_scratch(system.packed))
         body = system.bodies[0]
         u = -forces[0, body.flexible] / body.modes.omega**2
         found = body.integrals.D[body.mesh.column(-1, TRANSVERSE)] @ u
@@ -132,7 +134,7 @@ def test_generalised_weights_and_loads_are_derivatives_of_their_work(geometry):
 
     def forces(built):
         out = np.zeros((1, built.n))
-        motion_forces(built.packed, q[None], still, still, out, scratch)
+        motion_forces(built.packed, q[None], still, still, NO_LOADS, out, scratch)
         return out[0]
 
     slope = system.marker(PointRef("one", "B")).slope
@@ -334,5 +336,5 @@ def test_lumps_weigh_too():
     system = build_system(Mechanism("lump", {}, (beam,), (), gravity=(0.0, -G)))
     forces = np.zeros((1, system.n))
     still = np.zeros_like(forces)
-    motion_forces(system.packed, still, still, still, forces, make_scratch(system.packed))
+    motion_forces(system.packed, still, still, still, NO_LOADS, forces, make_scratch(system.packed))
     np.testing.assert_allclose(forces[0, :3], [0.0, 2.0 * G, 0.5 * G], rtol=1e-6, atol=1e-12)

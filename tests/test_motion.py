@@ -224,7 +224,7 @@ def test_a_path_may_start_from_equilibrium(tmp_path):
     [
         (
             ["--mode", "++"],
-            "--mode: a model without a path has no actuation modes, its torques are constant (got '++')",
+            "--mode: a model without a path has no actuation modes, its torques are given (got '++')",
         ),
         (["--ked"], "--ked: the model has no path to prescribe"),
         (["--path", "square"], "pendulum.toml: path: unknown path (got 'square'); there is none to choose from"),

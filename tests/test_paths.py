@@ -8,9 +8,21 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
+from paraflex.designs.derivatives.steps import with_fields
 from paraflex.errors import InputError
-from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon, TrapezoidalLaw
+from paraflex.kinematics import (
+    Circle,
+    CruiseLaw,
+    Line,
+    Path,
+    PointPath,
+    Polygon,
+    SequencePath,
+    TabulatedPath,
+    TrapezoidalLaw,
+)
 
+WAVE = tuple((0.05 * k, 0.1 * float(np.sin(0.9 * k))) for k in range(9))
 PATHS = {
     "square": Polygon(((0.05, 0.314), (-0.05, 0.314), (-0.05, 0.214), (0.05, 0.214)), 40.0),
     "open polygon": Polygon(((0.0, 0.0), (0.3, 0.1), (0.1, 0.4)), 7.0, closed=False),
@@ -19,6 +31,15 @@ PATHS = {
     "arc": Circle((0.2, 0.3), 0.15, 5.0, start_angle=1.1, sweep=-2.5),
     "points": PointPath(((0.0, 0.0), (0.1, 0.2), (0.3, 0.1), (0.35, -0.2), (0.5, 0.0)), 0.8),
     "two points": PointPath(((0.1, 0.2), (0.4, -0.3)), 0.5),
+    "sequence": SequencePath((Line((0.1, 0.2), (0.4, -0.3), 3.0), Circle((0.3, -0.3), 0.1, 5.0, sweep=1.0)), 0.1),
+}
+
+# Of a spline of fifth degree: the third derivative of the acceleration jumps at every point.
+TABLES = {
+    "acceleration": TabulatedPath(WAVE, max_acceleration=4.0),
+    "time": TabulatedPath(WAVE[:5], motion_time=0.7),
+    "speed": TabulatedPath(WAVE, max_acceleration=20.0, max_speed=0.4),
+    "times": TabulatedPath(WAVE, times=tuple(1.0 + 0.1 * k + 0.002 * k**2 for k in range(len(WAVE)))),
 }
 
 
@@ -241,3 +262,122 @@ def test_a_path_that_cannot_be_made_names_the_field(make, field):
     with pytest.raises(InputError) as caught:
         make()
     assert caught.value.field == field
+
+
+# --- Curves and sequences -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("length", "cruises"), [(0.5, True), (0.05, False)])
+def test_a_law_of_limited_speed_takes_the_time_of_its_ramps_and_its_cruise(length, cruises):
+    a, v = 2.0, 0.4
+    law = CruiseLaw(length, a, v)
+    t = np.linspace(0.0, law.duration, 4001)
+    s, speed, rate = law.evaluate(t)
+    assert s[-1] == pytest.approx(length, rel=1e-12)
+    assert np.max(np.abs(rate)) == pytest.approx(a, rel=1e-5)
+    # A half sine of acceleration gives 2 a R / pi.
+    ramp = np.pi * v / (2 * a) if cruises else np.sqrt(np.pi * length / (2 * a))
+    assert np.max(speed) == pytest.approx(2 * a * ramp / np.pi, rel=1e-6)
+    assert np.max(speed) <= v * (1 + 1e-12)
+    assert law.duration == pytest.approx(2 * ramp + (length / v - ramp if cruises else 0.0), rel=1e-12)
+    np.testing.assert_allclose(np.gradient(s, t)[1:-1], speed[1:-1], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(np.gradient(speed, t)[1:-1], rate[1:-1], rtol=0, atol=2e-3)
+
+
+EVEN = np.linspace(0.0, 1.0, 60)
+UNEVEN = np.sort(np.concatenate([[0.0, 1.0], np.random.default_rng(3).uniform(0.005, 0.995, 200)]))
+
+
+@pytest.mark.parametrize(("places", "within"), [(EVEN, (1e-7, 1e-5, 1e-3, 1e-8)), (UNEVEN, (1e-6, 1e-4, 1e-2, 1e-6))])
+def test_a_curve_through_points_of_a_circle_is_followed_as_the_circle(places, within):
+    circle = Circle((0.2, 0.3), 0.15, 5.0, start_angle=0.3, sweep=4.0)
+    points = [0.2, 0.3] + 0.15 * np.column_stack([np.cos(0.3 + 4.0 * places), np.sin(0.3 + 4.0 * places)])
+    table = TabulatedPath(points, max_acceleration=5.0)
+    assert table.duration == pytest.approx(circle.duration, rel=within[0])
+    t = np.linspace(0.0, circle.duration, 301)
+    for found, expected, limit in zip(table.evaluate(t), circle.evaluate(t), within, strict=False):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=limit)
+    # The law is one along the length: the speed is the law's, whatever the points' distances.
+    speed = np.linalg.norm(table.evaluate(t).velocity, axis=1)
+    np.testing.assert_allclose(speed, TrapezoidalLaw(0.6, 5.0).evaluate(t)[1], rtol=0, atol=within[3])
+
+
+@pytest.mark.parametrize("name", ["acceleration", "speed", "times"])
+def test_tables_are_at_their_points_at_their_knots(name):
+    table = TABLES[name]
+    places = table.evaluate(np.array(table.knots)).position
+    gaps = np.min(np.linalg.norm(places[None] - np.array(WAVE)[:, None], axis=2), axis=1)
+    np.testing.assert_allclose(gaps, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("speed", [None, 0.4])
+def test_knots_of_a_table_have_derivatives(speed):
+    def knots(a):
+        return np.array(TabulatedPath(WAVE, max_acceleration=a, max_speed=speed).knots)
+
+    path = TabulatedPath(WAVE, max_acceleration=20.0, max_speed=speed)
+    moved = np.array(with_fields(path, max_acceleration=20.0 + 1e-30j).knots)
+    np.testing.assert_allclose(moved.real, knots(20.0), rtol=1e-12)
+    slope = (knots(20.0 + 1e-4) - knots(20.0 - 1e-4)) / 2e-4
+    np.testing.assert_allclose(moved.imag / 1e-30, slope, rtol=0, atol=1e-6 * np.max(np.abs(slope)))
+
+
+@pytest.mark.parametrize("name", list(TABLES))
+def test_tables_move_from_rest_to_rest_with_derivatives_that_are_those_of_their_places(name):
+    path, h = TABLES[name], 1e-5
+    t = np.linspace(0.0, path.duration, 41)[1:-1]
+    for order in range(2):
+        low, high, exact = path.evaluate(t - h)[order], path.evaluate(t + h)[order], path.evaluate(t)[order + 1]
+        np.testing.assert_allclose((high - low) / (2 * h), exact, rtol=0, atol=2e-6 * np.max(np.abs(exact)))
+    ends = path.evaluate(np.array([0.0, path.duration, path.duration + 1.0]))
+    np.testing.assert_allclose(ends.position, [path.points[0], path.points[-1], path.points[-1]], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(ends.velocity, 0.0, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(ends.acceleration, 0.0, rtol=0, atol=1e-9)
+
+
+def test_a_curve_may_take_a_time_and_passes_its_points_when_they_say():
+    assert TabulatedPath(WAVE, motion_time=0.8).duration == pytest.approx(0.8, rel=1e-14)
+    timed = TABLES["times"]
+    np.testing.assert_allclose(timed.evaluate(np.array(timed.times) - 1.0).position, WAVE, rtol=0, atol=1e-13)
+
+
+def test_a_sequence_is_its_paths_with_rest_between():
+    first, second = PATHS["sequence"].paths
+    joined, t = PATHS["sequence"], np.linspace(0.0, 0.2, 7)
+    assert joined.duration == pytest.approx(first.duration + 0.1 + second.duration, rel=1e-15)
+    for part, start in ((first, 0.0), (second, first.duration + 0.1)):
+        for found, expected in zip(joined.evaluate(start + t), part.evaluate(t), strict=True):
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    resting = joined.evaluate(np.array([first.duration + 0.05]))
+    np.testing.assert_allclose(resting.position, [[0.4, -0.3]], rtol=0, atol=1e-15)
+    assert not np.any(resting.velocity)
+    turned = PointPath(((0.4, -0.3, 0.1), (0.2, 0.0, 0.5)), 0.3)
+    whole = SequencePath((turned, PointPath(((0.2, 0.0, 0.5), (0.0, 0.0, 0.0)), 0.3)))
+    assert whole.turning(np.array([0.0, 0.3, 0.6]))[0] == pytest.approx([0.1, 0.5, 0.0])
+    assert joined.turning(t) is None
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: TabulatedPath(WAVE[:3], motion_time=1.0), "points: not a list of points"),
+        (lambda: TabulatedPath((*WAVE, WAVE[-1]), motion_time=1.0), "points: points 9 and 10 coincide"),
+        (lambda: TabulatedPath(WAVE), "max_acceleration: nothing says how fast"),
+        (lambda: TabulatedPath(WAVE, motion_time=1.0, max_acceleration=1.0), "max_acceleration: its law of motion is"),
+        (lambda: TabulatedPath(WAVE, motion_time=1.0, max_speed=1.0), "max_speed: a largest speed goes with"),
+        (lambda: TabulatedPath(WAVE, times=(0.0, 1.0)), "times: there are 9 points and 2 times"),
+        (lambda: TabulatedPath(WAVE, times=(0, 1, 2, 2, 3, 4, 5, 6, 7)), "times: its times must ascend, that of"),
+        (lambda: TabulatedPath(np.zeros((10_001, 2)), motion_time=1.0), "points: too many"),
+        (lambda: SequencePath((PATHS["line"],)), "paths: a sequence needs two paths"),
+        (lambda: SequencePath((PATHS["line"], PATHS["circle"])), "paths: path 2 starts .* m from where the one before"),
+        (lambda: SequencePath((PATHS["line"], PATHS["line"]), -1.0), "dwell: must not be negative"),
+        (
+            lambda: SequencePath((PointPath(((0, 0, 1), (1, 0, 1)), 1.0), Line((1, 0), (2, 0), 1.0))),
+            "paths: some of its paths give angles",
+        ),
+    ],
+)  # fmt: skip
+def test_curves_and_sequences_that_make_no_sense_are_refused(make, says):
+    with pytest.raises(InputError, match=says) as caught:
+        make()
+    assert caught.value.remedy

@@ -9,8 +9,8 @@ import pytest
 
 import twins
 from conftest import make_geared_linkage, make_linkage
-from paraflex.dynamics import build_system, constant_signals, pack_signals
-from paraflex.files import load
+from paraflex.dynamics import build_system, constant_signals, inputs_of, pack_signals
+from paraflex.files import ExpressionLaw, load
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.ode import (
     descriptor_jacobian,
@@ -41,7 +41,10 @@ def loaded_linkage(geometry):
             LinearSpring("cord", ref("crank.P"), ref("flap.R"), 40.0, 0.1, damping=3.0),
             LinearSpring("stay", ref("ground.S"), ref("coupler.Q"), 70.0, 0.05, damping=1.0),
         ),
-        loads=(PointForce("pull", ref("coupler.R"), (3.0, -2.0)), AppliedTorque("wring", ref("crank.P"), 0.7)),
+        loads=(
+            PointForce("pull", ref("coupler.R"), (3.0, ExpressionLaw("1 - 5 * t"))),
+            AppliedTorque("wring", ref("crank.P"), ExpressionLaw("0.7 * cos(t)")),
+        ),
         gravity=(0.3, -9.81),
     )
 
@@ -81,7 +84,8 @@ class Case:
         self.signals, _ = pack_signals(
             self.system.mechanism, constant_signals(random.standard_normal(motors), 1.0), 1.0
         )
-        self.torques, self.ws = np.zeros(motors), self.system.workspace()
+        self.torques = np.zeros(inputs_of(self.system.mechanism).acting)
+        self.ws = self.system.workspace()
         note_friction(self.packed, self.q, self.v, self.ws.mu, self.ws.compliance)
 
     def residuals(self, q, v, a, lam):

@@ -42,7 +42,14 @@ from .mechanism import (
 )
 
 # Paths
-from .kinematics import Circle as Circle, Line as Line, PointPath as PointPath, Polygon as Polygon
+from .kinematics import (
+    Circle as Circle,
+    Line as Line,
+    PointPath as PointPath,
+    Polygon as Polygon,
+    SequencePath as SequencePath,
+    TabulatedPath as TabulatedPath,
+)
 
 # Models: read, checked, planned, run
 from .files import Model as Model, load as load, load_path as load_path, plan as plan

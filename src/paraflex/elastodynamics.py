@@ -26,7 +26,7 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import BodyCoordinates, System, joint_coordinate, pack_signals
+from paraflex.dynamics import BodyCoordinates, System, acting_loads, joint_coordinate, pack_signals
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
 from paraflex.integrators.beam_ends import beyond_ends, end_of_motion
@@ -162,15 +162,16 @@ def _check(task: TrackingTask, step: float) -> None:
 
 @dataclass(frozen=True)
 class _NominalMotion:
-    """The rigid motion q, v, a (k, n) in a system's coordinates, undeformed, with its forces and angles."""
+    """The rigid motion q, v, a (k, n) at times t in a system's coordinates, undeformed, with its forces and angles."""
 
     system: System
+    t: Array
     q: Array
     v: Array
     a: Array
 
     def __getitem__(self, instants: slice) -> _NominalMotion:
-        return _NominalMotion(self.system, self.q[instants], self.v[instants], self.a[instants])
+        return _NominalMotion(self.system, *(part[instants] for part in (self.t, self.q, self.v, self.a)))
 
     @property
     def angles(self) -> Array:
@@ -183,7 +184,8 @@ class _NominalMotion:
         Both in the body frames.
         """
         forces, packed = np.zeros_like(self.q), self.system.packed
-        motion_forces(packed, self.q, self.v, self.a, forces, make_scratch(packed))
+        acting = acting_loads(self.system.mechanism, self.t)
+        motion_forces(packed, self.q, self.v, self.a, acting, forces, make_scratch(packed))
         joints = np.array([self.system.jacobian(q) for q in self.q])
         motors = [joint_coordinate(self.system, name, self.q).rows[:, None] for name in held]
         return self.to_bodies(np.concatenate([joints, *motors], axis=1)), -self.to_bodies(forces)
@@ -216,7 +218,7 @@ def _nominal(task: TrackingTask, times: Array) -> _NominalMotion:
         source = rigid.system.body(carrier).all
         target = slice(body.offset, body.offset + 3)
         q[:, target], v[:, target], a[:, target] = rigid.q[:, source], rigid.v[:, source], rigid.a[:, source]
-    return _NominalMotion(task.system, q, v, a)
+    return _NominalMotion(task.system, times, q, v, a)
 
 
 def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array:

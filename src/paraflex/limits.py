@@ -42,6 +42,8 @@ SAMPLES = 1_000_000
 # Instants at which loops are closed along a path, each a millisecond after the one before: of thirty coordinates they
 # take a gigabyte and a minute.
 INSTANTS = 2_000_000
+# Points of a path: a curve of a metre with a point each tenth of a millimetre.
+PATH_POINTS = 10_000
 # Designs of a study: at ten runs a second they take twelve days, and more than their table would fill the memory.
 DESIGNS = 10_000_000
 # What to do about numbers that cannot be computed with.

@@ -1,4 +1,4 @@
-"""A mechanism without a path, under loads, prescribed motions and constant motor torques."""
+"""A mechanism without a path, under loads, prescribed motions and given motor torques."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import (
+    InputSignals,
     State,
     System,
     build_system,
     consistent_state,
     constant_signals,
+    law_signal,
     pack_signals,
     start_state,
 )
@@ -24,7 +26,8 @@ from paraflex.errors import InputError, IntegrationError, ResultWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from paraflex.kinematics import ModelWithPaths
-from paraflex.mechanism import Mechanism, Start
+from paraflex.mechanism import AngleLaw, Mechanism, Start
+from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
 from paraflex.validity import Validity, assess, doubtful_results, warn, with_blame
 
@@ -39,15 +42,24 @@ class MotionRun(Shown):
     system : System
     times : (k,) array
         At which results are kept [s]; where an event ends the run, those until then and its own.
-    torques : mapping of str to float
-        Of each motor, constant [N m].
+    torques : mapping of str to float or AngleLaw
+        Of each motor, constant or in time [N m].
     solution : Solution
     """
 
     system: System
     times: Array
-    torques: Mapping[str, float]
+    torques: Mapping[str, InTime]
     solution: Solution
+
+    @property
+    def applied(self) -> Array:
+        """Torques (k, motors) at the times of the solution [N m]."""
+        t = self.solution.t
+        each = [
+            law.evaluate(t)[0] if isinstance(law, AngleLaw) else np.full(t.size, law) for law in self.torques.values()
+        ]
+        return np.stack(each, axis=1) if each else np.zeros((t.size, 0))
 
     @cached_property
     def validity(self) -> Validity | None:
@@ -66,7 +78,7 @@ def simulate_motion(
     duration: float,
     *,
     samples: int = 701,
-    torques: Mapping[str, float] | None = None,
+    torques: Mapping[str, InTime] | None = None,
     start: State | Start | str | None = None,
     method: Method | str | None = None,
     options: IntegrationOptions | None = None,
@@ -82,8 +94,8 @@ def simulate_motion(
         [s]
     samples : int
         Times at which results are kept, evenly spaced, both ends among them.
-    torques : mapping of str to float, optional
-        Constant torque of each motor by name [N m]; zero for the others.
+    torques : mapping of str to float or AngleLaw, optional
+        Torque of each motor by name [N m], constant or a law in time, which may jump; zero for the others.
     start : State, Start or str, optional
         Where it starts: the name of an assembly, at rest and undeformed; a `mechanism.Start` near the first assembly
         (near another, see `dynamics.start_state`); or a `dynamics.consistent_state`. The first assembly by default.
@@ -101,7 +113,8 @@ def simulate_motion(
     Raises
     ------
     InputError
-        A duration or number of samples that makes no sense, an unknown motor, or neither an assembly nor a start.
+        A duration or number of samples that makes no sense, an unknown motor, a law that does not cover the run, or
+        neither an assembly nor a start.
     AssemblyError
         The loops do not close.
     IntegrationError
@@ -115,17 +128,18 @@ def simulate_motion(
     names = [motor.name for motor in mechanism.motors]
     for name, torque in (torques or {}).items():
         known(name, names, "torques", "motor")
-        if not np.isfinite(torque):
+        if not isinstance(torque, AngleLaw) and not np.isfinite(torque):
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
-    values = {name: float((torques or {}).get(name, 0.0)) for name in names}
+    values = {name: (torques or {}).get(name, 0.0) for name in names}
     system = build_system(mechanism)
     state = start if isinstance(start, State) else _state(system, start)
     times = np.linspace(state.time, state.time + duration, samples)
     end = float(times[-1])
-    signals, knots = pack_signals(mechanism, constant_signals(list(values.values()), end), end)
+    motors, own = _motor_signals(values, end)
+    signals, knots = pack_signals(mechanism, motors, end)
     try:
         solution = integrate(
-            system, signals, state, times, knots=np.array(knots), options=options, on_progress=on_progress
+            system, signals, state, times, knots=np.array([*own, *knots]), options=options, on_progress=on_progress
         )
     except IntegrationError as error:
         error.partial = _run(system, times, values, with_blame(error, mechanism).partial)
@@ -136,8 +150,21 @@ def simulate_motion(
     return run
 
 
-def _run(system: System, times: Array, torques: Mapping[str, float], solution: Solution) -> MotionRun:
+def _run(system: System, times: Array, torques: Mapping[str, InTime], solution: Solution) -> MotionRun:
     return MotionRun(system, solution.t if solution.event else times, torques, solution)
+
+
+def _motor_signals(torques: Mapping[str, InTime], end: float) -> tuple[list[InputSignals], list[float]]:
+    """Torques as signals, and the times between which they are smooth."""
+    signals, knots = [], []
+    for name, law in torques.items():
+        if isinstance(law, AngleLaw):
+            signal, inner = law_signal(f"torques.{name}", law, end)
+            knots += inner
+        else:
+            (signal,) = constant_signals([float(law)], end)
+        signals.append(signal)
+    return signals, knots
 
 
 def _state(system: System, start: Start | str | None) -> State:

@@ -331,7 +331,7 @@ def plan_tracking(
         path=path,
         motion=motion,
         effort=required_effort(motion),
-        plan=plan_torques(follow, path_knots(path, end)),
+        plan=plan_torques(follow, path_knots(path, end, mechanism)),
         start=_start(system, motion, _in_place(system)),
         after=as_enum(Ending, after, "after"),
     )
@@ -488,7 +488,17 @@ def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str
     return State(float(motion.t[0]), q, v)
 
 
-def path_knots(path: Path, end: float) -> Array:
-    """Times of a run between which the motion along a path is smooth, start and end included [s]."""
+def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Array:
+    """Times of a run between which the motion along a path is smooth, start and end included [s].
+
+    With a mechanism those between which its loads are smooth as well.
+    """
     knots = np.unique(np.concatenate([[0.0, end], [knot for knot in path.knots if 0.0 < knot < end]]))
-    return knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]
+    knots = knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]
+    laws = [law for load in mechanism.loads for law in load.laws] if mechanism else []
+    given = np.unique(
+        [knot for law in laws for knot in law.knots if _SAME_TIME * end < knot < end * (1.0 - _SAME_TIME)]
+    )
+    # Of two that are one, that of the load is kept: steps end there.
+    apart = np.abs(knots[:, None] - given) > _SAME_TIME * end
+    return np.unique(np.concatenate([knots[apart.all(axis=1)], given]))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics import joint_coordinate
+from paraflex.dynamics import acting_loads, joint_coordinate
 from paraflex.errors import ActuationError, Moment, SingularActuationError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
@@ -47,11 +47,18 @@ class Effort:
         return np.array([motor.name in mode.motors for motor in self.motion.mechanism.motors], dtype=bool)
 
 
-def required_effort(motion: RigidMotion) -> Effort:
-    """Effort and actuation matrix of a rigid motion, under gravity, loads, springs, dampers and friction."""
+def required_effort(motion: RigidMotion, *, before: bool = False) -> Effort:
+    """Effort and actuation matrix of a rigid motion, under gravity, loads, springs, dampers and friction.
+
+    Parameters
+    ----------
+    motion : RigidMotion
+    before : bool
+        With loads as they are just before each instant, where they may jump.
+    """
     system = motion.system
-    forces = apart(motion.q.shape)
-    motion_forces(system.packed, motion.q, motion.v, motion.a, forces, make_scratch(system.packed))
+    forces, acting = apart(motion.q.shape), acting_loads(motion.mechanism, motion.t, before=before)
+    motion_forces(system.packed, motion.q, motion.v, motion.a, acting, forces, make_scratch(system.packed))
     add_springs_and_dampers(motion, forces)
     transposed = np.swapaxes(motion.basis, 1, 2)
     return Effort(motion, np.einsum("kij,kj->ki", transposed, forces), transposed @ motor_rows(motion))

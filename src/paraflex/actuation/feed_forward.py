@@ -71,6 +71,8 @@ class TorquePlan:
         Times between which the motion is smooth [s].
     follow : callable
         Gives the rigid motion at any times, to refine.
+    jumping : Effort or None
+        Just before each knot, where loads change in time; else it is that at the knot.
     finer : list of Effort
         Found when a mode asked for them: kept, for the others will too.
     """
@@ -78,6 +80,7 @@ class TorquePlan:
     fine: Effort
     knots: Array
     follow: Callable[[Array], RigidMotion]
+    jumping: Effort | None = None
     finer: list[Effort] = field(default_factory=list, repr=False, compare=False)
 
     def feed_forward(self, mode: ActuationMode) -> FeedForward:
@@ -94,10 +97,11 @@ class TorquePlan:
         for refined in range(_REFINEMENTS):
             effort = self._effort(refined)
             t, torques = effort.motion.t, allocate(effort, mode)
-            checked = FeedForward(mode, tuple(splines(t[::2], torques[::2], self.knots)), self.knots, t[::2])
+            before = None if self.jumping is None else allocate(self.jumping, mode)
+            checked = FeedForward(mode, tuple(splines(t[::2], torques[::2], self.knots, before)), self.knots, t[::2])
             error = np.max(np.abs(checked.evaluate(t) - torques), axis=1)
             if np.max(error) <= _ERROR_FALL * _SPLINE_ERROR * max(np.max(np.abs(torques)), np.finfo(float).tiny):
-                return FeedForward(mode, tuple(splines(t, torques, self.knots)), self.knots, t)
+                return FeedForward(mode, tuple(splines(t, torques, self.knots, before)), self.knots, t)
             worst = int(np.argmax(error))
             time = float(t[worst])
         raise NumericalError(
@@ -132,7 +136,16 @@ def plan_torques(follow: Callable[[Array], RigidMotion], knots: Array) -> Torque
         np.linspace(a, b, max(_FEWEST_POINTS, int(np.ceil((b - a) / _LONGEST_SPACING)) + 1)) for a, b in pairwise(knots)
     ]
     times = np.unique(np.concatenate(intervals))
-    return TorquePlan(required_effort(follow(_with_middles(times))), np.asarray(knots), follow)
+    fine = required_effort(follow(_with_middles(times)))
+    return TorquePlan(fine, np.asarray(knots), follow, _before(fine.motion, knots))
+
+
+def _before(motion: RigidMotion, knots: Array) -> Effort | None:
+    """The effort just before each knot of a motion, where loads change in time."""
+    if not any(load.laws for load in motion.mechanism.loads):
+        return None
+    at = np.searchsorted(motion.t, knots)
+    return required_effort(replace(motion, **{name: getattr(motion, name)[at] for name in _IN_TIME}), before=True)
 
 
 def _with_middles(t: Array) -> Array:
@@ -156,12 +169,23 @@ def _interleaved(effort: Effort, between: Effort) -> Effort:
     )
 
 
-def splines(t: Array, values: Array, knots: Array) -> list[InputSignals]:
-    """A quintic spline of each column between neighbouring knots, joined."""
+def splines(t: Array, values: Array, knots: Array, before: Array | None = None) -> list[InputSignals]:
+    """A quintic spline of each column between neighbouring knots, joined.
+
+    Parameters
+    ----------
+    t : (k,) array
+        Knots among them [s].
+    values : (k, columns) array
+    knots : (j,) array
+    before : (j, columns) array, optional
+        Values just before each knot, where they may jump.
+    """
     breaks, coefficients = [], []
     edges = np.searchsorted(t, knots)
-    for a, b in pairwise(edges):
-        spline = scipy.interpolate.make_interp_spline(t[a : b + 1], values[a : b + 1], k=_DEGREE)
+    for end, (a, b) in enumerate(pairwise(edges), start=1):
+        last = values[b] if before is None else before[end]
+        spline = scipy.interpolate.make_interp_spline(t[a : b + 1], np.vstack([values[a:b], last]), k=_DEGREE)
         start = np.unique(spline.t)[:-1]
         breaks.append(start)
         # Taylor coefficients at the left end of every piece: (6, pieces, motors).

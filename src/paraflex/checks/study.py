@@ -12,8 +12,9 @@ from paraflex.errors import ActuationError, AssemblyError, InputError, Numerical
 from paraflex.files import Model
 from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
-from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.mechanism import ActuationMode, AngleLaw, Mechanism
 from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
+from paraflex.mechanism.loads import InTime
 from paraflex.tracking import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import STANDARD_GRAVITY, mechanism_mass, mechanism_size
@@ -45,7 +46,7 @@ def study_findings(
             yield Finding("duration-missing", "study.duration", "no path and no duration", "give one, in s")
         yield from laws_cut_short(model.mechanism, model.study.duration)
         yield from _few_samples(model)
-        yield from _constant_torques(model)
+        yield from _given_torques(model)
         return
     if model.mechanism.end_effector is None:
         yield Finding(
@@ -104,7 +105,7 @@ def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, magnitu
             )  # fmt: skip
         yield from _friction(task.mechanism, mode, np.max(np.abs(torques), axis=0))
         if magnitudes:
-            yield from doubtful_torques(task.system, task.driven(mode.name, torques, condition))
+            yield from doubtful_torques(task.system, task.driven(mode.name, torques, condition), task.motion.t)
 
 
 def path_findings(model: Model, path: Path, name: str, duration: float) -> Iterator[Finding]:
@@ -206,12 +207,12 @@ def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> I
             )  # fmt: skip
 
 
-def _constant_torques(model: Model) -> Iterator[Finding]:
-    """Constant torques beyond what turns all bodies, and friction that they do not overcome."""
+def _given_torques(model: Model) -> Iterator[Finding]:
+    """Given torques beyond what turns all bodies, and friction that they do not overcome."""
     mechanism = model.mechanism
     size, weight = mechanism_size(mechanism), STANDARD_GRAVITY * mechanism_mass(mechanism)
     for motor, unit in zip(mechanism.motors, mechanism.motor_units(), strict=True):
-        torque = abs(model.study.torques.get(motor.name, 0.0))
+        torque = _largest_torque(model.study.torques.get(motor.name, 0.0), model.study.duration or 0.0)
         if torque > LOADED_AT_REST * weight * (size if unit == "N m" else 1.0) > 0.0:
             yield Finding(
                 "load-large", f"study.torques.{motor.name}",
@@ -227,18 +228,28 @@ def _constant_torques(model: Model) -> Iterator[Finding]:
                 )  # fmt: skip
 
 
+def _largest_torque(torque: InTime, duration: float) -> float:
+    """The largest magnitude of a torque until a time, knots of its law included [N m]."""
+    if not isinstance(torque, AngleLaw):
+        return abs(torque)
+    times = [*np.linspace(0.0, duration, _SAMPLES), *(knot for knot in torque.knots if knot <= duration)]
+    return float(np.max(np.abs(torque.evaluate(np.array(times))[0])))
+
+
 def laws_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator[Finding]:
-    """Prescribed motions whose pieces or tables a run does not get to the end of."""
-    for one in mechanism.prescribed:
-        if isinstance(one.law, PiecewiseLaw):
-            end = one.law.ends[-1] if one.law.ends else 0.0
-        elif isinstance(one.law, TabulatedLaw):
-            end = one.law.times[-1]
+    """Prescribed motions and loads whose pieces or tables a run does not get to the end of."""
+    laws = [(f"prescribed.{one.name}", one.law) for one in mechanism.prescribed]
+    laws += [(f"load.{one.name}", law) for one in mechanism.loads for law in one.laws[:1]]
+    for place, law in laws:
+        if isinstance(law, PiecewiseLaw):
+            end = law.ends[-1] if law.ends else 0.0
+        elif isinstance(law, TabulatedLaw):
+            end = law.times[-1]
         else:
             continue
         if duration is not None and end > duration * (1.0 + _SAME_TIME):
             yield Finding(
-                "law-cut-short", f"prescribed.{one.name}",
+                "law-cut-short", place,
                 f"the run ends at {duration:.4g} s, the law goes on to {end:.4g} s",
                 "let the study last as long, in s",
             )  # fmt: skip

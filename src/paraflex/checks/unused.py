@@ -18,7 +18,7 @@ def file_findings(model: Model) -> Iterator[Finding]:
     yield from _unused(model.parameters)
     if model.paths and model.study.torques:
         yield Finding(
-            "unused", "study.torques", "the study has a path, whose torques are planned: constant ones are not applied",
+            "unused", "study.torques", "the study has a path, whose torques are planned: given ones are not applied",
             "leave them out, or the paths",
         )  # fmt: skip
     springs = model.parameters.get("linear_spring", {})

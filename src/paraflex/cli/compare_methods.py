@@ -104,7 +104,7 @@ def _mode(model: Model, request: CompareMethodsRequest) -> str | None:
         return find_mode(model, [] if request.mode is None else [request.mode]).name
     if request.mode is not None:
         raise InputError(
-            "a model without a path has no actuation modes, its torques are constant",
+            "a model without a path has no actuation modes, its torques are given",
             field="--mode", value=request.mode,
             remedy="leave it out, or add a [path.NAME] table",
         )  # fmt: skip

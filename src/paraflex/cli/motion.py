@@ -1,4 +1,4 @@
-"""`paraflex run` of a mechanism without a path: left to its loads, prescribed angles and constant torques."""
+"""`paraflex run` of a mechanism without a path: left to its loads, prescribed angles and given torques."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def run_motion(
     study = own_motion(model, request.plan)
     if request.modes:
         raise InputError(
-            "a model without a path has no actuation modes, its torques are constant",
+            "a model without a path has no actuation modes, its torques are given",
             field="--mode", value=request.modes[0],
             remedy="add a [path.NAME] table, or give torques in [study]",
         )  # fmt: skip

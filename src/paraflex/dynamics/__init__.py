@@ -30,7 +30,9 @@ from paraflex.dynamics.rank import Dependence as Dependence, dependence as depen
 from paraflex.dynamics.reduction import MissedTurn as MissedTurn, missed_turns as missed_turns
 from paraflex.dynamics.signals import (
     InputSignals as InputSignals,
+    acting_loads as acting_loads,
     constant_signals as constant_signals,
+    law_signal as law_signal,
     moment_signals as moment_signals,
     pack_signals as pack_signals,
     piecewise_quintic as piecewise_quintic,

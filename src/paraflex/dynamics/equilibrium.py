@@ -9,6 +9,7 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
+from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import sparse_jacobian, stiffness_diagonal
@@ -185,7 +186,7 @@ class _Residual:
         self.system, self.time, self.held = system, start.time, held
         self.kept = self.joints(start.q)[0]
         self.signals = moment_signals(mechanism, start.time)
-        self.workspace, self.torques = system.workspace(), np.zeros(len(mechanism.motors))
+        self.workspace, self.torques = system.workspace(), np.zeros(inputs_of(mechanism).acting)
         self.v, self.a = np.zeros((2, system.n))
         self.largest_effort = 0.0
         # Rows of friction come with a scale of their own, none by default.

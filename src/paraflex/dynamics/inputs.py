@@ -1,4 +1,4 @@
-"""Order of the functions of time: motors first, then prescribed motions."""
+"""Order of the functions of time: motors first, then loads in time, then prescribed motions."""
 
 from __future__ import annotations
 
@@ -12,15 +12,22 @@ class Inputs(NamedTuple):
 
     Attributes
     ----------
-    motors, prescribed : range
-        In the order of the mechanism's own.
+    motors, loads, prescribed : range
+        In the order of the mechanism's own; of loads those components that are laws in time.
     """
 
     motors: range
+    loads: range
     prescribed: range
+
+    @property
+    def acting(self) -> int:
+        """Number of forces and torques given in time: those of motors, and components of loads."""
+        return self.prescribed.start
 
 
 def inputs_of(mechanism: Mechanism) -> Inputs:
     """The numbers of a mechanism's signals."""
     motors = len(mechanism.motors)
-    return Inputs(range(motors), range(motors, motors + len(mechanism.prescribed)))
+    acting = motors + sum(len(load.laws) for load in mechanism.loads)
+    return Inputs(range(motors), range(motors, acting), range(acting, acting + len(mechanism.prescribed)))

@@ -32,7 +32,7 @@ from paraflex.kernel.packed import (
 )
 from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
-from paraflex.mechanism import Joint, Load, Mechanism, PointForce, PointRef
+from paraflex.mechanism import AngleLaw, Joint, Mechanism, PointRef
 
 
 def pack_system(
@@ -55,7 +55,7 @@ def pack_system(
         }
         for spring in mechanism.linear_springs
     ]
-    loads = [_load_record(load) | {"marker": packer.add_marker(load.point)} for load in mechanism.loads]
+    loads = _load_records(mechanism, packer)
     markers, columns = packer.markers, _columns(bodies, packer.markers)
     tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
 
@@ -194,7 +194,7 @@ class _Packer:
             return
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
             if not ref.on_ground:
-                record = {"marker": self.add_marker(ref), "signal": signal, "sign": sign}
+                record: dict[str, float] = {"marker": self.add_marker(ref), "signal": signal, "sign": sign}
                 self.motor_sides[self.index[ref.body]].append(record)
 
 
@@ -216,10 +216,24 @@ def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
     return records, np.concatenate(breaks), np.concatenate(coefficients)
 
 
-def _load_record(load: Load) -> dict[str, float]:
-    if isinstance(load, PointForce):
-        return {"fx": load.force[0], "fy": load.force[1]}
-    return {"torque": load.torque}
+def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float]]:
+    """Components of loads that are numbers, and the signals of those that are laws in time."""
+    signals, made = iter(inputs_of(mechanism).loads), []
+    for load in mechanism.loads:
+        record: dict[str, float] = {
+            "marker": packer.add_marker(load.point),
+            "x_signal": -1,
+            "y_signal": -1,
+            "torque_signal": -1,
+        }
+        names = (("fx", "x_signal"), ("fy", "y_signal")) if load.kind == "force" else (("torque", "torque_signal"),)
+        for (number, signal), given in zip(names, load.components, strict=True):
+            if isinstance(given, AngleLaw):
+                record[signal] = next(signals)
+            else:
+                record[number] = given
+        made.append(record)
+    return made
 
 
 def _modal_rows(body: BodyCoordinates) -> Array:

@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
+from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, constraint_jacobian, dependence, involved, joint_of_row
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_mass
 from paraflex.dynamics.system import System
@@ -152,7 +153,7 @@ def project(change: LeastChange, x: Array, left: Callable[[Array], Array]) -> Ar
 
 def second_rates(system: System, signals: Signals, t: float, q: Array, v: Array, a: Array) -> Array:
     """Phi'' (m,) at accelerations (n,); zero in the rows of springs and dampers."""
-    workspace, torques = system.workspace(), np.zeros(len(system.mechanism.motors))
+    workspace, torques = system.workspace(), np.zeros(inputs_of(system.mechanism).acting)
     equations(system.packed, signals, t, INDEX_1, q, v, a, np.zeros(system.m), torques, workspace)
     return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
 

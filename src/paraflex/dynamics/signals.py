@@ -1,8 +1,8 @@
-"""Functions of time for the kernels: motor torques and prescribed angles as piecewise quintics."""
+"""Functions of time for the kernels: motor torques, loads and prescribed angles as piecewise quintics."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,7 +12,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.errors import InputError
 from paraflex.kernel.packed import PackedSystem, Signals
-from paraflex.mechanism import AngleLaw, Mechanism, PrescribedAngle
+from paraflex.mechanism import AngleLaw, Mechanism
 
 # Breaks of a prescribed law: its quintic Hermite pieces are this short, as a fraction of the run.
 _LAW_PIECES = 2000
@@ -65,7 +65,7 @@ def no_signals(packed: PackedSystem) -> Signals:
 
 
 def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: float) -> tuple[Signals, list[float]]:
-    """Motor torques and the mechanism's prescribed angles, for the kernels.
+    """Motor torques and the mechanism's loads in time and prescribed angles, for the kernels.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
     Returns
     -------
     Signals, knots
-        The knots are the times at which a prescribed law is not smooth.
+        The knots are the times at which a law is not smooth.
 
     Raises
     ------
@@ -86,20 +86,39 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
         A law that does not cover the run or is not finite in it.
     """
     signals, knots = list(torques), []
-    for prescribed in mechanism.prescribed:
-        inner = sorted(knot for knot in prescribed.law.knots if 0.0 < knot < end)
+    for place, law in _laws(mechanism):
+        signal, inner = law_signal(place, law, end)
+        signals.append(signal)
         knots += inner
-        edges = np.array([0.0, *inner, end])
-        # The law may jump in a derivative at a knot: pieces on either side take its one-sided limits.
-        parts = []
-        for a, b in pairwise(edges):
-            t = _grid(prescribed.law, a, b, end)
-            inside = t.copy()
-            inside[0] = max(a + 1e-12 * (b - a), np.nextafter(a, b))
-            inside[-1] = min(b - 1e-12 * (b - a), np.nextafter(b, a))
-            parts.append(piecewise_quintic(t, *_evaluate(prescribed, inside)))
-        signals.append(_join(parts))
     return _pack(signals), knots
+
+
+def law_signal(place: str, law: AngleLaw, end: float) -> tuple[InputSignals, list[float]]:
+    """A law in time on [0, end] as a signal, and the times between which it is smooth.
+
+    Parameters
+    ----------
+    place : str
+        In a file, for errors.
+    law : AngleLaw
+    end : float
+        [s]
+
+    Raises
+    ------
+    InputError
+        It does not cover the run or is not finite in it.
+    """
+    inner = sorted(knot for knot in law.knots if 0.0 < knot < end)
+    # The law or a derivative may jump at a knot: pieces on either side take its one-sided limits.
+    parts = []
+    for a, b in pairwise([0.0, *inner, end]):
+        t = _grid(law, a, b, end)
+        inside = t.copy()
+        inside[0] = max(a + 1e-12 * (b - a), np.nextafter(a, b))
+        inside[-1] = min(b - 1e-12 * (b - a), np.nextafter(b, a))
+        parts.append(piecewise_quintic(t, *_evaluate(place, law, inside)))
+    return _join(parts), inner
 
 
 def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float]]:
@@ -110,11 +129,36 @@ def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float
 def moment_signals(mechanism: Mechanism, time: float) -> Signals:
     """Signals valid at one time: no torques; laws with their rate and acceleration."""
     signals = _no_torques(mechanism, 1.0)
-    for prescribed in mechanism.prescribed:
-        value, rate, acceleration = (float(x[0]) for x in _evaluate(prescribed, np.array([time])))
+    for place, law in _laws(mechanism):
+        value, rate, acceleration = (float(x[0]) for x in _evaluate(place, law, np.array([time])))
         taylor = np.array([[value, rate, 0.5 * acceleration, 0.0, 0.0, 0.0]])
         signals.append(InputSignals(np.array([time, time + 1.0]), taylor))
     return _pack(signals)
+
+
+def acting_loads(mechanism: Mechanism, t: Array, *, before: bool = False) -> Array:
+    """What acts (k, acting) at times by the components of loads that are laws in time, zero for motors [N, N m].
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    t : (k,) array
+        [s]
+    before : bool
+        Just before these times, where a load may jump.
+    """
+    inputs = inputs_of(mechanism)
+    acting = np.zeros((t.size, inputs.acting))
+    at = np.nextafter(t, -np.inf) if before else t
+    for k, (place, law) in zip(inputs.loads, _laws(mechanism), strict=False):
+        acting[:, k] = _evaluate(place, law, at)[0]
+    return acting
+
+
+def _laws(mechanism: Mechanism) -> Iterator[tuple[str, AngleLaw]]:
+    """Laws of loads, then of prescribed motions, each with its place in a file."""
+    yield from ((f"load.{load.name}", law) for load in mechanism.loads for law in load.laws)
+    yield from ((f"prescribed.{one.name}", one.law) for one in mechanism.prescribed)
 
 
 def _no_torques(mechanism: Mechanism, end: float) -> list[InputSignals]:
@@ -131,11 +175,11 @@ def _grid(law: AngleLaw, a: float, b: float, end: float) -> Array:
     return np.array([a, *(t for t in breaks if a + margin < t < b - margin), b])
 
 
-def _evaluate(prescribed: PrescribedAngle, t: Array) -> tuple[Array, Array, Array]:
+def _evaluate(place: str, law: AngleLaw, t: Array) -> tuple[Array, Array, Array]:
     try:
-        return prescribed.law.evaluate(t)
+        return law.evaluate(t)
     except InputError as error:
-        raise error.within(f"prescribed.{prescribed.name}") from None
+        raise error.within(place) from None
 
 
 def _join(parts: Sequence[InputSignals]) -> InputSignals:

@@ -54,7 +54,7 @@ def body_masses(system: System, q: Array) -> list[Array]:
     for body in system.bodies:
         a[np.arange(3 + body.nf), np.arange(body.all.start, body.all.stop)] = 1.0
     poses = np.repeat(np.asarray(q, dtype=float)[None], columns, axis=0)
-    motion_forces(bare, poses, np.zeros_like(poses), a, forces, make_scratch(bare))
+    motion_forces(bare, poses, np.zeros_like(poses), a, np.zeros((columns, 0)), forces, make_scratch(bare))
     return [forces[: 3 + body.nf, body.all].T for body in system.bodies]
 
 

@@ -7,6 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
+from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import greedy_colours, neighbours, tied_bodies, without_stiffness
 from paraflex.dynamics.state import point_position
@@ -34,7 +35,7 @@ class RestingForces:
         self.workspace: Workspace = system.workspace()
         self.v: Array = np.zeros(system.n)
         self.a: Array = np.zeros(system.n)
-        self.torques: Array = np.zeros(len(system.mechanism.motors))
+        self.torques: Array = np.zeros(inputs_of(system.mechanism).acting)
         self.springs: NDArray[np.intp] = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
 
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:

@@ -1,8 +1,8 @@
-"""Prescribed laws as a file gives them: a constant speed, an expression of t, pieces of them, or a table."""
+"""Laws in time as a file gives them: a number or constant speed, an expression of t, pieces of them, or a table."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,8 +19,9 @@ from paraflex.files.expressions import (
     names_in,
 )
 from paraflex.files.schema import PieceTable, PrescribedTable
-from paraflex.mechanism import AngleLaw, ConstantSpeed, PiecewiseLaw, PrescribedAngle, TabulatedLaw
+from paraflex.mechanism import AngleLaw, ConstantSpeed, PiecewiseLaw, TabulatedLaw
 from paraflex.mechanism.laws import Values
+from paraflex.mechanism.loads import InTime
 
 # Instants at which a law is tried when it is read.
 _TRIALS = 257
@@ -95,9 +96,14 @@ def read_law(entry: PrescribedTable, parameters: Mapping[str, float], duration: 
             value=entry.speed,
             remedy="write it into the law",
         )
+    _try(law, duration)
+    return law
+
+
+def _try(law: AngleLaw, duration: float | None) -> None:
+    """Evaluate a law where it will be used, as far as the study says."""
     # A duration that makes no sense is refused with the study.
     law.evaluate(np.linspace(0.0, duration, _TRIALS) if duration is not None and duration > 0.0 else np.zeros(1))
-    return law
 
 
 def quantities(entry: PrescribedTable) -> set[str]:
@@ -128,8 +134,111 @@ def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
     raise _no_words(law)
 
 
-def law_parameters(prescribed: Iterable[PrescribedAngle]) -> dict[str, float]:
-    """The parameters that laws speak of, each with one value.
+def read_components(
+    entry: Any, quantity: str, parameters: Mapping[str, float], duration: float | None
+) -> tuple[InTime, ...]:
+    """Components of a "force", or of a "torque" the one, that a table gives; laws are tried as by `read_law`.
+
+    Parameters
+    ----------
+    entry : table
+        With a field of the quantity's name, `pieces` and `table`, of which one is given.
+    quantity : str
+    parameters : mapping of str to float
+    duration : float or None
+        Of the study [s].
+
+    Raises
+    ------
+    InputError
+        See `read_law`.
+    """
+    given = [name for name in (quantity, "pieces", "table") if getattr(entry, name) is not None]
+    if len(given) != 1:
+        problem = f"its {quantity} is given in two ways" if given else "is missing"
+        raise InputError(
+            problem, field=given[-1] if given else quantity, value=", ".join(given) or None,
+            remedy=f"drop all but {given[0]}" if given else f"give it, or pieces or a table of the {quantity}",
+        )  # fmt: skip
+    if entry.table is not None:
+        times, *columns = zip(*entry.table, strict=True) if entry.table else ((), ())
+        found = [TabulatedLaw(times, column) for column in columns]
+        components = tuple(law.values[0] if len(set(law.values)) == 1 else law for law in found)
+    elif entry.pieces is not None:
+        ends = _ends(entry.pieces)
+        rows = [
+            _functions(getattr(piece, quantity), parameters, f"pieces.{k}.{quantity}")
+            for k, piece in enumerate(entry.pieces)
+        ]
+        components = tuple(_joined(laws, ends) for laws in zip(*rows, strict=True))
+    else:
+        components = _functions(getattr(entry, quantity), parameters, quantity)
+    for law in components:
+        if isinstance(law, AngleLaw):
+            _try(law, duration)
+    return components
+
+
+def _functions(given: Any, parameters: Mapping[str, float], field: str) -> tuple[InTime, ...]:
+    """Numbers and expressions of one quantity; those of numbers and parameters alone are numbers."""
+    listed = isinstance(given, list)
+    laws = [
+        _expression(each, parameters, f"{field}.{k}" if listed else field)
+        for k, each in enumerate(given if listed else [given])
+    ]
+    return tuple(law.angle if isinstance(law, ConstantSpeed) else law for law in laws)
+
+
+def _joined(laws: Sequence[InTime], ends: list[float]) -> InTime:
+    """One law of pieces; a number where all are the same."""
+    first = laws[0]
+    if not isinstance(first, AngleLaw) and all(law == first for law in laws):
+        return first
+    return PiecewiseLaw(
+        tuple(law if isinstance(law, AngleLaw) else ConstantSpeed(law, 0.0) for law in laws), tuple(ends)
+    )
+
+
+def components_table(components: Sequence[InTime], quantity: str) -> dict[str, Any]:
+    """What a table says of the components of a "force", or of a "torque".
+
+    Raises
+    ------
+    InputError
+        Laws that a file has no words for, or components whose pieces or times differ.
+    """
+
+    def said(values: Sequence[Any]) -> Any:
+        return list(values) if quantity == "force" else values[0]
+
+    tables = [law for law in components if isinstance(law, TabulatedLaw)]
+    pieces = [law for law in components if isinstance(law, PiecewiseLaw)]
+    if tables:
+        times = tables[0].times
+        columns = [
+            law.values if isinstance(law, TabulatedLaw) else (law,) * len(times)
+            for law in components
+            if (isinstance(law, TabulatedLaw) and law.times == times) or not isinstance(law, AngleLaw)
+        ]
+        if len(columns) < len(components):
+            raise _unlike(components)
+        return {"table": [[*row] for row in zip(times, *columns, strict=True)]}
+    if not pieces:
+        return {quantity: said([_piece(law) for law in components])}
+    ends = pieces[0].ends
+    if any(law.ends != ends for law in pieces):
+        raise _unlike(components)
+    rows = [
+        said([_piece(law.pieces[k] if isinstance(law, PiecewiseLaw) else law) for law in components])
+        for k in range(len(ends) + 1)
+    ]
+    return {
+        "pieces": [*({"until": end, quantity: row} for end, row in zip(ends, rows, strict=False)), {quantity: rows[-1]}]
+    }
+
+
+def law_parameters(laws: Iterable[tuple[str, AngleLaw]]) -> dict[str, float]:
+    """The parameters that laws, each with its place in a file, speak of; each has one value.
 
     Raises
     ------
@@ -137,18 +246,20 @@ def law_parameters(prescribed: Iterable[PrescribedAngle]) -> dict[str, float]:
         One of two values.
     """
     found: dict[str, float] = {}
-    for each in prescribed:
-        for law in each.law.pieces if isinstance(each.law, PiecewiseLaw) else (each.law,):
+    for place, whole in laws:
+        for law in whole.pieces if isinstance(whole, PiecewiseLaw) else (whole,):
             for name, value in law.parameters.items() if isinstance(law, ExpressionLaw) else ():
                 if found.setdefault(name, value) != value:
                     raise InputError(
                         f'a file has one value of the parameter "{name}", and laws have {found[name]!r} and {value!r}',
-                        field=f"prescribed.{each.name}.law", remedy="call one of them something else",
+                        field=place, remedy="call one of them something else",
                     )  # fmt: skip
     return found
 
 
-def _piece(law: AngleLaw) -> float | str:
+def _piece(law: InTime) -> float | str:
+    if not isinstance(law, AngleLaw):
+        return float(law)
     if isinstance(law, ExpressionLaw):
         return law.text
     if isinstance(law, ConstantSpeed):
@@ -160,6 +271,14 @@ def _no_words(law: AngleLaw) -> InputError:
     return InputError(
         "a model file cannot say this law", field="law", value=type(law).__name__,
         remedy="give a ConstantSpeed, an ExpressionLaw, a PiecewiseLaw of these, or a TabulatedLaw of its values",
+    )  # fmt: skip
+
+
+def _unlike(components: Sequence[InTime]) -> InputError:
+    return InputError(
+        "a model file cannot say a force whose components change at different times",
+        field="force", value=", ".join(type(law).__name__ for law in components),
+        remedy="give both pieces with the same ends, or tables of the same times",
     )  # fmt: skip
 
 
@@ -175,7 +294,7 @@ def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
 
 
 def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseLaw:
-    laws, ends = [], []
+    laws = []
     for number, piece in enumerate(pieces):
         field = f"pieces.{number}"
         if (piece.angle is None) == (piece.displacement is None):
@@ -184,17 +303,22 @@ def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> Piecew
                 field=field,
                 remedy="give its angle, or its displacement where the joint slides",
             )
-        if (piece.until is None) != (number == len(pieces) - 1):
-            raise InputError(
-                "every piece but the last has an end, and the last has none", field=f"{field}.until", value=piece.until,
-                remedy="give the time in s at which the next one takes over; the last goes on",
-            )  # fmt: skip
         name = "angle" if piece.displacement is None else "displacement"
         given = piece.angle if piece.displacement is None else piece.displacement
         assert given is not None
         laws.append(_expression(given, parameters, f"{field}.{name}"))
-        ends += [] if piece.until is None else [piece.until]
-    return PiecewiseLaw(tuple(laws), tuple(ends))
+    return PiecewiseLaw(tuple(laws), tuple(_ends(pieces)))
+
+
+def _ends(pieces: Sequence[Any]) -> list[float]:
+    """Where pieces end."""
+    for number, piece in enumerate(pieces):
+        if (piece.until is None) != (number == len(pieces) - 1):
+            raise InputError(
+                "every piece but the last has an end, and the last has none", field=f"pieces.{number}.until",
+                value=piece.until, remedy="give the time in s at which the next one takes over; the last goes on",
+            )  # fmt: skip
+    return [piece.until for piece in pieces[:-1]]
 
 
 def _expression(given: float | str, parameters: Mapping[str, float], field: str, speed: float = 0.0) -> AngleLaw:

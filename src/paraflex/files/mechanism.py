@@ -2,34 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.laws import quantities, read_law
-from paraflex.files.schema import AssemblyTable, JointTable, ModelTable, PathTable, PrescribedTable
-from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon
+from paraflex.files.laws import quantities, read_components, read_law
+from paraflex.files.schema import (
+    AssemblyTable,
+    JointTable,
+    ModelTable,
+    PathTable,
+    PrescribedTable,
+    SequenceTable,
+    TabulatedPathTable,
+    TorqueTable,
+)
+from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
 from paraflex.mechanism import (
     JOINT_KINDS,
     ActuationMode,
+    AppliedTorque,
     Assembly,
     EndEffector,
     Group,
     Joint,
+    Load,
     Mechanism,
     Motor,
     Payload,
+    PointForce,
     PointRef,
     PrescribedAngle,
     RevoluteJoint,
     groups_of,
 )
+from paraflex.mechanism.loads import InTime
+from paraflex.mechanism.quantities import known
 
 # What paths are called in files.
-PATHS: dict[str, Callable[..., Path]] = {"polygon": Polygon, "line": Line, "circle": Circle, "points": PointPath}
+PATHS: dict[str, Callable[..., Path]] = {
+    "polygon": Polygon,
+    "line": Line,
+    "circle": Circle,
+    "points": PointPath,
+    "table": TabulatedPath,
+    "sequence": SequencePath,
+}
 
 
 def read_mechanism(table: ModelTable) -> Mechanism:
@@ -48,7 +69,8 @@ def read_mechanism(table: ModelTable) -> Mechanism:
     }
     for field, group in groups_of(Mechanism).items():
         if group.kinds:
-            made[field] = [_member(group, name, dict(one)) for name, one in getattr(table, group.table).items()]
+            make = _load if group.table == "load" else _member
+            made[field] = [make(group, name, one, table) for name, one in getattr(table, group.table).items()]
     mechanism = Mechanism(
         **made,
         bodies=tuple(read_body(name, body, table) for name, body in table.body.items()),
@@ -112,20 +134,86 @@ def _assembly(name: str, entry: AssemblyTable) -> Assembly:
     return Assembly(name, entry.angles, points)
 
 
-def _member(group: Group, name: str, said: dict[str, Any]) -> Any:
+def _load(_: Group, name: str, entry: Any, table: ModelTable) -> Load:
+    """A load from its table."""
+    kind = {"force": PointForce, "torque": AppliedTorque}[entry.type]
+    try:
+        given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
+    except InputError as error:
+        raise error.within(f"load.{name}") from None
+    return kind(name, entry.point, *(given if entry.type == "torque" else (given,)))
+
+
+def read_torques(table: ModelTable) -> dict[str, InTime]:
+    """Torques of motors that the study gives.
+
+    Raises
+    ------
+    InputError
+        A law that makes no sense.
+    """
+    parameters, torques = evaluate_parameters(table.parameters), {}
+    for name, given in table.study.torques.items():
+        place, whole = f"study.torques.{name}", isinstance(given, TorqueTable)
+        entry = given if whole else TorqueTable.model_construct(torque=given)
+        try:
+            (torques[name],) = read_components(entry, "torque", parameters, table.study.duration)
+        except InputError as error:
+            # An expression alone stands where the table would.
+            raise (error.within(place) if whole else error.at(place)) from None
+    return torques
+
+
+def _member(group: Group, name: str, entry: Any, _: ModelTable) -> Any:
     """A member of a group from its table."""
+    said = dict(entry)
     kinds = {getattr(kind, "kind", None): kind for kind in group.kinds}
     kind = kinds[said.pop("type")] if "type" in said else group.kinds[0]
     points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in said.pop("points", ())]
     return kind(name, *points, *said.pop("joints", ()), **said)
 
 
-def read_path(table: PathTable) -> Path:
-    """A path from its table.
+def read_paths(tables: Mapping[str, PathTable]) -> dict[str, Path]:
+    """Paths from their tables, by name.
 
     Raises
     ------
     InputError
-        Numbers that make no path.
+        See `read_path`; or a sequence of what is no path, or is one that follows it in the file.
     """
-    return PATHS[table.type](**{name: value for name, value in table if name != "type"})
+    found: dict[str, Path] = {}
+    # Sequences name the others.
+    for name in sorted(tables, key=lambda name: tables[name].type == "sequence"):
+        try:
+            found[name] = read_path(tables[name], found)
+        except InputError as error:
+            raise error.within(f"path.{name}") from error
+    return {name: found[name] for name in tables}
+
+
+def read_path(table: PathTable, others: Mapping[str, Path] | None = None) -> Path:
+    """A path from its table, and those that it may name.
+
+    Raises
+    ------
+    InputError
+        Numbers that make no path, or unknown names.
+    """
+    said = {name: value for name, value in table if name != "type"}
+    if isinstance(table, SequenceTable):
+        for name in table.paths:
+            known(name, others or {}, "paths", "path")
+        said["paths"] = tuple((others or {})[name] for name in table.paths)
+    if isinstance(table, TabulatedPathTable):
+        rows = said.pop("table")
+        if len({len(row) for row in rows}) > 1:
+            raise InputError(
+                "some points have a time and some do not", field="table", remedy="give all as [x, y], or as [x, y, t]"
+            )
+        said["points"] = [row[:2] for row in rows]
+        said["times"] = [row[2] for row in rows] if rows and len(rows[0]) > 2 else None
+    try:
+        return PATHS[table.type](**said)
+    except InputError as error:
+        at_table = isinstance(table, TabulatedPathTable) and error.field in ("points", "times")
+        raise (error.at("table") if at_table else error) from None

@@ -11,7 +11,7 @@ from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError, suggestion
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
-from paraflex.files.mechanism import read_mechanism, read_path
+from paraflex.files.mechanism import read_mechanism, read_path, read_paths, read_torques
 from paraflex.files.merge import merged, same
 from paraflex.files.overlay import with_values
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
@@ -340,7 +340,9 @@ def load_path(file: str | FilePath) -> Path:
         See `load`.
     """
     source = str(file)
-    table = validate(PathFile, read_toml(FilePath(file), source), source)
+    with naming(source):
+        data = with_rows(read_toml(FilePath(file), source), FilePath(file).parent)
+    table = validate(PathFile, data, source)
     try:
         return read_path(table.path)
     except InputError as error:
@@ -349,13 +351,12 @@ def load_path(file: str | FilePath) -> Path:
 
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
     mechanism = read_mechanism(table)
-    paths = {}
-    for name, entry in table.path.items():
-        try:
-            paths[name] = read_path(entry)
-        except InputError as error:
-            raise error.within(f"path.{name}") from error
-    said = dict(table.study) | {"modes": tuple(table.study.modes), "orientation": table.study.orientation or 0.0}
+    paths = read_paths(table.path)
+    said = dict(table.study) | {
+        "modes": tuple(table.study.modes),
+        "orientation": table.study.orientation or 0.0,
+        "torques": read_torques(table),
+    }
     study = StudyDefaults(**said)
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates

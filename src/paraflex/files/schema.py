@@ -31,6 +31,7 @@ from pydantic_core import PydanticCustomError
 from paraflex.files.expressions import ExpressionError, check_in_time, evaluate
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
+from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import joint_pair
 from paraflex.mechanism.sections import SHAPES
 
@@ -96,12 +97,60 @@ FunctionOfTime = Annotated[Any, BeforeValidator(_function, json_schema_input_typ
 Count = Annotated[int, Field(strict=True, ge=-WHOLE, le=WHOLE)]
 Text = Annotated[str, Field(strict=True, max_length=TEXT_LETTERS)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-# Rows of two numbers; the name of a file stands for its rows, which `rows.with_rows` has put in its place.
+# Rows of two or three numbers; the name of a file stands for its rows, which `rows.with_rows` has put in its place.
 Rows = Annotated[list[Pair], BeforeValidator(lambda value: value, json_schema_input_type=list[Pair] | str)]
+Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+PathRows = Annotated[
+    list[Annotated[list[Number], Field(min_length=2, max_length=3)]],
+    BeforeValidator(lambda value: value, json_schema_input_type=list[Pair] | list[Triple] | str),
+]
+ForceRows = Annotated[list[Triple], BeforeValidator(lambda value: value, json_schema_input_type=list[Triple] | str)]
 
 
 class _Table(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
+
+
+_UNTIL = Field(default=None, description="the time in s at which the next piece takes over")
+_PAIR_IN_TIME = Annotated[list[FunctionOfTime], Field(min_length=2, max_length=2)]
+
+
+class ForcePiece(_Table):
+    """One of the pieces of a force."""
+
+    until: Number | None = _UNTIL
+    force: _PAIR_IN_TIME = Field(description="[x, y] in the ground frame in N, numbers or expressions of the time t")
+
+
+class TorquePiece(_Table):
+    """One of the pieces of a torque."""
+
+    until: Number | None = _UNTIL
+    torque: FunctionOfTime = Field(description="the torque in N m, a number or an expression of the time t")
+
+
+# How files write a component, or both, that may be a law in time: by a function, by pieces, by rows of a table.
+_IN_TIME: dict[Any, tuple[Any, Any, Any, str]] = {
+    InTime: (FunctionOfTime, TorquePiece, Rows, "[t, torque] in s and N m, or the name of a file with two"),
+    tuple[InTime, InTime]: (
+        _PAIR_IN_TIME, ForcePiece, ForceRows, "[t, x, y] in s and N, or the name of a file with three"
+    ),
+}  # fmt: skip
+
+
+def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
+    """Fields of a table for what may be a law in time."""
+    written, piece, rows, columns = _IN_TIME[hint]
+    pieces: Any = Annotated[list[piece], Field(min_length=1)]
+    example = f"a list of {{ until = s, {name} = ... }}, the last without until"
+    return {
+        name: (
+            written | None,
+            Field(default=None, description=f"{description}, numbers or expressions of the time t"),
+        ),
+        "pieces": (pieces | None, Field(default=None, description=example)),
+        "table": (rows | None, Field(default=None, description=f"a list of {columns} such columns")),
+    }
 
 
 TwoPoints = TwoJoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
@@ -138,6 +187,9 @@ def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
             missing = ... if needed else None
             default = missing if each.default is MISSING else getattr(each.default, "value", each.default)
             description = each.metadata.get("description", f"its {each.name}")
+            if hints[each.name] in _IN_TIME:
+                found |= _in_time(hints[each.name], each.name, description)
+                continue
             found[each.name] = (_written(hints[each.name]), Field(default, description=description))
     return found
 
@@ -318,7 +370,7 @@ class ModalTable(_Table):
 class PieceTable(_Table):
     """One of the pieces of a law."""
 
-    until: Number | None = Field(default=None, description="the time in s at which the next piece takes over")
+    until: Number | None = _UNTIL
     angle: FunctionOfTime | None = Field(default=None, description="the angle in rad, an expression of the time t")
     displacement: FunctionOfTime | None = Field(
         default=None, description="the displacement in m, an expression of the time t"
@@ -466,7 +518,51 @@ class PointsTable(_Table):
     motion_time: Number = Field(description="the time from the first point to the last in s")
 
 
-PathTable = Annotated[PolygonTable | LineTable | CircleTable | PointsTable, Field(discriminator="type")]
+class TabulatedPathTable(_Table):
+    """A smooth curve through many points, such as those of a file."""
+
+    type: Literal["table"]
+    table: PathRows = Field(
+        description="a list of [x, y] in m, or of [x, y, t] in m and s, or the name of a file with such columns"
+    )
+    motion_time: Number | None = Field(default=None, description="the time from the first point to the last in s")
+    max_acceleration: Number | None = Field(
+        default=None, description="the largest acceleration along the path in m/s^2"
+    )
+    max_speed: Number | None = Field(default=None, description="the largest speed along the path in m/s")
+
+
+class SequenceTable(_Table):
+    """Paths one after another in one motion."""
+
+    type: Literal["sequence"]
+    paths: list[Text] = Field(description="names of other [path.NAME] tables, in order")
+    dwell: Number = Field(default=0.0, description="the rest between two of them in s")
+
+
+PathTable = Annotated[
+    PolygonTable | LineTable | CircleTable | PointsTable | TabulatedPathTable | SequenceTable,
+    Field(discriminator="type"),
+]
+
+
+class TorqueTable(_Table):
+    """A motor's torque in time, by pieces or a table."""
+
+    torque: FunctionOfTime | None = Field(default=None, description="the torque in N m, an expression of the time t")
+    pieces: Annotated[list[TorquePiece], Field(min_length=1)] | None = Field(
+        default=None, description="a list of { until = s, torque = ... }, the last without until"
+    )
+    table: Rows | None = Field(
+        default=None, description="a list of [t, torque] in s and N m, or the name of a file with two such columns"
+    )
+
+
+# A number or an expression of the time, or a table. Tags are such that errors do not show them.
+TorqueEntry = Annotated[
+    Annotated[FunctionOfTime, Tag("number[t]")] | Annotated[TorqueTable, Tag("TorqueTable")],
+    Discriminator(lambda value: "TorqueTable" if isinstance(value, dict) else "number[t]"),
+]
 
 
 class StudyDefaultsTable(_Table):
@@ -477,7 +573,10 @@ class StudyDefaultsTable(_Table):
     duration: Number | None = Field(default=None, description="the duration in s, dwell included")
     samples: Count = Field(default=701, description="the number of samples kept")
     assembly: Text | None = Field(default=None, description="the name of an [assembly.NAME] table")
-    torques: dict[str, Number] = Field(default={}, description="constant torques of motors in N m, without a path")
+    torques: dict[str, TorqueEntry] = Field(
+        default={},
+        description="torques of motors in N m, without a path: numbers, expressions of the time t, or tables",
+    )
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
     )

@@ -10,6 +10,7 @@ from paraflex.errors import InputError
 from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions, check_times, find_method
 from paraflex.kinematics import Path
 from paraflex.mechanism import Mechanism, parse_mode
+from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
 
 
@@ -27,8 +28,8 @@ class StudyDefaults:
     samples : int
     assembly : str or None
         The first of the mechanism where None.
-    torques : mapping of str to float
-        Constant motor torques of a run without a path [N m].
+    torques : mapping of str to float or AngleLaw
+        Motor torques of a run without a path, constant or in time [N m].
     orientation : float
         Angle of the end-effector along the path, where it is a task coordinate [rad].
     method : str or None
@@ -48,7 +49,7 @@ class StudyDefaults:
     duration: float | None = None
     samples: int = 701
     assembly: str | None = None
-    torques: Mapping[str, float] = field(default_factory=dict)
+    torques: Mapping[str, InTime] = field(default_factory=dict)
     orientation: float = 0.0
     method: str | None = None
     tolerance: float | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields
 from enum import Enum
 from itertools import count
@@ -10,11 +10,13 @@ from numbers import Integral
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.files.laws import law_parameters, law_table
+from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
 from paraflex.files.study import StudyDefaults
-from paraflex.kinematics import Path
+from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
+    AngleLaw,
+    AppliedTorque,
     Assembly,
     AssumedModesBeam,
     Body,
@@ -22,6 +24,7 @@ from paraflex.mechanism import (
     Joint,
     Mechanism,
     ModalBody,
+    PointForce,
     PointRef,
     Polynomial,
     PrescribedAngle,
@@ -75,7 +78,7 @@ def model_tables(
         "description": mechanism.description,
         "geometry": "" if mechanism.geometry.value == "second-order" else mechanism.geometry.value,
         **{key: value for key, value in shared.items() if value != _SHARED[key]},
-        "parameters": law_parameters(mechanism.prescribed),
+        "parameters": law_parameters(_laws(mechanism, study)),
         "section": {name: _section(one, name, file or {}) for name, one in names["section"].values.items()},
         "material": {name: _fields(material) for name, material in names["material"].values.items()},
         "lump": {name: {"mass": mass, "inertia": inertia} for name, (mass, inertia) in names["lump"].values.items()},
@@ -89,9 +92,9 @@ def model_tables(
         "end_effector": {} if mechanism.end_effector is None else _fields(mechanism.end_effector),
         "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
         "mode": {mode.name: mode.motors for mode in mechanism.modes},
-        "path": {name: _path(path, name) for name, path in paths.items()},
+        "path": {name: _path(path, name, paths) for name, path in paths.items()},
         "start": {} if start is None else _start(start),
-        "study": _fields(study),
+        "study": _fields(study) | ({"torques": _torques(study)} if study.torques else {}),
     }
     return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
 
@@ -109,7 +112,19 @@ def _member(member: Any) -> dict[str, Any]:
     """The fields of a member; its points a and b together, and so two joints."""
     together = {"points": ["a", "b"] if hasattr(member, "a") else [], "joints": joint_pair(member)}
     pairs = {key: [getattr(member, name) for name in names] for key, names in together.items() if names}
+    if isinstance(member, PointForce | AppliedTorque):
+        try:
+            return {"point": member.point} | components_table(member.components, member.kind)
+        except InputError as error:
+            raise error.within(f"load.{member.name}") from None
     return pairs | _fields(member, "name", *(name for names in together.values() for name in names))
+
+
+def _laws(mechanism: Mechanism, study: StudyDefaults) -> Iterator[tuple[str, AngleLaw]]:
+    """Laws in time of a mechanism, each with its place in a file."""
+    yield from ((f"prescribed.{one.name}.law", one.law) for one in mechanism.prescribed)
+    yield from ((f"load.{load.name}.{load.kind}", law) for load in mechanism.loads for law in load.laws)
+    yield from ((f"study.torques.{name}", law) for name, law in study.torques.items() if isinstance(law, AngleLaw))
 
 
 def _fields(given: Any, *left_out: str) -> dict[str, Any]:
@@ -274,11 +289,33 @@ def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, 
     return {"joint": prescribed.joint} | law
 
 
-def _path(path: Path, name: str) -> dict[str, Any]:
+def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
+    if isinstance(path, SequencePath):
+        names = [next((other for other, one in paths.items() if one == part), "") for part in path.paths]
+        if not all(names):
+            raise _unwritable(f"path.{name}.paths", "a path without a name", "put each of its paths among the model's")
+        return {"type": "sequence", "paths": names} | _fields(path, "paths")
+    if isinstance(path, TabulatedPath):
+        columns = [*zip(*path.points, strict=True), *([] if path.times is None else [path.times])]
+        return {"type": "table", "table": [*zip(*columns, strict=True)]} | _fields(path, "points", "times")
     for kind, made in PATHS.items():
         if type(path) is made:
             return {"type": kind} | _fields(path)
-    raise _unwritable(f"path.{name}", type(path).__name__, "give a Polygon, Line, Circle or PointPath")
+    raise _unwritable(
+        f"path.{name}", type(path).__name__, "give a Polygon, Line, Circle, PointPath, TabulatedPath or SequencePath"
+    )
+
+
+def _torques(study: StudyDefaults) -> dict[str, Any]:
+    """Torques of motors: a number or an expression alone where that says it."""
+    said = {}
+    for name, law in study.torques.items():
+        try:
+            table = components_table((law,), "torque")
+        except InputError as error:
+            raise error.within(f"study.torques.{name}") from None
+        said[name] = table.get("torque", table)
+    return said
 
 
 def _assembly(assembly: Assembly) -> dict[str, Any]:

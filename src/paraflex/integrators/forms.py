@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, dependence
+from paraflex.dynamics import System, dependence, inputs_of
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import DEPENDENT_PART, MEMORY, Problem
 from paraflex.kernel.ode import (
@@ -56,7 +56,7 @@ class OdeForm:
         self.signals: Signals = problem.signals
         self.evaluations: int = 0
         self._weights = (1.0, 2.0 * options.alpha, options.beta**2)
-        self._torques, self._ws = np.zeros(len(system.mechanism.motors)), system.workspace()
+        self._torques, self._ws = np.zeros(inputs_of(system.mechanism).acting), system.workspace()
         self._a, self._lam, self._tangent = np.zeros(system.n), np.zeros(system.m), make_tangent(system.packed)
 
     @property

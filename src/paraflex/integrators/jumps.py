@@ -1,4 +1,4 @@
-"""Times at which torques or laws jump, where steps must end."""
+"""Times at which torques, loads or laws jump, where steps must end."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SMOOTH = 1e-9
 
 
 def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:
-    """The knots at which a torque jumps, or a prescribed law in its value, rate or acceleration.
+    """The knots at which a torque or load jumps, or a prescribed law in its value, rate or acceleration.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:
     knots : (k,) array
         Times to look at [s].
     """
-    looked_at = [(k, 1) for k in inputs.motors] + [(k, 3) for k in inputs.prescribed]
+    looked_at = [(k, 1) for k in (*inputs.motors, *inputs.loads)] + [(k, 3) for k in inputs.prescribed]
     return np.array([t for t in knots if any(_jumps(signals, k, t, derivatives) for k, derivatives in looked_at)])
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System
+from paraflex.dynamics import System, inputs_of
 from paraflex.integrators.method import NativeMethod, Treatment
 from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.integrators.options import IntegrationOptions
@@ -184,7 +184,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     assert isinstance(method, NativeMethod)
     scheme = method.scheme
     treatment = POSITION if isinstance(method, NewmarkMethod) else _TREATMENTS[options.treatment]
-    state = make_march(system.n, system.m, scheme.c.size, len(system.mechanism.motors), treatment)
+    state = make_march(system.n, system.m, scheme.c.size, inputs_of(system.mechanism).acting, treatment)
     state.q[:], state.v[:] = initial.q, initial.v
     state.clock[TIME], state.clock[STEP] = initial.time, min(FIRST_STEP * span, options.max_step)
     workspace = system.workspace()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import numbers_of, with_numbers
+from paraflex.dynamics import inputs_of, numbers_of, with_numbers
 from paraflex.errors import InputError, IntegrationError, Moment, SliderOffBeamError
 from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
 from paraflex.integrators.integrate import CAUSES
@@ -228,7 +228,7 @@ class _Varied:
     def __init__(self, problem: Problem, run: NativeRun, directions: Sequence[Direction]) -> None:
         self.problem, self.run, self.directions, self.residual = problem, run, directions, 0.0
         system, initial, stages = problem.system, problem.initial, run.scheme.c.size
-        self.march = make_march(system.n, system.m, stages, len(system.mechanism.motors))
+        self.march = make_march(system.n, system.m, stages, inputs_of(system.mechanism).acting)
         self.march.q[:], self.march.v[:] = initial.q, initial.v
         self.workspace, self.samples = system.workspace(), empty_samples(problem.times, system)
         self.workspace.redundant[:] = run.workspace.redundant

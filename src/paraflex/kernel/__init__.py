@@ -10,7 +10,7 @@ Arguments of one name are the same everywhere, n coordinates and m constraint ro
     q, v, a, f, x           (n,) coordinates, their derivatives, generalised forces, a vector of that kind
     lam, mu, rows           (m,) multipliers, changes of them, residuals of the constraint rows
     phi, dphi               (m,) values of the constraints, their derivatives in time
-    torques                 (motors,) torques or forces of the motors at the instant
+    torques                 (acting,) torques or forces of the motors at the instant, then of loads given in time
     weights                 three floats, of Phi'', Phi' and Phi in the rows
     points                  sums over mass points, None for linear geometry
     signals, tableau, controls, march   functions of time, the scheme, what the user chooses, the state of a run

@@ -98,15 +98,15 @@ def body_terms(system, i, q, v, a, f, scratch):
 
 
 @kernel
-def motion_forces(system, q, v, a, f, scratch):
+def motion_forces(system, q, v, a, torques, f, scratch):
     """M q'' + h + K u of the whole system at every instant of a motion, less weight and loads, into f.
 
-    q, v, a, f : (instants, n) arrays.
+    q, v, a, f : (instants, n) arrays; torques : (instants, acting) array, of loads that are given in time.
     """
     for k in range(q.shape[0]):
         for i in range(system.bodies.size):
             body_terms(system, i, q[k], v[k], a[k], f[k], scratch)
-        apply_loads(system, q[k], f[k])
+        apply_loads(system, q[k], torques[k], f[k])
         apply_lines(system, q[k], v[k], f[k])
 
 

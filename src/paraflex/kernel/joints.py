@@ -202,15 +202,24 @@ def modal_damping_power(system, v):
     return power
 
 
+@inlined
+def load_at(load, torques):
+    """Force and torque of a load: (fx, fy, torque)."""
+    fx = load.fx if load.x_signal < 0 else torques[load.x_signal]
+    fy = load.fy if load.y_signal < 0 else torques[load.y_signal]
+    return fx, fy, load.torque if load.torque_signal < 0 else torques[load.torque_signal]
+
+
 @routine
-def apply_loads(system, q, f):
-    """Subtract the generalised forces of constant loads from f."""
+def apply_loads(system, q, torques, f):
+    """Subtract the generalised forces of loads from f; `torques` has those that are given in time."""
     for k in range(system.loads.size):
         load = system.loads[k]
         marker = system.markers[load.marker]
+        fx, fy, torque = load_at(load, torques)
         _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
-        apply_force(system, marker, q, -load.fx, -load.fy, rx, ry, f)
-        apply_torque(system, marker, -load.torque, f)
+        apply_force(system, marker, q, -fx, -fy, rx, ry, f)
+        apply_torque(system, marker, -torque, f)
 
 
 @inlined
@@ -263,14 +272,15 @@ def line_energy(system, q, v):
 
 
 @routine
-def load_power(system, q, v):
-    """Power of constant loads."""
+def load_power(system, q, v, torques):
+    """Power of loads."""
     power = 0.0
     for k in range(system.loads.size):
         load = system.loads[k]
         marker = system.markers[load.marker]
+        fx, fy, torque = load_at(load, torques)
         _, _, vx, vy, _, _, _, _ = marker_motion(system, marker, q, v, v)
-        power += load.fx * vx + load.fy * vy + load.torque * marker_angle(system, marker, v)
+        power += fx * vx + fy * vy + torque * marker_angle(system, marker, v)
     return power
 
 

@@ -112,6 +112,10 @@ LOAD = np.dtype(
         ("fx", np.float64),  # in the ground frame
         ("fy", np.float64),
         ("torque", np.float64),
+        # Of components that are given in time, else -1.
+        ("x_signal", np.int64),
+        ("y_signal", np.int64),
+        ("torque_signal", np.int64),
     ],
     align=True,
 )
@@ -211,7 +215,7 @@ class PackedSystem(NamedTuple):
 
 @by_reference
 class Signals(NamedTuple):
-    """Functions of time as piecewise quintics: motor torques first, then prescribed values."""
+    """Functions of time as piecewise quintics: motor torques first, then loads, then prescribed values."""
 
     start: NDArray[np.int64]  # first break of each signal; one more at the end
     breaks: NDArray[np.float64]

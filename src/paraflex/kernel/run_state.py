@@ -105,7 +105,7 @@ class March(NamedTuple):
     vs: NDArray[np.float64]
     eq: NDArray[np.float64]  # (n,) estimated errors of a step
     ev: NDArray[np.float64]
-    torques: NDArray[np.float64]  # (motors,) of the motors at a stage, or forces
+    torques: NDArray[np.float64]  # (acting,) of the motors at a stage, or forces, then of loads given in time
     algorithmic: NDArray[np.float64]  # (2, n) accelerations that the Newmark family carries, of the last step and this
     passages: NDArray[np.float64]  # (2, MOST_PASSAGES) from when to when more rows were dependent than at the start
     opening: NDArray[np.float64]  # (n,) near a singular position: what opens the row nearest to dependence by one unit
@@ -125,7 +125,7 @@ class Samples(NamedTuple):
     energy: NDArray[np.float64]  # (times, 3): kinetic, strain, work done by motors and prescribed motion
 
 
-def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGARTE) -> March:
+def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGARTE) -> March:
     """Allocate the state of a run with n coordinates and m constraint rows."""
     stage_v = apart((stages, n))
     return March(
@@ -145,7 +145,7 @@ def make_march(n: int, m: int, stages: int, motors: int, treatment: int = BAUMGA
         vs=apart(n),
         eq=apart(n),
         ev=apart(n),
-        torques=apart(motors),
+        torques=apart(acting),
         algorithmic=apart((2, n)),
         passages=apart((2, MOST_PASSAGES)),
         opening=apart(n),

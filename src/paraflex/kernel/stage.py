@@ -65,7 +65,7 @@ def equations(system, signals, t, weights, q, v, a, lam, torques, work):
 
 @inlined
 def note_torques(signals, t, torques):
-    """Torques of the motors at a time."""
+    """Torques of the motors, and of loads what is given in time, at a time."""
     for k in range(torques.size):
         torques[k] = evaluate_signal(signals, k, t)[0]
 
@@ -82,7 +82,7 @@ def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
         hand_on(system, i, work.scratch, work.f)
     apply_axes(system, q, v, a, lam, weights, torques, work.f, work.rows)
     finish_friction(system, lam, work.compliance, work.rows)
-    apply_loads(system, q, work.f)
+    apply_loads(system, q, torques, work.f)
     apply_lines(system, q, v, work.f)
 
 

@@ -71,7 +71,7 @@ SAME_TIME = 1e-6
 @routine
 def input_power(system, signals, t, q, v, lam, torques, work):
     """Power of the motors, of prescribed motion and of loads, less that of dampers, friction and damping."""
-    total = load_power(system, q, v) + axis_power(system, q, v, torques) - line_energy(system, q, v)[1]
+    total = load_power(system, q, v, torques) + axis_power(system, q, v, torques) - line_energy(system, q, v)[1]
     total -= dissipated_power(system, q, v, lam, work.mu) + modal_damping_power(system, v)
     for k in range(system.motor_sides.size):
         side = system.motor_sides[k]

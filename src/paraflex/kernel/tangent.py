@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
 from paraflex.kernel.constraints import joint_rates
-from paraflex.kernel.joints import angle_row, apply_torque, line_end, marker_motion
+from paraflex.kernel.joints import angle_row, apply_torque, line_end, load_at, marker_motion
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem
 from paraflex.kernel.tangent_axes import axes_tangent
 from paraflex.kernel.tangent_bodies import body_terms_tangent
@@ -70,14 +70,15 @@ def joints_tangent(system, i, weights, q, v, a, lam, direction):
 
 
 @routine
-def loads_tangent(system, q, direction):
-    """Subtract the change of the generalised forces of constant loads from direction.f."""
+def loads_tangent(system, q, torques, direction):
+    """Subtract the change of the generalised forces of loads from direction.f."""
     for k in range(system.loads.size):
         load = system.loads[k]
         marker = system.markers[load.marker]
         _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
         _, _, _, _, _, _, d_rx, d_ry = marker_tangent(system, marker, q, q, q, direction)
-        force_tangent(system, marker, q, (-load.fx, -load.fy), (0.0, 0.0), (rx, ry), (d_rx, d_ry), direction)
+        fx, fy, _ = load_at(load, torques)
+        force_tangent(system, marker, q, (-fx, -fy), (0.0, 0.0), (rx, ry), (d_rx, d_ry), direction)
 
 
 @routine
@@ -147,7 +148,7 @@ def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, 
     ----------
     weights : tuple of 3 float
         Of Phi'', Phi' and Phi in the rows of constraints: (1, 2 alpha, beta^2) for those of `equations`.
-    torques : (motors,) array
+    torques : (acting,) array
         As `equations` left them.
     compliance : (m,) array
         That of the workspace the residuals were found with.
@@ -164,7 +165,7 @@ def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, 
         joints_tangent(system, i, weights, q, v, a, lam, direction)
     axes_tangent(system, weights, q, v, a, lam, torques, direction)
     finish_rows(system, compliance, direction)
-    loads_tangent(system, q, direction)
+    loads_tangent(system, q, torques, direction)
     lines_tangent(system, q, v, direction)
 
 

@@ -6,7 +6,7 @@ from paraflex.kinematics.closure import (
     path_follower as path_follower,
     reach_shortfall as reach_shortfall,
 )
-from paraflex.kinematics.laws import TrapezoidalLaw as TrapezoidalLaw
+from paraflex.kinematics.laws import CruiseLaw as CruiseLaw, TrapezoidalLaw as TrapezoidalLaw
 from paraflex.kinematics.model import ModelWithPaths as ModelWithPaths
 from paraflex.kinematics.paths import (
     Circle as Circle,
@@ -15,6 +15,8 @@ from paraflex.kinematics.paths import (
     PathMotion as PathMotion,
     PointPath as PointPath,
     Polygon as Polygon,
+    SequencePath as SequencePath,
+    TabulatedPath as TabulatedPath,
     length_fraction as length_fraction,
 )
 from paraflex.kinematics.reach import Shortfall as Shortfall

@@ -1,4 +1,4 @@
-"""The modified trapezoidal law of motion along a length (Eqs. 62-63, as corrected)."""
+"""Laws of motion along a length: the modified trapezoidal one (Eqs. 62-63, as corrected), and one of limited speed."""
 
 from __future__ import annotations
 
@@ -66,3 +66,63 @@ class TrapezoidalLaw:
         covered = distance(rising) + cruise * np.maximum(t - 0.5 * T, 0.0) - distance(falling)
         acceleration = np.where(t < 0.5 * T, sine, np.where(t < T, 0.0, -sine))
         return covered, speed(rising) - speed(falling), acceleration
+
+
+@dataclass(frozen=True)
+class CruiseLaw:
+    """Sine-shaped acceleration to a speed, cruise, sine-shaped deceleration: a trapezoidal law without jumps.
+
+    With the acceleration a sin(pi t/R) on [0, R] the speed 2 a R/pi is reached after its half times R. R is such that
+    this is the largest speed, or, where the length is too short for it, that nothing is left to cruise.
+
+    Attributes
+    ----------
+    length : float
+        Covered [m].
+    max_acceleration, max_speed : float
+        [m/s^2, m/s]
+    """
+
+    length: float
+    max_acceleration: float
+    max_speed: float
+
+    @property
+    def ramp(self) -> float:
+        """Duration R of either ramp [s]."""
+        full = pi * self.max_speed / (2.0 * self.max_acceleration)
+        if np.real(full * self.max_speed) <= np.real(self.length):
+            return full
+        return np.sqrt(pi * self.length / (2.0 * self.max_acceleration))
+
+    @property
+    def speed(self) -> float:
+        """Speed reached [m/s]."""
+        return 2.0 * self.max_acceleration * self.ramp / pi
+
+    @property
+    def duration(self) -> float:
+        """Duration of the motion [s]."""
+        return self.ramp + self.length / self.speed
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times at which the third derivative jumps [s]."""
+        return (0.0, self.ramp, self.duration - self.ramp, self.duration)
+
+    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
+        """Length covered [m], speed and acceleration at times t [s]; at rest outside the motion."""
+        R, v, end = self.ramp, self.speed, self.duration
+        t = np.clip(t, 0.0, end)
+        rising, falling = np.minimum(t, R), np.maximum(t - (end - R), 0.0)
+        w = pi / R
+
+        def distance(x):
+            return 0.5 * v * (x - np.sin(w * x) / w)
+
+        def rate(x):
+            return 0.5 * v * (1.0 - np.cos(w * x))
+
+        covered = distance(rising) + v * np.maximum(t - R, 0.0) - distance(falling)
+        acceleration = 0.5 * v * w * (np.sin(w * rising) - np.sin(w * falling))
+        return covered, rate(rising) - rate(falling), acceleration

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import pairwise
 from math import pi
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.kinematics.laws import TrapezoidalLaw
-from paraflex.mechanism.quantities import finite, positive
+from paraflex.kinematics.laws import CruiseLaw, TrapezoidalLaw
+from paraflex.limits import PATH_POINTS, at_most
+from paraflex.mechanism.quantities import finite, not_negative, positive
 
-# Points of Gauss's rule for the length between two knots of a path.
+# Points of Gauss's rule for the length between two knots of a path, or two points of a curve.
 _LENGTH_POINTS = 40
+# Newton's iterations for the place at a length, and what is left of the whole length.
+_NEWTON, _ON_CURVE = 30, 1e-14
+# Halvings of a time that leave its last digits, and what part of the motion two times are apart at least.
+_BISECTIONS, _SAME_KNOT = 60, 1e-6
+_LEAST_POINTS = 4
+# Paths of a sequence meet to this part of their place [m]: rounding of coordinates in files.
+_GAP = 1e-9
 
 
 class PathMotion(NamedTuple):
@@ -29,7 +39,10 @@ class PathMotion(NamedTuple):
     acceleration: Array
 
 
-@given_as("a path", "a path: Polygon, Line, Circle or PointPath, or one that paraflex.load_path reads")
+@given_as(
+    "a path",
+    "a path: Polygon, Line, Circle, PointPath, TabulatedPath or SequencePath, or one that paraflex.load_path reads",
+)
 @runtime_checkable
 class Path(Protocol):
     """A motion of a point in the plane: from rest to rest, then dwell."""
@@ -261,6 +274,276 @@ class PointPath(CheckedFields):
         inside = ((t >= 0.0) & (t <= self.motion_time))[:, None]
         x = np.clip(t, 0.0, self.motion_time)
         return np.stack([self._spline(x), *(np.where(inside, self._spline(x, k), 0.0) for k in (1, 2))])
+
+
+@dataclass(frozen=True)
+class TabulatedPath(CheckedFields):
+    """A smooth curve through many points, such as those of a file, from rest to rest.
+
+    With times it is the motion that passes the points then, a quintic spline in time at rest at both ends. Without them
+    it is the natural quintic spline over the lengths of the chords, which the end-effector follows by a law along its
+    length: of a given time or acceleration the modified trapezoidal one, with a largest speed a `CruiseLaw`.
+    Accelerations are along the path; the centripetal one comes on top.
+
+    Attributes
+    ----------
+    points : sequence of (x, y)
+        At least four [m].
+    times : sequence of float, optional
+        When they are passed, ascending; the motion starts with the first [s].
+    motion_time, max_acceleration, max_speed : float, optional
+        The law without times: either its duration [s], or the largest acceleration [m/s^2] and perhaps speed [m/s].
+
+    Raises
+    ------
+    InputError
+        Fewer points, two neighbours that coincide, times that do not ascend, or more or less than one law.
+    """
+
+    _own = ("points",)
+    points: tuple[tuple[float, float], ...]
+    times: tuple[float, ...] | None = None
+    motion_time: float | None = None
+    max_acceleration: float | None = None
+    max_speed: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        points = _points(self.points, "points", _LEAST_POINTS)
+        at_most(len(points), PATH_POINTS, "points")
+        object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
+        same = np.flatnonzero(np.all(points[1:] == points[:-1], axis=1))
+        if same.size:
+            raise InputError(
+                f"points {same[0] + 1} and {same[0] + 2} coincide", field="points", value=self.points[same[0]],
+                remedy="drop one of them",
+            )  # fmt: skip
+        self._check_law()
+        if self.times is not None:
+            self._check_times(np.array(self.times, dtype=float))
+
+    def _check_law(self) -> None:
+        given = [name for name in ("times", "motion_time", "max_acceleration") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise InputError(
+                "its law of motion is given in two ways" if given else "nothing says how fast it is passed",
+                field=given[-1] if given else "max_acceleration", value=", ".join(given) or None,
+                remedy=f"drop all but {given[0]}" if given else "give max_acceleration, motion_time, or times",
+            )  # fmt: skip
+        for name, unit in (("motion_time", "seconds"), ("max_acceleration", "m/s^2"), ("max_speed", "m/s")):
+            if (value := getattr(self, name)) is not None:
+                positive(value, name, unit)
+        if self.max_speed is not None and self.max_acceleration is None:
+            raise InputError(
+                "a largest speed goes with a largest acceleration", field="max_speed", value=self.max_speed,
+                remedy="give max_acceleration too, or leave it out",
+            )  # fmt: skip
+
+    def _check_times(self, times: Array) -> None:
+        if times.size != len(self.points) or not np.all(np.isfinite(times)):
+            raise InputError(
+                f"there are {len(self.points)} points and {times.size} times", field="times",
+                remedy="give a finite time in s for every point",
+            )  # fmt: skip
+        late = np.flatnonzero(np.diff(times) <= 0.0)
+        if late.size:
+            raise InputError(
+                f"its times must ascend, that of point {late[0] + 2} does not", field="times",
+                value=float(times[late[0] + 1]), remedy=f"it follows t = {times[late[0]]:g} s",
+            )  # fmt: skip
+
+    @cached_property
+    def _timed(self) -> scipy.interpolate.BSpline:
+        times, still = np.array(self.times), np.zeros(2)
+        rest = [(1, still), (2, still)]
+        return scipy.interpolate.make_interp_spline(times - times[0], self.points, k=5, bc_type=(rest, rest))
+
+    @cached_property
+    def _curve(self) -> _Curve:
+        if any(isinstance(value, complex) for point in self.points for value in point):
+            raise InputError("no derivative by a point of a path", field="points", remedy="leave it out")
+        return _Curve(np.array(self.points))
+
+    @cached_property
+    def _law(self) -> TrapezoidalLaw | CruiseLaw:
+        length = self._curve.length
+        if self.motion_time is not None:
+            return TrapezoidalLaw(length, pi * length / (self.motion_time / 1.5) ** 2)
+        assert self.max_acceleration is not None
+        if self.max_speed is None:
+            return TrapezoidalLaw(length, self.max_acceleration)
+        return CruiseLaw(length, self.max_acceleration, self.max_speed)
+
+    @property
+    def duration(self) -> float:
+        """Duration of the motion [s]."""
+        return self._law.duration if self.times is None else self.times[-1] - self.times[0]
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """When the points are passed, at which the acceleration is smooth only to a degree; ends of the phases [s]."""
+        if self.times is not None:
+            return tuple(time - self.times[0] for time in self.times)
+        phases, passed = np.array(self._law.knots), self._passed
+        apart = np.abs(passed[:, None] - phases) > _SAME_KNOT * np.abs(self.duration)
+        return tuple(np.sort(np.concatenate([phases, passed[apart.all(axis=1)]])).tolist())
+
+    @cached_property
+    def _passed(self) -> Array:
+        """When the law passes the inner points [s]."""
+        law, at = self._law, self._curve.lengths[1:-1]
+        real = type(law)(*(float(np.real(getattr(law, each.name))) for each in fields(law)))
+        low, high = np.zeros(at.size), np.full(at.size, real.duration)
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            short = real.evaluate(middle)[0] < at
+            low, high = np.where(short, middle, low), np.where(short, high, middle)
+        if law == real:
+            return low
+        # One of Newton's steps gives the derivative of a law with a complex step.
+        covered, speed, _ = law.evaluate(low)
+        return low - (covered - at) / speed
+
+    def evaluate(self, t: Array) -> PathMotion:
+        """The motion at times t."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        if self.times is None:
+            return self._curve.motion(*self._law.evaluate(t))
+        inside, x = ((t >= 0.0) & (t <= self.duration))[:, None], np.clip(t, 0.0, self.duration)
+        return PathMotion(self._timed(x), *(np.where(inside, self._timed(x, k), 0.0) for k in (1, 2)))
+
+
+class _Curve:
+    """A spline p(u) through points, u the lengths of their chords, and its arc length s(u)."""
+
+    def __init__(self, points: Array) -> None:
+        chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        self._u = np.concatenate([[0.0], np.cumsum(chords)])
+        # Of all curves through the points that of least third derivative, which swings little at its ends.
+        free = [(3, np.zeros(2)), (4, np.zeros(2))]
+        self._spline = scipy.interpolate.make_interp_spline(self._u, points, k=5, bc_type=(free, free))
+        self._z, self._w = np.polynomial.legendre.leggauss(_LENGTH_POINTS)
+        self.lengths = np.concatenate([[0.0], np.cumsum(self._arc(self._u[:-1], self._u[1:]))])
+        self.length = float(self.lengths[-1])
+
+    def _arc(self, a: Array, b: Array) -> Array:
+        """Lengths between parameters a and b of one piece each."""
+        half = 0.5 * (b - a)
+        speed = np.linalg.norm(self._spline(0.5 * (a + b)[:, None] + half[:, None] * self._z, 1), axis=-1)
+        return half * (speed @ self._w)
+
+    def _parameter(self, s: Array) -> Array:
+        """The parameters u (k,) at lengths s, by Newton's iteration in the piece that has them."""
+        piece = np.clip(np.searchsorted(self.lengths, s, side="right") - 1, 0, self._u.size - 2)
+        left, right = self._u[piece], self._u[piece + 1]
+        u = left + (right - left) * (s - self.lengths[piece]) / (self.lengths[piece + 1] - self.lengths[piece])
+        for _ in range(_NEWTON):
+            off = self.lengths[piece] + self._arc(left, u) - s
+            if np.max(np.abs(off)) <= _ON_CURVE * self.length:
+                break
+            u = np.clip(u - off / np.linalg.norm(self._spline(u, 1), axis=1), left, right)
+        return u
+
+    def motion(self, s: Array, rate: Array, second: Array) -> PathMotion:
+        """The motion of a point at lengths (k,), with their derivatives by time."""
+        u = self._parameter(s)
+        p, dp, ddp = (self._spline(u, k) for k in range(3))
+        slope = np.linalg.norm(dp, axis=1)
+        du = rate / slope
+        ddu = (second - np.sum(dp * ddp, axis=1) / slope * du**2) / slope
+        return PathMotion(p, dp * du[:, None], ddp * (du**2)[:, None] + dp * ddu[:, None])
+
+
+@dataclass(frozen=True)
+class SequencePath(CheckedFields):
+    """Paths one after another in one motion, each from where the one before ends.
+
+    Attributes
+    ----------
+    paths : sequence of Path
+        At least two.
+    dwell : float
+        Rest between two of them [s].
+
+    Raises
+    ------
+    InputError
+        Fewer paths, one that does not begin where that before it ends, or angles of the end-effector in some only.
+    """
+
+    paths: tuple[Path, ...]
+    dwell: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        not_negative(self.dwell, "dwell", "seconds")
+        if len(self.paths) < 2:
+            raise InputError("a sequence needs two paths", field="paths", value=len(self.paths), remedy="name them")
+        for number, (before, after) in enumerate(pairwise(self.paths), start=2):
+            end, start = (path.evaluate(np.array([t])) for path, t in ((before, before.duration), (after, 0.0)))
+            gap = float(np.linalg.norm(start.position - end.position))
+            if not gap <= _GAP * max(1.0, float(np.max(np.abs(end.position)))):
+                x, y = end.position[0].tolist()
+                raise InputError(
+                    f"path {number} starts {gap:.6g} m from where the one before ends", field="paths",
+                    value=f"({start.position[0, 0]:g}, {start.position[0, 1]:g})",
+                    remedy=f"let it start at ({x:.9g}, {y:.9g}), or put a line between them",
+                )  # fmt: skip
+        turning = [self._angle(path, np.zeros(1)) is not None for path in self.paths]
+        if any(turning) and not all(turning):
+            raise InputError(
+                "some of its paths give angles of the end-effector and some do not", field="paths",
+                remedy="give them in all, or in none",
+            )  # fmt: skip
+
+    @property
+    def _starts(self) -> list[float]:
+        """When each path begins, and when the last ends [s]."""
+        starts: list[float] = [0.0]
+        for path in self.paths:
+            starts.append(starts[-1] + path.duration + self.dwell)
+        starts[-1] = starts[-1] - self.dwell
+        return starts
+
+    @property
+    def duration(self) -> float:
+        """Duration of the motion [s]."""
+        return self._starts[-1]
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Those of all paths [s]."""
+        return tuple(start + knot for start, path in zip(self._starts, self.paths, strict=False) for knot in path.knots)
+
+    def evaluate(self, t: Array) -> PathMotion:
+        """The motion at times t."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        out = np.zeros((3, t.size, 2))
+        for here, path, time in self._each(t):
+            out[:, here] = path.evaluate(time)
+        return PathMotion(*out)
+
+    def turning(self, t: Array) -> Array | None:
+        """Angle [rad] of the end-effector, its rate and acceleration at times t (3, k); None without angles."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        if self._angle(self.paths[0], t[:1]) is None:
+            return None
+        out = np.zeros((3, t.size))
+        for here, path, time in self._each(t):
+            out[:, here] = self._angle(path, time)
+        return out
+
+    def _each(self, t: Array) -> Iterator[tuple[NDArray[np.bool_], Path, Array]]:
+        """For each path which of the times are its own, and these counted from its start."""
+        which = np.searchsorted(self._starts[1:-1], t, side="right")
+        for k, path in enumerate(self.paths):
+            if np.any(which == k):
+                yield which == k, path, t[which == k] - self._starts[k]
+
+    @staticmethod
+    def _angle(path: Path, t: Array) -> Array | None:
+        turning = getattr(path, "turning", None)
+        return None if turning is None else turning(t)
 
 
 @checked_arguments()

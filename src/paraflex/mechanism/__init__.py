@@ -29,7 +29,6 @@ from paraflex.mechanism.groups import Group as Group, grouped as grouped, groups
 from paraflex.mechanism.joints import (
     GROUND as GROUND,
     JOINT_KINDS as JOINT_KINDS,
-    AngleLaw as AngleLaw,
     AtEnd as AtEnd,
     Joint as Joint,
     Motor as Motor,
@@ -37,15 +36,16 @@ from paraflex.mechanism.joints import (
     PrescribedAngle as PrescribedAngle,
     PrismaticJoint as PrismaticJoint,
     RevoluteJoint as RevoluteJoint,
-    SampledAngle as SampledAngle,
     SlidingJoint as SlidingJoint,
     SlotJoint as SlotJoint,
     WeldJoint as WeldJoint,
     points_named as points_named,
 )
 from paraflex.mechanism.laws import (
+    AngleLaw as AngleLaw,
     ConstantSpeed as ConstantSpeed,
     PiecewiseLaw as PiecewiseLaw,
+    SampledAngle as SampledAngle,
     TabulatedLaw as TabulatedLaw,
 )
 from paraflex.mechanism.loads import (

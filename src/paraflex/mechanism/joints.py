@@ -8,14 +8,13 @@ grows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from enum import Enum
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
-from paraflex.arrays import Array
 from paraflex.errors import InputError
+from paraflex.mechanism.laws import AngleLaw, check_motion
 from paraflex.mechanism.quantities import AT_JOINT, JointThat, finite, said
 
 GROUND = "ground"
@@ -234,35 +233,6 @@ class WeldJoint(Joint, kind="weld", holds=("points", "angle")):
     angle: float = field(default=0.0, metadata=_ANGLE)
 
 
-@given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")
-@runtime_checkable
-class AngleLaw(Protocol):
-    """An angle as a function of time."""
-
-    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Angle [rad], its rate [rad/s] and its acceleration [rad/s^2] at times t [s]."""
-        ...
-
-    @property
-    def knots(self) -> tuple[float, ...]:
-        """Times [s] at which a derivative of the law jumps; integration steps end there."""
-        ...
-
-
-@dataclass(frozen=True)
-class SampledAngle(CheckedFields):
-    """An angle law from three functions of time: the angle and its first two derivatives."""
-
-    angle: Callable[[Array], Array]
-    rate: Callable[[Array], Array]
-    acceleration: Callable[[Array], Array]
-    knots: tuple[float, ...] = ()
-
-    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Angle, rate and acceleration at times t."""
-        return self.angle(t), self.rate(t), self.acceleration(t)
-
-
 @dataclass(frozen=True)
 class PrescribedAngle(CheckedFields):
     """A rheonomic constraint: the angle of a revolute joint follows a law in time."""
@@ -272,6 +242,13 @@ class PrescribedAngle(CheckedFields):
     name: str
     joint: str = field(metadata=AT_JOINT)
     law: AngleLaw
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        try:
+            check_motion(self.law)
+        except InputError as error:
+            raise error.within(f"prescribed.{self.name}") from None
 
 
 @dataclass(frozen=True)

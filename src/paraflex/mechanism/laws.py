@@ -1,18 +1,19 @@
-"""Laws in time of model files: constant speed, pieces, a table."""
+"""Laws in time, of prescribed motions, loads and torques: functions, constant speed, pieces, a table."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy
 
-from paraflex.arguments import CheckedFields
+from paraflex.arguments import CheckedFields, given_as
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.mechanism.joints import AngleLaw
 
 Values = tuple[Array, Array, Array]
 
@@ -21,6 +22,35 @@ _SMOOTH = 1e-9
 # A run may end this far beyond a table, as a fraction of it: rounding of times.
 _BEYOND_TABLE = 1e-9
 _DEGREE = 5
+
+
+@given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")
+@runtime_checkable
+class AngleLaw(Protocol):
+    """An angle, a travel, a force or a torque as a function of time."""
+
+    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
+        """Value [rad, m, N or N m] and its first and second derivatives at times t [s]."""
+        ...
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times [s] at which a derivative of the law jumps; integration steps end there."""
+        ...
+
+
+@dataclass(frozen=True)
+class SampledAngle(CheckedFields):
+    """A law from three functions of time: the angle, or whatever it is a law of, and its first two derivatives."""
+
+    angle: Callable[[Array], Array]
+    rate: Callable[[Array], Array]
+    acceleration: Callable[[Array], Array]
+    knots: tuple[float, ...] = ()
+
+    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
+        """Angle, rate and acceleration at times t."""
+        return self.angle(t), self.rate(t), self.acceleration(t)
 
 
 @dataclass(frozen=True)
@@ -40,7 +70,7 @@ class ConstantSpeed(CheckedFields):
 
 @dataclass(frozen=True)
 class PiecewiseLaw(CheckedFields):
-    """Laws in succession, between which only the acceleration may jump.
+    """Laws in succession. Those of a prescribed motion must meet in value and rate; loads and torques may jump.
 
     Attributes
     ----------
@@ -52,7 +82,7 @@ class PiecewiseLaw(CheckedFields):
     Raises
     ------
     InputError
-        Ends that do not ascend, or a jump of the law or its rate.
+        Ends that do not ascend.
     """
 
     _table = "law"
@@ -68,16 +98,6 @@ class PiecewiseLaw(CheckedFields):
                     "the times of pieces must ascend from 0", field="pieces", value=end,
                     remedy=f"let this one end after t = {before:g} s",
                 )  # fmt: skip
-        for end, (left, right) in zip(self.ends, pairwise(self.pieces), strict=True):
-            at = np.array([end])
-            for what, a, b in zip(("law", "rate"), left.evaluate(at), right.evaluate(at), strict=False):
-                jump = float(b[0] - a[0])
-                if abs(jump) > _SMOOTH * max(1.0, abs(float(a[0]))):
-                    raise InputError(
-                        f"the {what} jumps by {jump:.6g} at t = {end:g} s", field="pieces",
-                        value=f"{float(a[0]):.9g} before, {float(b[0]):.9g} after",
-                        remedy="make value and rate of the pieces meet; t is the same time in all",
-                    )  # fmt: skip
 
     @property
     def knots(self) -> tuple[float, ...]:
@@ -167,3 +187,27 @@ class TabulatedLaw(CheckedFields):
                 )  # fmt: skip
         x = np.clip(t, first, last)
         return self._spline(x), self._spline(x, 1), self._spline(x, 2)
+
+
+def check_motion(law: AngleLaw) -> None:
+    """Check that a law can be that of a motion, in which only the acceleration may jump.
+
+    Raises
+    ------
+    InputError
+        A jump between pieces of the law or its rate.
+    """
+    if not isinstance(law, PiecewiseLaw):
+        return
+    for piece in law.pieces:
+        check_motion(piece)
+    for end, (left, right) in zip(law.ends, pairwise(law.pieces), strict=True):
+        at = np.array([end])
+        for what, a, b in zip(("law", "rate"), left.evaluate(at), right.evaluate(at), strict=False):
+            jump = float(b[0] - a[0])
+            if abs(jump) > _SMOOTH * max(1.0, abs(float(a[0]))):
+                raise InputError(
+                    f"the {what} jumps by {jump:.6g} at t = {end:g} s", field="pieces",
+                    value=f"{float(a[0]):.9g} before, {float(b[0]):.9g} after",
+                    remedy="make value and rate of the pieces meet; t is the same time in all",
+                )  # fmt: skip

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+
 from paraflex.arguments import CheckedFields, given_as
+from paraflex.arrays import Array
+from paraflex.errors import InputError
 from paraflex.mechanism.joints import PointRef
+from paraflex.mechanism.laws import AngleLaw
 from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, positive, said
 
 
@@ -95,40 +99,80 @@ class LinearSpring(CheckedFields):
     damping: float = field(default=0.0, metadata=said("the damping in N s/m", not_negative, "N s/m"))
 
 
+InTime = float | AngleLaw
+given_as("a number or a law in time", "a number, or a law in time: PiecewiseLaw, TabulatedLaw, ExpressionLaw")(InTime)
+given_as("two numbers or laws in time", "[x, y], each a number or a law in time")(tuple[InTime, InTime])
+
+
+def _finite_or_law(values: InTime | tuple[InTime, ...], field: str) -> None:
+    """Check numbers; laws are checked where they are evaluated."""
+    several = values if isinstance(values, tuple) else (values,)
+    finite([each for each in several if not isinstance(each, AngleLaw)], field)
+
+
 @dataclass(frozen=True)
-class PointForce(CheckedFields):
-    """A constant force [N] at a named point of a body, given in the ground frame."""
+class _Load(CheckedFields):
+    """What loads have in common."""
 
     _table = "load"
+    kind: ClassVar[str]
+    unit: ClassVar[str]
+
+    name: str
+    point: PointRef = field(metadata=said('"body.point"'))
+
+    @property
+    def components(self) -> tuple[InTime, ...]:
+        """Force along x and y in the ground frame [N], or the torque [N m]: what the load's last field has."""
+        given = getattr(self, self.kind)
+        return given if isinstance(given, tuple) else (given,)
+
+    @property
+    def laws(self) -> tuple[AngleLaw, ...]:
+        """Those of the components that are laws in time."""
+        return tuple(each for each in self.components if isinstance(each, AngleLaw))
+
+    def evaluate(self, t: Array) -> Array:
+        """Components (k, 2) of a force, (k, 1) of a torque, at times t [N, N m].
+
+        Raises
+        ------
+        InputError
+            A law that does not cover a time or is not finite there.
+        """
+        try:
+            each = [
+                one.evaluate(t)[0] if isinstance(one, AngleLaw) else np.full(t.shape, one) for one in self.components
+            ]
+        except InputError as error:
+            raise error.within(f"load.{self.name}") from None
+        return np.stack(each, axis=1)
+
+    def largest(self, t: Array) -> float:
+        """The largest magnitude at times t, and where a law between them has a knot or a row [N, N m]."""
+        marks = [time for law in self.laws for time in (*law.knots, *getattr(law, "breaks", ()))]
+        within = [time for time in marks if np.min(t) <= time <= np.max(t)]
+        return float(np.max(np.linalg.norm(self.evaluate(np.concatenate([t, within])), axis=1)))
+
+
+@dataclass(frozen=True)
+class PointForce(_Load):
+    """A force [N] at a named point of a body, given in the ground frame; each component a number or a law in time."""
+
     kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
 
-    name: str
-    point: PointRef = field(metadata=said('"body.point"'))
-    force: tuple[float, float] = field(metadata=said("[x, y] in the ground frame in N", finite))
-
-    @property
-    def size(self) -> float:
-        """Magnitude of the force [N]."""
-        return math.hypot(*self.force)
+    force: tuple[InTime, InTime] = field(metadata=said("[x, y] in the ground frame in N", _finite_or_law))
 
 
 @dataclass(frozen=True)
-class AppliedTorque(CheckedFields):
-    """A constant torque [N m] on the material at a named point of a body."""
+class AppliedTorque(_Load):
+    """A torque [N m] on the material at a named point of a body, a number or a law in time."""
 
-    _table = "load"
     kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"
 
-    name: str
-    point: PointRef = field(metadata=said('"body.point"'))
-    torque: float = field(metadata=said("the torque in N m", finite))
-
-    @property
-    def size(self) -> float:
-        """Magnitude of the torque [N m]."""
-        return abs(self.torque)
+    torque: InTime = field(metadata=said("the torque in N m", _finite_or_law))
 
 
 Load = PointForce | AppliedTorque

@@ -36,7 +36,7 @@ def motion_page(data: xr.Dataset) -> Page:
     return Page(
         title=data.attrs["mechanism"],
         kind="run",
-        subtitle="left to its loads, prescribed motion and constant torques",
+        subtitle="left to its loads, prescribed motion and given torques",
         verdict=verdict_word(data),
         facts=common_facts(data),
         command=run_command_line(asked(data)),
@@ -67,12 +67,19 @@ def _table(data: xr.Dataset) -> str:
         ("constraint violation, velocity", f"{number(data['constraint_velocity_max'].item())} m/s"),
         ("imbalance of energy", f"{number(data['energy_balance_max'].item(), beside=energy_scale(data))} J"),
     ]
-    facts += [(f"torque of {text_symbol(str(name))}", f"{number(float(data['applied_torque'][k]))} N m")
-             for k, name in enumerate(data["motor"].values)]  # fmt: skip
+    facts += [(f"torque of {text_symbol(str(name))}", _torque(data["applied_torque"].sel(motor=name)))
+             for name in data["motor"].values]  # fmt: skip
     passed = json.loads(data.attrs.get("singular_positions", "[]"))
     if passed:
         facts.append(("singular positions passed", ", ".join(f"{t:.4g} s" for t in passed[:6])))
     return pairs(facts)
+
+
+def _torque(values: xr.DataArray) -> str:
+    """A constant torque, or the least and the largest of one in time."""
+    if "time" not in values.dims:
+        return f"{number(float(values))} N m"
+    return f"{number(float(values.min()))} to {number(float(values.max()))} N m"
 
 
 def _panels(data: xr.Dataset) -> list[Panel]:

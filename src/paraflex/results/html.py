@@ -10,6 +10,7 @@ from paraflex.display import facts, page, sentence, table, view
 from paraflex.dynamics.points import point_motion
 from paraflex.integrators import Solution
 from paraflex.integrators.methods import title_of
+from paraflex.mechanism import AngleLaw
 from paraflex.motion import MotionRun
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import deflections
@@ -58,12 +59,15 @@ def motion_run_html(run: MotionRun) -> str:
             ("strain energy, largest", f"{np.max(solution.strain_energy):.4g} J"),
         ]
         points = _last_places(run)
-    torques = [f"{name} {value:g}" for name, value in run.torques.items() if value]
+    given = {
+        name: "in time" if isinstance(law, AngleLaw) else f"{law:g}" for name, law in run.torques.items() if law != 0.0
+    }
+    torques = [f"{name} {value}" for name, value in given.items()]
     return page(
         title,
         sentence(solution.message),
         sentence(_verdict(run)),
-        facts([*energies, ("constant torques", torques), *_solver(solution, method)]),
+        facts([*energies, ("given torques", torques), *_solver(solution, method)]),
         table(("point", "x at the end [m]", "y [m]"), points),
     )
 

@@ -95,7 +95,7 @@ UNITS = (
         "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
         "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
         "point_velocity": ("velocity of a named point", "m/s"),
-        "applied_torque": ("constant motor torque", "N m"),
+        "applied_torque": ("given motor torque, over time where it changes", "N m"),
     }
     | VALIDITY_UNITS
     | STRESS_UNITS

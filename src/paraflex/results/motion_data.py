@@ -14,7 +14,7 @@ from paraflex.dynamics.points import point_motion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of
-from paraflex.mechanism import PointRef
+from paraflex.mechanism import AngleLaw, PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
@@ -65,8 +65,8 @@ def motion_dataset(
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v, a = solution.q, solution.v, solution.a
-    torques = np.array(list(run.torques.values()))
-    links = system_links(system, solution, np.tile(torques, (len(q), 1)), len(q))
+    torques = run.applied
+    links = system_links(system, solution, torques, len(q))
     named = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
     velocities = [point_motion(system, point, q, v, a).velocity for point in named]
     values: Variables = {
@@ -82,7 +82,10 @@ def motion_dataset(
     }
     data |= {name: getattr(solution, name) for name in RUN_FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
-    data["applied_torque"] = (("motor",), torques)
+    if any(isinstance(law, AngleLaw) for law in run.torques.values()):
+        data["applied_torque"] = (("time", "motor"), padded(torques, run.times.size))
+    else:
+        data["applied_torque"] = (("motor",), np.array(list(run.torques.values()), dtype=float))
     coordinates = {"time": run.times, "coordinate": _coordinate_names(run), **link_coordinates(system, links)}
     out = with_totals(xr.Dataset(data, coords=coordinates))
     label(out, mechanism)

@@ -15,6 +15,7 @@ from paraflex.dynamics.points import point_motion
 from paraflex.errors import IntegrationError
 from paraflex.integrators import IntegrationOptions, Solution, check_times
 from paraflex.mechanism import ActuationMode, Mechanism, PointRef
+from paraflex.mechanism.loads import InTime
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
@@ -82,7 +83,7 @@ def motion_case(
     duration: float,
     *,
     samples: int = 701,
-    torques: Mapping[str, float] | None = None,
+    torques: Mapping[str, InTime] | None = None,
     start: State,
 ) -> Case:
     """A mechanism's motion without a path; the error is the end-effector's, or else the largest of all named points.

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from paraflex.arrays import Array
+from paraflex.errors import InputError
 from paraflex.findings import Finding
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, PointForce
 from paraflex.mechanism.bodies import Body
@@ -26,7 +28,7 @@ LONG = 5.0
 _G = 9.81
 
 
-def doubtful_actions(mechanism: Mechanism, size: float, mass: float) -> Iterator[Finding]:
+def doubtful_actions(mechanism: Mechanism, size: float, mass: float, times: Array) -> Iterator[Finding]:
     """Findings about joints, springs, friction, damping and loads, from the description alone.
 
     Parameters
@@ -36,6 +38,8 @@ def doubtful_actions(mechanism: Mechanism, size: float, mass: float) -> Iterator
         The largest of its lengths [m].
     mass : float
         Of all its bodies [kg].
+    times : (k,) array
+        At which loads in time are looked at [s].
     """
     yield from _twice(mechanism)
     yield from _beside(mechanism)
@@ -44,7 +48,7 @@ def doubtful_actions(mechanism: Mechanism, size: float, mass: float) -> Iterator
     yield from _sharp(mechanism)
     if mass > 0.0 and size > 0.0:
         yield from _rubbing(mechanism, size, mass * _G)
-        yield from _loaded(mechanism, size, mass * _G)
+        yield from _loaded(mechanism, size, mass * _G, times)
 
 
 def _twice(mechanism: Mechanism) -> Iterator[Finding]:
@@ -155,14 +159,19 @@ def _rubbing(mechanism: Mechanism, size: float, weight: float) -> Iterator[Findi
             )  # fmt: skip
 
 
-def _loaded(mechanism: Mechanism, size: float, weight: float) -> Iterator[Finding]:
+def _loaded(mechanism: Mechanism, size: float, weight: float, times: Array) -> Iterator[Finding]:
     most = (LOADED if any(mechanism.gravity) else LOADED_AT_REST) * weight
     for load in mechanism.loads:
         force = isinstance(load, PointForce)
-        if load.size > (most if force else most * size):
+        try:
+            largest = load.largest(times)
+        except InputError:
+            # As of a prescribed law: a run that does not end earlier says what is wrong.
+            continue
+        if largest > (most if force else most * size):
             yield Finding(
-                "load-large", f"load.{load.name}.{'force' if force else 'torque'}",
-                f"{load.size:.3g} {load.unit}, where all bodies weigh {weight:.3g} N"
+                "load-large", f"load.{load.name}.{load.kind}",
+                f"{'up to ' if load.laws else ''}{largest:.3g} {load.unit}, where all bodies weigh {weight:.3g} N"
                 + ("" if force else f", in a mechanism of {size:.3g} m"),
                 f"it is in {load.unit}: is it in another unit, or are masses?",
             )  # fmt: skip

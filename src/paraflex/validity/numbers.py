@@ -11,6 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.findings import Finding
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, Rectangle, RigidBody, Section
@@ -75,14 +76,15 @@ def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> lis
     """
     size = mechanism_size(mechanism)
     found = [*_lengths(mechanism, size), *_gravity(mechanism.gravity), *_angles(mechanism), *_drives(mechanism)]
-    found += _laws(mechanism, size, duration or 0.0)
+    times = np.linspace(0.0, duration or 0.0, _LOOKS)
+    found += _laws(mechanism, size, times)
     for body in mechanism.bodies:
         if isinstance(body, Beam):
             found += _beam(body, size)
         elif isinstance(body, RigidBody):
             found += _rigid(body, size)
     found += [*_masses(mechanism, size), *_hinges(mechanism), *_one_place(mechanism, size)]
-    return _shared([*found, *doubtful_actions(mechanism, size, mechanism_mass(mechanism))])
+    return _shared([*found, *doubtful_actions(mechanism, size, mechanism_mass(mechanism), times)])
 
 
 def _shared(found: Iterable[Finding]) -> list[Finding]:
@@ -180,13 +182,13 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _laws(mechanism: Mechanism, size: float, duration: float) -> Iterator[Finding]:
+def _laws(mechanism: Mechanism, size: float, times: Array) -> Iterator[Finding]:
     """Angles in time: degrees show in where they start, and how far they swing to and fro."""
     for one in mechanism.prescribed:
         if mechanism.slides(one.joint):
             continue
         try:
-            angle, rate, _ = one.law.evaluate(np.linspace(0.0, duration, _LOOKS))
+            angle, rate, _ = one.law.evaluate(times)
         except InputError:
             # A run that ends earlier may be asked for; one that does not says what is wrong with the law.
             continue

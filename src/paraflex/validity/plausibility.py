@@ -114,13 +114,13 @@ def doubtful_results(
         *_large_forces(where, system, solution),
     ]
     if driven is not None:
-        found += [*_lost(where, driven), *_large_torques(where, system, driven)]
+        found += [*_lost(where, driven), *_large_torques(where, system, driven, solution.t)]
     return found
 
 
-def doubtful_torques(system: System, driven: Driven) -> list[Finding]:
-    """Findings about the torques and forces of a plan, before anything runs."""
-    return list(_large_torques(_Where(f"mode {driven.mode}", system.mechanism), system, driven))
+def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
+    """Findings about the torques and forces of a plan at times t (k,), before anything runs."""
+    return list(_large_torques(_Where(f"mode {driven.mode}", system.mechanism), system, driven, t))
 
 
 def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
@@ -187,10 +187,10 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _large_torques(where: _Where, system: System, driven: Driven) -> Iterator[Finding]:
+def _large_torques(where: _Where, system: System, driven: Driven, t: Array) -> Iterator[Finding]:
     mechanism = where.mechanism
     size = mechanism_size(mechanism) or system.size
-    force, turning = _expected(system, mechanism, driven.acceleration)
+    force, turning = _expected(system, mechanism, driven.acceleration, t)
     for motor, peak in driven.peaks.items():
         unit = driven.units[motor]
         expected = force * size + turning if unit == "N m" else force + turning / size
@@ -203,10 +203,10 @@ def _large_torques(where: _Where, system: System, driven: Driven) -> Iterator[Fi
             )  # fmt: skip
 
 
-def _expected(system: System, mechanism: Mechanism, acceleration: float) -> tuple[float, float]:
+def _expected(system: System, mechanism: Mechanism, acceleration: float, t: Array) -> tuple[float, float]:
     """The force that accelerates and holds the whole mass, with all loads [N]; and all torques applied [N m]."""
-    loads = sum(one.size for one in mechanism.loads if isinstance(one, PointForce))
-    turning = sum(one.size for one in mechanism.loads if not isinstance(one, PointForce))
+    loads = sum(one.largest(t) for one in mechanism.loads if isinstance(one, PointForce))
+    turning = sum(one.largest(t) for one in mechanism.loads if not isinstance(one, PointForce))
     felt = max(acceleration + math.hypot(*mechanism.gravity), _LEAST_ACCELERATION)
     return system.total_mass * felt + loads, turning
 
@@ -218,7 +218,7 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
     # A mechanism of one point has no size of its own.
     size = mechanism_size(where.mechanism) or system.size
     accelerations = np.stack([np.linalg.norm(solution.a[:, body.position], axis=1) for body in system.bodies])
-    expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))))
+    expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))), solution.t)
     # NaN at singular positions, and of rows that a method has no multipliers of.
     lasting = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _LASTING, axis=0)
     lasting[system.packed.rows["kind"] != CONSTRAINT] = 0.0
@@ -249,7 +249,7 @@ def _moving(mechanism: Mechanism, solution: Solution) -> str:
         rate = float(np.max(np.abs(one.law.evaluate(solution.t)[1])))
         unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
         named.append(f"prescribed.{one.name} (up to {rate:.3g} {unit})")
-    named += [f"load.{load.name} ({load.size:.3g} {load.unit})" for load in mechanism.loads]
+    named += [f"load.{load.name} ({load.largest(solution.t):.3g} {load.unit})" for load in mechanism.loads]
     return f": {', '.join(named)}" if named else ""
 
 

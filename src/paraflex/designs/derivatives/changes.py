@@ -21,6 +21,7 @@ from paraflex.designs.setting import Setting
 from paraflex.dynamics import (
     InputSignals,
     System,
+    acting_loads,
     build_system,
     numbers_of,
     pack_signals,
@@ -33,7 +34,7 @@ from paraflex.integrators.run import make_problem
 from paraflex.integrators.sensitivity import Direction
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
-from paraflex.kernel.packed import make_scratch
+from paraflex.kernel.packed import Signals, make_scratch
 from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
 from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
@@ -186,6 +187,13 @@ class Change:
     @cached_property
     def knots(self) -> Numbers:
         """Knots of the path, with a complex step."""
+        laws = [law for load in self.planned.mechanism.loads for law in load.laws]
+        if any(law.knots for law in laws):
+            raise InputError(
+                "loads whose law has pieces: no derivative of the torques that a path takes",
+                field="load",
+                remedy="give their laws as one expression or a table",
+            )
         knots = path_knots(self.there.path, self.there.end)
         if knots.size != self.planned.plan.knots.size:
             raise InputError(
@@ -255,7 +263,7 @@ class Change:
         )  # fmt: skip
         system = replace(self.system, packed=problem.system.packed)
         task = replace(self.planned, mechanism=self.planned.mechanism, system=system, motion=sampled.with_step())
-        error = max(self.stepped.error, _relative(signals, numbers_of(problem.signals)))
+        error = max(self.stepped.error, _relative(signals, numbers_of(problem.signals), _sizes(problem.signals)))
         condition = _condition(nominal.condition, sampled, nominal.torques)
         return ModeChange(direction, task, torques, condition, error)
 
@@ -352,16 +360,26 @@ class _Planned:
         """Forces of inertia, weight and loads, with a complex step."""
         motion, change, here = self.motion, self.change, self.motion.system.packed
         numbers, d_numbers = numbers_of(here), part(numbers_of(self.owner.rigid.packed))
+        acting, d_acting = self._loads()
 
         def at(place: float) -> Array:
             forces = apart(motion.q.shape)
             packed = with_numbers(here, numbers + place * d_numbers)
             moved = (x + place * dx for x, dx in zip((motion.q, motion.v, motion.a), change, strict=False))
-            motion_forces(packed, *moved, forces, make_scratch(packed))
+            motion_forces(packed, *moved, acting + place * d_acting, forces, make_scratch(packed))
             return forces
 
         stencil = STENCILS[0]
         return stepped(at(0.0), stencil.derivative([at(place) for place in stencil.places]).value)
+
+    def _loads(self) -> tuple[Array, Array]:
+        """Loads in time (k, acting) and their derivative, at instants that move with the parameter."""
+        owner, t, d_times = self.owner, np.real(self.times), part(self.times)
+        moved = [
+            acting_loads(near.mechanism, np.maximum(t + place * d_times, 0.0))
+            for near, place in zip(owner.near, owner.stencil.places, strict=True)
+        ]
+        return acting_loads(owner.planned.mechanism, t), owner.stencil.derivative(moved).value
 
     def torques(self, mode: ActuationMode) -> tuple[Array, Array]:
         """Torques (k, motors) of minimum norm and their derivative.
@@ -406,7 +424,15 @@ def _moved(task: Task, k: int, by: float) -> Task:
     return task._replace(values=(*values[:k], values[k] + by, *values[k + 1 :]))
 
 
-def _relative(difference: Difference, numbers: Array) -> float:
-    """The largest error of differences relative to the largest number or derivative."""
-    size = max(np.max(np.abs(difference.value), initial=0.0), np.max(np.abs(numbers), initial=0.0))
-    return float(np.max(difference.error, initial=0.0) / size) if size > 0.0 else 0.0
+def _sizes(signals: Signals) -> Array:
+    """What each number of signals is multiplied by in their values: a power of the length of its piece."""
+    # The last piece of a signal is none, and its coefficients are zero.
+    lengths = np.abs(np.append(np.diff(signals.breaks), 0.0))
+    powers = np.arange(signals.coefficients.shape[1])
+    return numbers_of(signals._replace(breaks=np.ones(lengths.size), coefficients=lengths[:, None] ** powers))
+
+
+def _relative(difference: Difference, numbers: Array, sizes: Array) -> float:
+    """The largest error of differences relative to the largest number or derivative, each times its size."""
+    size = max(np.max(np.abs(sizes * difference.value), initial=0.0), np.max(np.abs(sizes * numbers), initial=0.0))
+    return float(np.max(sizes * difference.error, initial=0.0) / size) if size > 0.0 else 0.0
