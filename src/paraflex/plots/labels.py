@@ -165,10 +165,8 @@ def plain(name: str) -> str:
 
 
 def mode_label(name: str) -> str:
-    """A mode's name; signs in circles, as in the paper, if it is a row of signs."""
-    if is_signs(name):
-        return name.replace("+", "⊕").replace("-", "⊖")
-    return name.replace("$", r"\$")
+    """A mode's name as everywhere else, signs as signs; Matplotlib does not read it as mathematics."""
+    return plain(name)
 
 
 def is_signs(name: str) -> bool:

@@ -40,7 +40,7 @@ _AXIS_LABEL = 3.8
 _RIGHT = 3.6  # half of a number such as 0.030
 
 # Widths of the letters of numbers [em] in DejaVu Sans, and its size on the axes [mm].
-_DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838, "⊕": 0.838, "⊖": 0.838}
+_DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838}
 _EM = STYLE["ytick.labelsize"] / 72.0 * 25.4
 # Width of a letter of a title, and by how much titles may be wider than their panels, where they are centred [mm].
 _LETTER = 0.6 * STYLE["axes.titlesize"] / 72.0 * 25.4

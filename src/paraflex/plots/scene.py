@@ -5,6 +5,7 @@ Matplotlib (`plots/drawing.py`), files of SVG (`plots/svg.py`) and the player of
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -53,13 +54,19 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True)
 class DrawnJoint:
-    """A joint at the f times of a scene: its kind, whether it is on the ground, places (f, 2), directions (f,)."""
+    """A joint at the f times of a scene: its kind, whether it is on the ground, places (f, 2), directions (f,).
+
+    `driven` is whether a motor is there; `rail` a point (f, 2) of the moving body that carries its axis, None where the
+    ground does or a beam is the axis.
+    """
 
     name: str
     kind: str
     grounded: bool
     place: Array
     direction: Array
+    driven: bool = False
+    rail: Array | None = None
 
     @property
     def slides(self) -> bool:
@@ -190,12 +197,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     owners = run["station_body"].values
     bodies = {str(name): owners == name for name in dict.fromkeys(owners.tolist())}
     places, directions = run["joint_position"].values.astype(float), run["joint_direction"].values.astype(float)
-    joints = tuple(
-        DrawnJoint(str(name), str(kind), bool(grounded), at(places[:, i]), at(directions[:, i]))
-        for i, (name, kind, grounded) in enumerate(
-            zip(run["joint"].values, run["joint_kind"].values, run["joint_grounded"].values, strict=True)
-        )
-    )
+    joints = _joints(run, drawn, at)
     springs, followed = _springs(run, drawn), followed_station(run)
     seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
     seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
@@ -216,6 +218,21 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
         reached=float(time[-1]),
         limits=limits_of(_with_rails(np.concatenate([one.reshape(-1, 2) for one in seen]), joints)),
     )
+
+
+def _joints(run: xr.Dataset, drawn: Array, at: Callable[[Array], Array]) -> tuple[DrawnJoint, ...]:
+    """Joints of a run; results of earlier versions do not say which have motors, and rails on moving bodies."""
+    names, count = run["joint"].values, run.sizes["joint"]
+    driven = run["joint_driven"].values if "joint_driven" in run else np.zeros(count, dtype=bool)
+    rails = run["joint_rail"].values if "joint_rail" in run else np.full(count, -1)
+    return tuple(
+        DrawnJoint(
+            str(names[i]), str(run["joint_kind"].values[i]), bool(run["joint_grounded"].values[i]),
+            at(run["joint_position"].values[:, i].astype(float)), at(run["joint_direction"].values[:, i].astype(float)),
+            bool(driven[i]), at(drawn[:, int(rails[i])]) if rails[i] >= 0 else None,
+        )
+        for i in range(count)
+    )  # fmt: skip
 
 
 class _Sampler:
@@ -348,7 +365,13 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
         bodies={name: places[chosen] for name, places in shown.bodies.items()},
         stiff={name: places[chosen] for name, places in shown.stiff.items()},
         joints=tuple(
-            replace(joint, place=joint.place[chosen], direction=joint.direction[chosen]) for joint in shown.joints
+            replace(
+                joint,
+                place=joint.place[chosen],
+                direction=joint.direction[chosen],
+                rail=None if joint.rail is None else joint.rail[chosen],
+            )
+            for joint in shown.joints
         ),
         springs={name: ends[chosen] for name, ends in shown.springs.items()},
         gears=tuple(DrawnGear(gear.name, tuple(line[chosen] for line in gear.lines)) for gear in shown.gears),

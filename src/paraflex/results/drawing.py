@@ -126,13 +126,18 @@ def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
         return np.array([pose.position or (np.nan, np.nan)]), np.array([pose.angle])
 
     shapes = {one.body: turned(*frame(one.body), one.places) for one in outlines(mechanism)}
-    one = drawing(mechanism, shapes, lambda ref: frame(ref.body)[1], frame)
+    return drawing_data(mechanism, drawing(mechanism, shapes, lambda ref: frame(ref.body)[1], frame), np.zeros(1))
+
+
+def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
+    """A drawing at times (k,) as a run: what is drawn, and nothing else."""
     points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+    effector = mechanism.end_effector
     return xr.Dataset(
         {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(one).items()},
-        coords={"time": [0.0], "point": points, "joint": [joint.name for joint in mechanism.joints],
+        coords={"time": time, "point": points, "joint": [joint.name for joint in mechanism.joints],
                 **drawing_coordinates(mechanism)},
-        attrs={"mechanism": mechanism.name},
+        attrs={"mechanism": mechanism.name} | ({} if effector is None else {"end_effector_point": str(effector.point)}),
     )  # fmt: skip
 
 
@@ -152,7 +157,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     """Labels of these variables: bodies of the stations, stations of the points, kinds of the joints.
 
     Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
-    -1.
+    -1, and so has the rail of a joint without one on a moving body.
     """
     drawn = outlines(mechanism)
     first = dict(zip([one.body for one in drawn], np.cumsum([0, *(len(one.places) for one in drawn)]), strict=False))
@@ -162,6 +167,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         for point in body.points
     }
     joints, springs = mechanism.joints, mechanism.linear_springs
+    driven = {motor.joint for motor in mechanism.motors}
     of_springs: dict[str, Any] = {}
     if springs:
         ends = [[stations.get(ref, -1) for ref in (spring.a, spring.b)] for spring in springs]
@@ -184,9 +190,16 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
         "joint_kind": ("joint", [joint.symbol for joint in joints]),
         "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
+        "joint_driven": ("joint", np.array([joint.name in driven for joint in joints], dtype=bool)),
+        "joint_rail": ("joint", np.array([_rail_station(joint, stations) for joint in joints], dtype=np.int32)),
         **of_springs,
         **of_gears,
     }
+
+
+def _rail_station(joint: Joint, stations: Mapping[PointRef, int]) -> int:
+    """The station that a joint's rail goes through; the rail of what slides along a beam is the beam."""
+    return stations.get(joint.a, -1) if joint.slides and not joint.follows_beam else -1
 
 
 def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
