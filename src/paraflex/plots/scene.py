@@ -5,7 +5,7 @@ Matplotlib (`plots/drawing.py`), files of SVG (`plots/svg.py`) and the player of
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -28,6 +28,10 @@ _MARGIN = 0.07
 _SCALE_BAR = 0.28
 # A point that moves by less is at rest [m].
 _STILL_POINT = 1e-6
+# What deflections are drawn by default: at most this share of the mechanism's size, and not magnified where the largest
+# of these leaves them below the second.
+MAGNIFICATIONS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+_SHOWN_BENDING, _UNSEEN_BENDING = 0.08, 0.005
 # Shares of all places in percent between which a run is that does not come apart.
 _RUN_SHARES = (0.2, 99.8)
 
@@ -235,6 +239,20 @@ def _joints(run: xr.Dataset, drawn: Array, at: Callable[[Array], Array]) -> tupl
     )  # fmt: skip
 
 
+def default_magnification(runs: Sequence[xr.Dataset]) -> float:
+    """The largest of MAGNIFICATIONS at which no deflection of runs exceeds 8 % of the mechanism's size; else 1."""
+    bent, size = 0.0, 0.0
+    for run in runs:
+        shape, base = (run[name].values.reshape(-1, 2).astype(float) for name in ("shape", "shape_base"))
+        known = np.isfinite(shape).all(axis=1) & np.isfinite(base).all(axis=1)
+        if known.any():
+            bent = max(bent, float(np.max(np.linalg.norm((shape - base)[known], axis=1))))
+            size = max(size, float(np.max(np.ptp(base[known], axis=0))))
+    if MAGNIFICATIONS[-1] * bent <= _UNSEEN_BENDING * size:
+        return 1.0
+    return max((one for one in MAGNIFICATIONS if one * bent <= _SHOWN_BENDING * size), default=1.0)
+
+
 class _Sampler:
     """Linear interpolation between samples; constant beyond the last."""
 
@@ -250,20 +268,24 @@ class _Sampler:
 
 
 def followed_station(run: xr.Dataset) -> int | None:
-    """The station whose trail is drawn: the end-effector's, or that of the free point with the longest way."""
+    """The station whose trail is drawn: the end-effector's, else that of the longest way, free points before joints."""
     points = names_of(run, "point")
     stations = run["point_station"].values
     if run.attrs.get("end_effector_point") in points:
         return int(stations[points.index(run.attrs["end_effector_point"])])
     shape, joints = run["shape"].values.astype(float), run["joint_position"].values.astype(float)
-    travelled = {}
+    ways, free = {}, []
     for station in stations.tolist():
         place = shape[:, station]
         apart = np.linalg.norm(joints - place[:, None], axis=-1)
+        ways[station] = float(np.sum(np.linalg.norm(np.diff(place, axis=0), axis=-1)))
         if not (joints.size and np.min(np.max(apart, axis=0)) < _STILL_POINT):
-            travelled[station] = float(np.sum(np.linalg.norm(np.diff(place, axis=0), axis=-1)))
-    farthest = max(travelled, key=lambda station: travelled[station], default=None)
-    return farthest if farthest is not None and travelled[farthest] >= _STILL_POINT else None
+            free.append(station)
+    for chosen in (free, [*ways]):
+        farthest = max(chosen, key=lambda station: ways[station], default=None)
+        if farthest is not None and ways[farthest] >= _STILL_POINT:
+            return farthest
+    return None
 
 
 def _anchors(run: xr.Dataset) -> tuple[Array, ...]:

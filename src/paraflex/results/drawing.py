@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 # Joints of wheels and of racks: whether they slide, and what they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
+# How far a rack's axis is from its pinion, in radii.
+_NEAREST, _FARTHEST = 0.5, 2.0
 
 
 @dataclass(frozen=True)
@@ -206,7 +208,8 @@ def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
     """Radii of two external gears, or of a pinion and its rack, at joints on one body or the ground.
 
     Of a rack, whose joint slides without turning, infinity: positive where its pitch line lies to the right of the
-    joint's direction as seen from the pinion, else negative. NaN of anything else [m].
+    joint's direction as seen from the pinion, else negative. NaN of anything else [m], also where the rack's axis is
+    not about a radius from the pinion: a screw's ratio is no radius.
     """
     unknown = np.nan, np.nan
     joints = first, second = [mechanism.joint(name) for name in one.joints]
@@ -218,16 +221,24 @@ def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
     # Ratio of their rotations and travels relative to the carrier.
     sides = [1.0 if joint.a.body == carrier else -1.0 for joint in joints]
     ratio = one.transmission * sides[0] * sides[1]
-    if kinds == [_WHEEL, _RACK]:
-        return abs(ratio), np.copysign(np.inf, ratio)
-    if kinds == [_RACK, _WHEEL]:
-        return np.copysign(np.inf, ratio), abs(1.0 / ratio)
-    if kinds == [_RACK, _RACK] or ratio > 0.0:
-        return unknown
     places = mechanism.ground if carrier == GROUND else local_points(mechanism.body(carrier))
     ends = [places[(joint.a if joint.a.body == carrier else joint.b).point] for joint in joints]
+    if kinds in ([_WHEEL, _RACK], [_RACK, _WHEEL]):
+        radius, rack = (abs(ratio), 1) if kinds[1] == _RACK else (abs(1.0 / ratio), 0)
+        if not _touches(joints[rack], sides[rack], np.subtract(ends[rack], ends[1 - rack]), radius):
+            return unknown
+        return (radius, np.copysign(np.inf, ratio)) if rack else (np.copysign(np.inf, ratio), radius)
+    if kinds == [_RACK, _RACK] or ratio > 0.0:
+        return unknown
     apart = float(np.hypot(*np.subtract(ends[1], ends[0])))
     return apart * ratio / (ratio - 1.0), apart / (1.0 - ratio)
+
+
+def _touches(rail: Joint, side: float, arm: Array, radius: float) -> bool:
+    """Whether a rail is about a radius from a pinion, at an arm from it in their carrier."""
+    direction = rail.direction - (0.0 if side > 0.0 else rail.angle)
+    distance = abs(arm[0] * np.sin(direction) - arm[1] * np.cos(direction))
+    return bool(_NEAREST * radius <= distance <= _FARTHEST * radius)
 
 
 def _base(
