@@ -38,7 +38,7 @@ def test_verify_prints_and_saves_how_models_agree(tmp_path):
     kept = float(data["tracking_rms"].sel(model="linear", mode="++++"))
     # Sums of the same squares, in another order.
     assert models["linear"]["tracking_error"] == pytest.approx(kept, rel=1e-14)
-    assert {path.name for path in (out / "figures").iterdir()} >= {"model_distances.png", "fig22_links_++++.svg"}
+    assert {path.name for path in (out / "figures").iterdir()} >= {"model_distances.png", "compared_links_++++.svg"}
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_run_at_other_fidelities(tmp_path, flag, extra, largest):
     assert summary["parameters"]["run"][flag[2:]]
     data = load_results(tmp_path / "results.nc")
     assert list(data["body"].values) == [f"link{i}" for i in range(1, 9)]
-    assert (tmp_path / "figures" / "fig14_link_motions.png").exists()
+    assert (tmp_path / "figures" / "link_motions.png").exists()
 
 
 @pytest.mark.parametrize(

@@ -95,7 +95,7 @@ def rack(radius=0.04, **more):
     """A pinion on a pin and a rack on an inclined rail."""
     return Mechanism(
         name="rack and pinion",
-        ground={"A": (0.0, 0.0), "R": (0.1, 0.05)},
+        ground={"A": (0.0, 0.0), "R": (0.157, 0.04)},
         bodies=(wheel("pinion", 3e-4), RigidBody("rack", 0.8, 1e-3, (0.1, 0.0), {"R": (0.0, 0.0)})),
         joints=(
             RevoluteJoint("A", ref("ground.A"), ref("pinion.O")),
@@ -335,7 +335,7 @@ def test_a_phase_is_as_the_first_assembly_stands(make, phase):
 def test_the_phase_of_a_rack_counts_its_travel():
     pushed = rack()
     assembly = Assembly(
-        "start", {"pinion": 0.5, "rack": 0.5}, {ref("rack.R"): (0.1 + 0.3 * np.cos(0.5), 0.05 + 0.3 * np.sin(0.5))}
+        "start", {"pinion": 0.5, "rack": 0.5}, {ref("rack.R"): (0.157 + 0.3 * np.cos(0.5), 0.04 + 0.3 * np.sin(0.5))}
     )
     phase = replace(pushed, gears=(replace(pushed.gears[0], phase=None),), assemblies=(assembly,)).gears[0].phase
     assert phase == pytest.approx(0.3 - 0.04 * 0.5)
@@ -496,6 +496,8 @@ fields = ["parameters.l1"]
         (planetary, (0.04, 0.03)),
         (lambda: train(-2.0), (0.2, 0.1)),
         (lambda: train(2.0), None),
+        # A screw: the ratio is no radius.
+        (lambda: rack(0.5), None),
         (rack, (0.04, np.inf)),
         (lambda: rack(-0.04), (0.04, -np.inf)),
         (lambda: turned(rack(), "A"), (0.04, -np.inf)),

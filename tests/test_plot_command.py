@@ -225,7 +225,7 @@ def test_png_has_the_dots_asked_for(results: Path, tmp_path: Path) -> None:
 
 def test_names_of_the_files_of_a_run_are_names_too(results: Path) -> None:
     source = open_source(results / "tracking")
-    assert find_figure(source, "fig18_tracking_errors").name == "tracking_errors"
+    assert find_figure(source, "tracking_errors").name == "tracking_errors"
 
 
 def test_a_misspelt_figure_names_the_nearest_and_lists_all(results: Path) -> None:
@@ -243,7 +243,7 @@ def test_modes_are_chosen_and_unknown_ones_refused(results: Path) -> None:
     figure = find_figure(source, "link_motions")
     assert [each.stem for each in drawings(source, figure, ["+-", "++"])] == ["link_motions_+-", "link_motions_++"]
     (one,) = drawn(source, "tracking_errors", modes=["+-"])
-    assert [axes.get_title()[:2] for axes in one.axes if axes.get_visible()] == ["⊕⊖"]
+    assert [axes.get_title()[:2] for axes in one.axes if axes.get_visible()] == ["+-"]
     for kind, name in (("tracking", "tracking_errors"), ("verification", "compared_links"), ("sweep", "pareto_front")):
         with pytest.raises(InputError, match="no such mode"):
             drawn(open_source(results / kind), name, modes=["--"])

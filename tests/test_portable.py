@@ -99,7 +99,7 @@ def test_signals_and_workers_do_without_what_windows_lacks(monkeypatch):
 @pytest.mark.parametrize(
     ("text", "name"),
     [
-        ("fig11_desired_path", "fig11_desired_path"),
+        ("desired_path", "desired_path"),
         ("responses_+-0+", "responses_+-0+"),
         ("path a/b", "path a_b"),
         ('a:b*c?"<>|\\\n', "a_b_c_______"),

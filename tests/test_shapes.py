@@ -257,7 +257,7 @@ def test_a_body_held_at_three_corners_passes_through_them():
 
 
 def test_what_slides_along_a_beam_stays_on_it():
-    """A bead on a beam between two pins: the beam drawn stiff has a kink where the bead is."""
+    """A bead on a beam between two pins: the beam drawn stiff goes through the bead."""
     beam = FlexibleBeam("beam", 1.0, SECTION, STEEL, points={"A": 0.0, "B": 1.0}, elements=2)
     ref = PointRef.parse
     mechanism = Mechanism(
@@ -275,7 +275,7 @@ def test_what_slides_along_a_beam_stays_on_it():
     drawn = system_drawing(system, q)
     bead = drawn.shape[0, -1]
     assert abs(bead[1]) > 1e-3
-    # It stands within a station's width of place 6 / 16; the kink of the base is there.
+    # It stands within a station's width of place 6 / 16.
     gap = np.interp(bead[0], drawn.base[0, :17, 0], drawn.base[0, :17, 1]) - bead[1]
     assert abs(gap) < 0.1 * abs(bead[1])
     magnified = drawn.base + 50.0 * (drawn.shape - drawn.base)

@@ -116,7 +116,7 @@ def test_the_dataset_has_all_models_and_survives_a_file(verification, tmp_path):
 def test_figures_overlay_the_models(verification, tmp_path):
     data = verification.data
     written = plots.save_figures(data, tmp_path)
-    names = ["fig22_links_++++", "fig23_paths_++++", "model_distances"]
+    names = ["compared_links_++++", "compared_paths_++++", "model_distances"]
     assert [path.name for path in written] == [f"{name}.{suffix}" for name in names for suffix in ("png", "svg")]
     links = plots.compared_links(data, "++++", ("second-order", "segments"))
     assert len(links.axes) == 16

@@ -51,7 +51,7 @@ class Manifest:
     identity : str
         A digest of the results without figures, report and exports: the same wherever they are copied to.
     files : mapping of str to str
-        Digests of the bytes of all files, by their names within the folder ("figures/fig11_desired_path.png").
+        Digests of the bytes of all files, by their names within the folder ("figures/desired_path.png").
     """
 
     kind: str

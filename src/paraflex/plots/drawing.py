@@ -19,7 +19,17 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import mode_label, three_digits
 from paraflex.plots.layout import page_width
 from paraflex.plots.marks import LOOKS, by_look, moving_marks, still_marks
-from paraflex.plots.scene import Limits, Scene, figure_of, is_plate, run_times, scale_bar, scene, select
+from paraflex.plots.scene import (
+    Limits,
+    Scene,
+    default_magnification,
+    figure_of,
+    is_plate,
+    run_times,
+    scale_bar,
+    scene,
+    select,
+)
 from paraflex.plots.themes import Theme, theme
 
 Array = NDArray[np.float64]
@@ -157,7 +167,7 @@ def mechanism_drawing(
     data: xr.Dataset,
     mode: str | None = None,
     time: float | None = None,
-    magnify: float = 1.0,
+    magnify: float | None = None,
     *,
     model: str | None = None,
     width: float = 84.0,
@@ -169,8 +179,9 @@ def mechanism_drawing(
     ----------
     time : float, optional
         [s]; half way by default.
-    magnify : float
-        How many times deflections are drawn: joints stay where they are, links bend more.
+    magnify : float, optional
+        How many times deflections are drawn: joints stay where they are, links bend more. By default a round number at
+        which bending is seen.
     model : str, optional
         Of a verification; the reference by default.
     width : float
@@ -185,6 +196,7 @@ def mechanism_drawing(
     if not first <= time <= last:
         raise InputError("outside the run", field="time", value=time, remedy=f"choose it from {first:g} to {last:g} s")
     until = run["time"].values
+    magnify = default_magnification([run]) if magnify is None else magnify
     shown = scene(run, np.append(until[until < time], time), magnify)
     limits = shown.limits
     aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), 0.4, 1.25))

@@ -17,26 +17,33 @@ from paraflex.plots.style import ZERO
 # Names of the curves, in every figure of energies.
 ENERGIES = {"kinetic_energy": "kinetic energy", "strain_energy": "strain energy", "work": "work done on it"}
 
+# Share of the largest energy that rounding errors stay below.
+_ROUNDING = 1e-12
+
 
 @drawn
 def energies(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Kinetic and strain energy and the work done on the mechanism; strain energy alone; imbalance of energy.
 
-    The imbalance is |kinetic + strain energy - those at the start - work|, at the samples.
+    The imbalance is |kinetic + strain energy - those at the start - work|, at the samples. What is zero throughout has
+    no panel.
     """
     run = one_run(data, mode)
     curves = {label: run[name].values for name, label in ENERGIES.items()}
     kinetic, strain, work = curves.values()
     imbalance = np.abs(kinetic + strain - kinetic[0] - strain[0] - work)
-    figure, axes = panels(3, 1)
-    every, elastic, balance = axes[:, 0]
+    # Rounding errors would extend the logarithmic axis.
+    imbalance = np.where(imbalance > _ROUNDING * max(map(peak, curves.values())), imbalance, 0.0)
+    figure, axes = panels(1 + (peak(strain) > 0.0) + (peak(imbalance) > 0.0), 1)
+    every, *rest = axes[:, 0]
     draw_curves(every, run, curves)
     every.axhline(0.0, **ZERO)
-    # The same colour as above.
-    draw_curves(elastic, run, {"kinetic energy": np.full_like(strain, np.nan), "strain energy": strain})
-    draw_curves(balance, run, {"imbalance": np.where(imbalance > 0.0, imbalance, np.nan)}, first=3)
+    if peak(strain) > 0.0:
+        # The same colour as above.
+        draw_curves(rest.pop(0), run, {"strain energy": strain}, first=1)
     if peak(imbalance) > 0.0:
-        mark_powers(balance)
+        draw_curves(rest[0], run, {"imbalance": np.where(imbalance > 0.0, imbalance, np.nan)}, first=3)
+        mark_powers(rest[0])
     for panel in axes.flat:
         panel.set_ylabel(axis_label("energy"))
     return finish_over_time(figure, axes, data, panel_height=34.0)

@@ -12,7 +12,7 @@ import xarray as xr
 from paraflex.errors import InputError
 from paraflex.plots.film_files import find_encoder, write_film
 from paraflex.plots.film_pictures import FOOT, HEAD, Film
-from paraflex.plots.scene import Scene, common_limits, run_times, scene, select
+from paraflex.plots.scene import Scene, common_limits, default_magnification, run_times, scene, select
 from paraflex.plots.themes import theme
 from paraflex.writing import whole_file, whole_folder
 
@@ -33,8 +33,8 @@ class FilmOptions:
 
     Attributes
     ----------
-    magnify : float
-        How many times deflections are drawn.
+    magnify : float, optional
+        How many times deflections are drawn; by default a round number at which bending is seen.
     fps : float
         Pictures a second; GIFs count in hundredths of a second.
     speed : float, optional
@@ -49,7 +49,7 @@ class FilmOptions:
         Of a verification; the reference by default.
     """
 
-    magnify: float = 1.0
+    magnify: float | None = None
     fps: float = 30.0
     speed: float | None = None
     size: tuple[int, int] | None = None
@@ -101,7 +101,8 @@ def plan_film(
                 remedy=f"choose a higher speed: the run takes {duration:g} s",
             )  # fmt: skip
         times = np.linspace(first, last, max(count, 2))
-    scenes = tuple(scene(run, times, options.magnify) for run in runs)
+    magnify = default_magnification(runs) if options.magnify is None else options.magnify
+    scenes = tuple(scene(run, times, magnify) for run in runs)
     return Film(scenes, _size(scenes, options.size), fps, speed, theme(options.theme), kind != ".png")
 
 

@@ -19,6 +19,10 @@ _GREEK = {
 }  # fmt: skip
 
 
+# A value in a figure below this, in whatever unit, is rounding.
+_NOTHING = 1e-12
+
+
 class Quantity(NamedTuple):
     """Quantity of an axis: its name, its symbol (empty if it has none) and its unit."""
 
@@ -116,8 +120,8 @@ def peak(values: ArrayLike) -> float:
 
 
 def three_digits(value: float) -> str:
-    """A value to three significant digits: 48.0, 0.377, 120; 0."""
-    return f"{value:#.3g}".rstrip(".") if value else "0"
+    """A value to three significant digits: 48.0, 0.377, 120; 0, also of rounding errors."""
+    return f"{value:#.3g}".rstrip(".") if not abs(value) < _NOTHING else "0"
 
 
 def power_of_ten(value: float) -> str:
@@ -171,10 +175,8 @@ def plain(name: str) -> str:
 
 
 def mode_label(name: str) -> str:
-    """A mode's name; signs in circles, as in the paper, if it is a row of signs."""
-    if is_signs(name):
-        return name.replace("+", "⊕").replace("-", "⊖")
-    return name.replace("$", r"\$")
+    """A mode's name as everywhere else, signs as signs; Matplotlib does not read it as mathematics."""
+    return plain(name)
 
 
 def is_signs(name: str) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -39,8 +39,10 @@ _TIME_NUMBERS = 4.3
 _AXIS_LABEL = 3.8
 _RIGHT = 3.6  # half of a number such as 0.030
 
+# Data within this, in the unit of their axis, are zero but for rounding.
+_ROUNDING = 1e-12
 # Widths of the letters of numbers [em] in DejaVu Sans, and its size on the axes [mm].
-_DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838, "⊕": 0.838, "⊖": 0.838}
+_DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838}
 _EM = STYLE["ytick.labelsize"] / 72.0 * 25.4
 # Width of a letter of a title, and by how much titles may be wider than their panels, where they are centred [mm].
 _LETTER = 0.6 * STYLE["axes.titlesize"] / 72.0 * 25.4
@@ -136,12 +138,19 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
         [mm]; less where the figure would be taller than a page.
     """
     axes = arranged(axes)
-    lines = _shared_legend(figure)
-    _, height = _rows(axes, panel_height, lines)
+    for panel in axes.flat:
+        low, high = panel.yaxis.get_data_interval()
+        if panel.get_autoscaley_on() and panel.get_yscale() == "linear" and max(abs(low), abs(high)) <= _ROUNDING:
+            panel.set_ylim(-1.04, 1.04)
+    width = figure.get_figwidth() / MM
+    shared, own = _entries(figure)
+    lines = _shared_legend(figure, shared)
+    panel_lines = _panel_legends(own, _columns(axes, width)[2])
+    own_lines = [max((panel_lines.get(panel, 0) for panel in row), default=0) for row in axes]
+    _, height = _rows(axes, panel_height, lines, own_lines)
     if height > _PAGE:
         panel_height = max(_LOWEST, panel_height - (height - _PAGE) / axes.shape[0])
-    tops, height = _rows(axes, panel_height, lines)
-    width = figure.get_figwidth() / MM
+    tops, height = _rows(axes, panel_height, lines, own_lines)
     figure.set_size_inches(width * MM, height * MM)
     for panel in axes.flat:  # The numbers on an axis depend on its length.
         panel.set_position((0.1, 0.0, 0.8, panel_height / height))
@@ -151,6 +160,10 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
             bottom = height - top - panel_height
             panel.set_position((left / width, bottom / height, panel_width / width, panel_height / height))
             _place_labels(panel, room / panel_width, _TIME_NUMBERS / panel_height)
+            if panel_lines.get(panel):
+                titled = any(panel.get_title(loc=loc) for loc in ("left", "center"))
+                above = 1.0 + (_TITLE if titled else 0.5) / panel_height
+                panel.get_legend().set_bbox_to_anchor((0.5, above), transform=panel.transAxes)
     return figure
 
 
@@ -161,11 +174,14 @@ def equal_scales_height(figure: Figure, panel: Axes) -> float:
     return width * (top - bottom) / (right - left)
 
 
-def _rows(axes: NDArray[Any], panel_height: float, legend_lines: int) -> tuple[list[float], float]:
+def _rows(
+    axes: NDArray[Any], panel_height: float, legend_lines: int, own_lines: Sequence[int]
+) -> tuple[list[float], float]:
     """Tops of the rows of panels below the figure's top edge, and the figure's height [mm]."""
     tops = []
     y = _EDGE + (legend_lines * _LEGEND_LINE + _EDGE if legend_lines else 0.0)
-    for row in axes:
+    for row, lines in zip(axes, own_lines, strict=True):
+        y += lines * _LEGEND_LINE + 0.5 * _EDGE if lines else 0.0
         y += _TITLE if any(panel.get_title(loc=loc) for panel in row for loc in ("left", "center")) else 0.0
         tops.append(y)
         y += panel_height
@@ -202,18 +218,48 @@ def _number_width(axis: Axis) -> float:
     return _EM * max((sum(_LETTERS.get(letter, _DIGIT) for letter in text) for text in shown), default=0.0)
 
 
-def _shared_legend(figure: Figure) -> int:
-    """One legend above all panels, each entry once, in the order of drawing; the number of its lines."""
-    entries: dict[str, Any] = {}
-    for axes in figure.axes:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            entries.setdefault(label, handle)
+def _entries(figure: Figure) -> tuple[dict[str, Any], dict[Axes, dict[str, Any]]]:
+    """Entries of the legend above all panels, and of those of single panels, in the order of drawing.
+
+    Above all stands what one panel has all of, or every panel has; the rest stands where it is drawn.
+    """
+    entries: dict[Axes, dict[str, Any]] = {}
+    for panel in figure.axes:
+        own: dict[str, Any] = {}
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            own.setdefault(label, handle)
+        if own:
+            entries[panel] = own
+    every: dict[str, Any] = {}
+    for own in entries.values():
+        every |= {label: handle for label, handle in own.items() if label not in every}
+    if len(entries) < 2 or any(own.keys() == every.keys() for own in entries.values()):
+        return every, {}
+    common = {label: handle for label, handle in every.items() if all(label in own for own in entries.values())}
+    rest = {panel: {label: own[label] for label in own if label not in common} for panel, own in entries.items()}
+    return common, {panel: own for panel, own in rest.items() if own}
+
+
+def _shared_legend(figure: Figure, entries: Mapping[str, Any]) -> int:
+    """One legend above all panels; the number of its lines."""
+    return _fitted_legend(figure, entries, 0.98 * figure.bbox.width, bbox_to_anchor=(0.5, 1.0), loc="upper center")
+
+
+def _panel_legends(own: Mapping[Axes, Mapping[str, Any]], width: float) -> dict[Axes, int]:
+    """A legend above each panel of a width [mm]; the numbers of their lines."""
+    found = {}
+    for panel, entries in own.items():
+        room = (width + _OVERHANG) * MM * panel.figure.dpi
+        found[panel] = _fitted_legend(panel, entries, room, bbox_to_anchor=(0.5, 1.0), loc="lower center")
+    return found
+
+
+def _fitted_legend(holder: Figure | Axes, entries: Mapping[str, Any], room: float, **place: Any) -> int:
+    """A legend with as few lines as fit a width [pixels]; their number."""
     for lines in range(1, len(entries) + 1):
         columns = math.ceil(len(entries) / lines)
-        legend = figure.legend(
-            list(entries.values()), list(entries), loc="upper center", ncols=columns, bbox_to_anchor=(0.5, 1.0)
-        )
-        if columns == 1 or legend.get_window_extent().width <= 0.98 * figure.bbox.width:
+        legend = holder.legend(list(entries.values()), list(entries), ncols=columns, **place)
+        if columns == 1 or legend.get_window_extent().width <= room:
             return math.ceil(len(entries) / columns)
         legend.remove()
     return 0

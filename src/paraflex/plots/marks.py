@@ -13,8 +13,10 @@ from paraflex.plots.scene import BLOCK, DrawnJoint, Limits, Scene
 Array = NDArray[np.float64]
 
 # Sizes as parts of the picture's larger side.
-PIN, TRIANGLE, RAIL = 0.008, 0.028, 0.02
+PIN, TRIANGLE, RAIL, MOTOR = 0.008, 0.028, 0.02, 0.0125
 _TEETH = 14
+# Points of a disc.
+_ROUND = 25
 # A joint that moves by less than this fraction of the picture is drawn at rest.
 _STILL_SHARE = 1e-3
 
@@ -34,7 +36,9 @@ LOOKS = {
     "hatching": MarkLook("", "earth", 0.8),
     "gear": MarkLook("", "earth", 0.9, dashed=True),
     "spring": MarkLook("", "earth", 1.1),
+    "rail": MarkLook("", "earth", 1.6),
     "block": MarkLook("ground", "ink", 1.2),
+    "motor": MarkLook("ink", "ink", 0.8),
     "weld": MarkLook("ink", "ink", 0.8),
     "pin": MarkLook("ground", "ink", 1.3),
 }
@@ -62,11 +66,13 @@ def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
 
 
 def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
-    """Symbols of gears, springs and joints."""
+    """Symbols of gears, springs, rails, joints and their motors."""
     out = [Mark("gear", gear.name, line) for gear in shown.gears for line in gear.lines]
     out += [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
     parts = [(joint, look, shape) for joint in shown.joints for look, shape in SYMBOLS.get(joint.kind, {}).items()]
+    out += [Mark("rail", "", rail(joint, limits)) for joint in shown.joints if joint.slides and joint.rail is not None]
     out += [Mark(look, joint.name, shape(joint, limits)) for joint, look, shape in parts]
+    out += [Mark("motor", "", motor(joint, limits)) for joint in shown.joints if joint.driven]
     return sorted(out, key=lambda mark: list(LOOKS).index(mark.look))
 
 
@@ -137,6 +143,24 @@ def block(joint: DrawnJoint, limits: Limits) -> Array:
     c, s = np.cos(joint.direction)[:, None], np.sin(joint.direction)[:, None]
     x, y = corners.T
     return joint.place[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def rail(joint: DrawnJoint, limits: Limits) -> Array:
+    """The ends (f, 2, 2) of a rail that a moving body carries, as long as the travel and a block beyond it."""
+    assert joint.rail is not None
+    along = np.stack([np.cos(joint.direction), np.sin(joint.direction)], axis=-1)
+    travel = np.sum((joint.place - joint.rail) * along, axis=-1)
+    beyond, far = 1.5 * BLOCK[0] * limits.size, 1.5 * limits.size
+    ends = np.clip([np.nanmin(travel) - beyond, np.nanmax(travel) + beyond], -far, far)
+    return joint.rail[:, None] + ends[None, :, None] * along[:, None]
+
+
+def motor(joint: DrawnJoint, limits: Limits) -> Array:
+    """The disc (f, n, 2) of a motor round its pin, or the core of a block that is driven along its rail."""
+    if joint.slides:
+        return joint.place[:, None] + 0.5 * (block(joint, limits) - joint.place[:, None])
+    angle = np.linspace(0.0, 2.0 * np.pi, _ROUND)
+    return joint.place[:, None] + MOTOR * limits.size * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def square(joint: DrawnJoint, limits: Limits) -> Array:

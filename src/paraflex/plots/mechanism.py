@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import symbol
 from paraflex.plots.marks import still_marks
-from paraflex.plots.scene import DrawnJoint, Scene, limits_of
+from paraflex.plots.scene import DrawnGear, DrawnJoint, Limits, Scene, figure_of, limits_of, run_times, scene
 from paraflex.plots.selection import names_of, samples
 from paraflex.plots.style import BLACK
 from paraflex.plots.themes import theme
@@ -25,6 +25,8 @@ Points = NDArray[np.float64]
 POINT_STYLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
 _IN_LEGEND: dict[str, Any] = {"linestyle": "none", "marker": "^", "markerfacecolor": "none", "markeredgecolor": BLACK}
 _LOOK = replace(theme("light"), ink=BLACK, earth=BLACK, links=("#737373",))
+# Millimetres in a metre; samples of a run that show how far things slide.
+_MM, _POSES = 1e3, 61
 # Of lines, beside those of a film.
 _WIDTH = 0.68
 
@@ -55,11 +57,11 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
     groups = _coincident(start, size)
     joined = [group[0] for group in groups if len(group) > 1 or fixed[group[0]]]
     joints = [DrawnJoint(names[k], "pin", bool(fixed[k]), start[None, k], np.full(1, np.nan)) for k in joined]
-    shown = _scene(start, names, tuple(joints))
+    shown = _of_shapes(run) if "shape" in run and "joint_kind" in run else _scene(start, names, tuple(joints))
     sketch = Sketch(axes, shown, shown.limits, _LOOK, _WIDTH)
     sketch.show(0)
     sketch.links.set_label("links")
-    if joints:
+    if "pin" in sketch.marks:
         sketch.marks["pin"].set_label("joints")
     grounds = [mark.places[0] for mark in still_marks(shown, shown.limits)]
     if grounds:
@@ -71,6 +73,23 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
     taken = taken[np.isfinite(taken).all(axis=1)]
     axes.update_datalim(np.vstack([start, taken]))
     _name_points(axes, start, groups, names, taken)
+
+
+def _of_shapes(run: xr.Dataset) -> Scene:
+    """The start in mm, with rails as long as the travel of the run."""
+    shown = scene(run, np.linspace(*run_times(run), _POSES))
+    return replace(
+        shown,
+        bodies={name: _MM * figure_of(places[:1]) for name, places in shown.bodies.items()},
+        joints=tuple(
+            replace(joint, place=_MM * joint.place, rail=None if joint.rail is None else _MM * joint.rail)
+            for joint in shown.joints
+        ),
+        springs={name: _MM * ends for name, ends in shown.springs.items()},
+        gears=tuple(DrawnGear(gear.name, tuple(_MM * line for line in gear.lines)) for gear in shown.gears),
+        anchors=tuple(_MM * place for place in shown.anchors),
+        trail=None, desired=None, limits=Limits(*(_MM * side for side in shown.limits)),
+    )  # fmt: skip
 
 
 def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:

@@ -20,6 +20,8 @@ from paraflex.results.following import headline, ranked_by_motion
 
 # Of a mode and the names of its passive motors, as many as fit above a panel.
 _TITLE_LETTERS = 22
+# A torque below this is rounding [N m, N].
+_NOTHING = 1e-12
 
 
 @drawn
@@ -30,7 +32,7 @@ def motor_torques(data: xr.Dataset) -> Figure:
     """
     names = names_of(data, "mode")
     figure, axes = _mode_panels(len(names))
-    time, motors = data["time"].values, data["motor"].values
+    time, motors, largest = data["time"].values, data["motor"].values, peak(data["torque"])
     for row in range(axes.shape[0]):
         shown = names[row * axes.shape[1] :][: axes.shape[1]]
         scale = max(peak(select_run(data, name)["torque"]) for name in shown)
@@ -39,12 +41,13 @@ def motor_torques(data: xr.Dataset) -> Figure:
             passive = []
             for k, motor in enumerate(motors):
                 torque = run["torque"].sel(motor=motor).values
-                if peak(torque) <= 1e-9 * scale:
+                if peak(torque) <= max(1e-9 * largest, _NOTHING):
                     passive.append(str(motor))
                     torque = np.full_like(torque, np.nan)  # Keeps its place in the legend.
                 panel.plot(time, torque, label=symbol(str(motor)), **look_of(k))
             panel.axhline(0.0, **ZERO)
-            panel.set_ylim(-1.08 * scale or -1.0, 1.08 * scale or 1.0)
+            half = 1.08 * scale if scale > max(1e-9 * largest, _NOTHING) else 1.0
+            panel.set_ylim(-half, half)
             panel.set_title(mode_label(name), loc="left")
             if passive:
                 short = len(name) + len(", ".join(passive)) <= _TITLE_LETTERS

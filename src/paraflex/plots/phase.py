@@ -9,7 +9,7 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, symbol
 from paraflex.plots.layout import is_narrow, lay_out, panels
 from paraflex.plots.runs import END_EFFECTOR, START, draw_actual, draw_desired
-from paraflex.plots.selection import names_of, one_run, select_run
+from paraflex.plots.selection import moving_directions, names_of, one_run, select_run
 from paraflex.plots.style import BLUE, keep_flat
 
 # Bodies that have a panel.
@@ -20,7 +20,7 @@ _MOST_PANELS = 8
 def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
     """Velocity over displacement and acceleration over velocity in x and y, desired and actual (Fig. 17)."""
     run = select_run(data, mode)
-    directions = names_of(data, "axis")
+    directions = moving_directions(run)
     figure, axes = panels(2, len(directions))
     for row, (across, up) in zip(axes, (END_EFFECTOR[:2], END_EFFECTOR[1:]), strict=True):
         for panel, axis in zip(row, directions, strict=True):

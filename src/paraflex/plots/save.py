@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -28,9 +28,10 @@ FIGURE_FORMATS = tuple(_METADATA)
 def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mode: str | None = None) -> list[Path]:
     """Write the figures that a command adds to its results, as PNG (200 dpi) and SVG.
 
-    Of a run along a path figures 11 to 18, named like `fig11_desired_path.png`; of a verification figures 22 and 23 of
-    every mode and the distances of all models; of others see `paraflex plot --list`. There are none where nothing can
-    be shown: of a search in which no design ran, of metrics that do not vary.
+    Files are named by what they show, like `desired_path.png`; those of a run along a path are the paper's Figs. 11 to
+    18, of a verification its Figs. 22 and 23 of every mode and the distances of all models; of others see
+    `paraflex plot --list`. There are none where nothing can be shown: of a search in which no design ran, of metrics
+    that do not vary.
 
     Parameters
     ----------
@@ -125,7 +126,13 @@ def _write(figure: Figure, files: Iterable[Path], dpi: float | None = None) -> l
     written = []
     for path in files:
         suffix = path.suffix[1:]
-        with whole_file(path, field=str(path.parent)) as unfinished, journal_style():
-            figure.savefig(unfinished, format=suffix, metadata=_METADATA[suffix], dpi="figure" if dpi is None else dpi)
+        with whole_file(path, field=str(path.parent)) as unfinished:
+            write_figure(figure, unfinished, suffix, dpi)
         written.append(path)
     return written
+
+
+def write_figure(figure: Figure, file: Path | TextIO, format_name: str, dpi: float | None = None) -> None:
+    """Write a figure in one of FIGURE_FORMATS, the same bytes whenever that is."""
+    with journal_style():
+        figure.savefig(file, format=format_name, metadata=_METADATA[format_name], dpi="figure" if dpi is None else dpi)

@@ -5,6 +5,7 @@ Matplotlib (`plots/drawing.py`), files of SVG (`plots/svg.py`) and the player of
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -27,6 +28,10 @@ _MARGIN = 0.07
 _SCALE_BAR = 0.28
 # A point that moves by less is at rest [m].
 _STILL_POINT = 1e-6
+# What deflections are drawn by default: at most this share of the mechanism's size, and not magnified where the largest
+# of these leaves them below the second.
+MAGNIFICATIONS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+_SHOWN_BENDING, _UNSEEN_BENDING = 0.08, 0.005
 # Shares of all places in percent between which a run is that does not come apart.
 _RUN_SHARES = (0.2, 99.8)
 
@@ -53,13 +58,19 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True)
 class DrawnJoint:
-    """A joint at the f times of a scene: its kind, whether it is on the ground, places (f, 2), directions (f,)."""
+    """A joint at the f times of a scene: its kind, whether it is on the ground, places (f, 2), directions (f,).
+
+    `driven` is whether a motor is there; `rail` a point (f, 2) of the moving body that carries its axis, None where the
+    ground does or a beam is the axis.
+    """
 
     name: str
     kind: str
     grounded: bool
     place: Array
     direction: Array
+    driven: bool = False
+    rail: Array | None = None
 
     @property
     def slides(self) -> bool:
@@ -190,12 +201,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     owners = run["station_body"].values
     bodies = {str(name): owners == name for name in dict.fromkeys(owners.tolist())}
     places, directions = run["joint_position"].values.astype(float), run["joint_direction"].values.astype(float)
-    joints = tuple(
-        DrawnJoint(str(name), str(kind), bool(grounded), at(places[:, i]), at(directions[:, i]))
-        for i, (name, kind, grounded) in enumerate(
-            zip(run["joint"].values, run["joint_kind"].values, run["joint_grounded"].values, strict=True)
-        )
-    )
+    joints = _joints(run, drawn, at)
     springs, followed = _springs(run, drawn), followed_station(run)
     seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
     seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
@@ -218,6 +224,35 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     )
 
 
+def _joints(run: xr.Dataset, drawn: Array, at: Callable[[Array], Array]) -> tuple[DrawnJoint, ...]:
+    """Joints of a run; results of earlier versions do not say which have motors, and rails on moving bodies."""
+    names, count = run["joint"].values, run.sizes["joint"]
+    driven = run["joint_driven"].values if "joint_driven" in run else np.zeros(count, dtype=bool)
+    rails = run["joint_rail"].values if "joint_rail" in run else np.full(count, -1)
+    return tuple(
+        DrawnJoint(
+            str(names[i]), str(run["joint_kind"].values[i]), bool(run["joint_grounded"].values[i]),
+            at(run["joint_position"].values[:, i].astype(float)), at(run["joint_direction"].values[:, i].astype(float)),
+            bool(driven[i]), at(drawn[:, int(rails[i])]) if rails[i] >= 0 else None,
+        )
+        for i in range(count)
+    )  # fmt: skip
+
+
+def default_magnification(runs: Sequence[xr.Dataset]) -> float:
+    """The largest of MAGNIFICATIONS at which no deflection of runs exceeds 8 % of the mechanism's size; else 1."""
+    bent, size = 0.0, 0.0
+    for run in runs:
+        shape, base = (run[name].values.reshape(-1, 2).astype(float) for name in ("shape", "shape_base"))
+        known = np.isfinite(shape).all(axis=1) & np.isfinite(base).all(axis=1)
+        if known.any():
+            bent = max(bent, float(np.max(np.linalg.norm((shape - base)[known], axis=1))))
+            size = max(size, float(np.max(np.ptp(base[known], axis=0))))
+    if MAGNIFICATIONS[-1] * bent <= _UNSEEN_BENDING * size:
+        return 1.0
+    return max((one for one in MAGNIFICATIONS if one * bent <= _SHOWN_BENDING * size), default=1.0)
+
+
 class _Sampler:
     """Linear interpolation between samples; constant beyond the last."""
 
@@ -233,20 +268,24 @@ class _Sampler:
 
 
 def followed_station(run: xr.Dataset) -> int | None:
-    """The station whose trail is drawn: the end-effector's, or that of the free point with the longest way."""
+    """The station whose trail is drawn: the end-effector's, else that of the longest way, free points before joints."""
     points = names_of(run, "point")
     stations = run["point_station"].values
     if run.attrs.get("end_effector_point") in points:
         return int(stations[points.index(run.attrs["end_effector_point"])])
     shape, joints = run["shape"].values.astype(float), run["joint_position"].values.astype(float)
-    travelled = {}
+    ways, free = {}, []
     for station in stations.tolist():
         place = shape[:, station]
         apart = np.linalg.norm(joints - place[:, None], axis=-1)
+        ways[station] = float(np.sum(np.linalg.norm(np.diff(place, axis=0), axis=-1)))
         if not (joints.size and np.min(np.max(apart, axis=0)) < _STILL_POINT):
-            travelled[station] = float(np.sum(np.linalg.norm(np.diff(place, axis=0), axis=-1)))
-    farthest = max(travelled, key=lambda station: travelled[station], default=None)
-    return farthest if farthest is not None and travelled[farthest] >= _STILL_POINT else None
+            free.append(station)
+    for chosen in (free, [*ways]):
+        farthest = max(chosen, key=lambda station: ways[station], default=None)
+        if farthest is not None and ways[farthest] >= _STILL_POINT:
+            return farthest
+    return None
 
 
 def _anchors(run: xr.Dataset) -> tuple[Array, ...]:
@@ -348,7 +387,13 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
         bodies={name: places[chosen] for name, places in shown.bodies.items()},
         stiff={name: places[chosen] for name, places in shown.stiff.items()},
         joints=tuple(
-            replace(joint, place=joint.place[chosen], direction=joint.direction[chosen]) for joint in shown.joints
+            replace(
+                joint,
+                place=joint.place[chosen],
+                direction=joint.direction[chosen],
+                rail=None if joint.rail is None else joint.rail[chosen],
+            )
+            for joint in shown.joints
         ),
         springs={name: ends[chosen] for name, ends in shown.springs.items()},
         gears=tuple(DrawnGear(gear.name, tuple(line[chosen] for line in gear.lines)) for gear in shown.gears),

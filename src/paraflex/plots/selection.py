@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+# An end-effector whose speed along an axis is this share of that along the other rests there, but for rounding.
+_STILL = 1e-9
+
+
 def place_of(name: str, names: Sequence[str], what: str, field: str = "") -> int:
     """The place of a mode or model among those of results."""
     if name not in names:
@@ -72,3 +76,12 @@ def samples(run: xr.Dataset) -> int:
     moving = run["end_effector"] if "end_effector" in run else run["angle"]
     missing = ~np.isfinite(moving.values).all(axis=-1)
     return int(np.argmax(missing)) if missing.any() else missing.size
+
+
+def moving_directions(run: xr.Dataset) -> list[str]:
+    """The axes along which the end-effector moves, or should: all where it rests."""
+    names = names_of(run, "axis")
+    parts = [np.nan_to_num(run[name].transpose("time", "axis").values)
+             for name in ("end_effector_velocity", "end_effector_velocity_desired")]  # fmt: skip
+    speeds = np.max(np.abs(parts), axis=(0, 1))
+    return [name for name, speed in zip(names, speeds, strict=True) if speed > _STILL * speeds.max()] or names

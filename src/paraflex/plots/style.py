@@ -83,6 +83,6 @@ def keep_flat(axes: Axes, scale: float, direction: Literal["x", "y"] = "y") -> N
     axis, set_limits = (axes.xaxis, axes.set_xlim) if direction == "x" else (axes.yaxis, axes.set_ylim)
     low, high = axis.get_data_interval()
     if not high - low > max(1e-6 * scale, _NOTHING):  # also true of axes without data
-        middle = 0.5 * (low + high) if math.isfinite(low) else 0.0
+        middle = 0.5 * (low + high) if math.isfinite(low) and max(abs(low), abs(high)) > _NOTHING else 0.0
         half = 0.052 * scale if scale > _NOTHING else 1.04
         set_limits(middle - half, middle + half)

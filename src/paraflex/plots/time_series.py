@@ -13,7 +13,7 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, symbol
 from paraflex.plots.layout import is_narrow, panels
 from paraflex.plots.runs import END_EFFECTOR, draw_actual, draw_desired, finish_over_time, largest_over_time
-from paraflex.plots.selection import names_of, one_run, run_label, select_run
+from paraflex.plots.selection import moving_directions, one_run, run_label, select_run
 from paraflex.plots.style import keep_flat
 
 # Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
@@ -32,7 +32,9 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
         A row each; by default the two whose tips move most across, twins of a symmetric mechanism counted once.
     """
     run = select_run(data, mode)
-    chosen = most_deflected(run) if bodies is None else list(bodies)
+    # A link that does not bend has no panels unless it is asked for, or none does.
+    chosen = [name for name in most_deflected(run) if _bends(run, name)] or most_deflected(run)[:1]
+    chosen = chosen if bodies is None else list(bodies)
     for name in chosen:
         if name not in run["body"].values:
             known = ", ".join(map(str, run["body"].values))
@@ -52,6 +54,10 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
             panel.set_title(f"{symbol(name)}: {title}")
             panel.set_ylabel(axis_label(quantity, unit=unit.name))
     return finish_over_time(figure, axes, data, panel_height=34.0)
+
+
+def _bends(run: xr.Dataset, name: str) -> bool:
+    return any(peak(run[variable].sel(body=name)) > 0.0 for variable in ("tip_axial", "tip_transverse", "tip_slope"))
 
 
 def most_deflected(run: xr.Dataset) -> list[str]:
@@ -115,7 +121,7 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
 def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
     """Displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16)."""
     run, time = select_run(data, mode), data["time"].values
-    directions = names_of(data, "axis")
+    directions = moving_directions(run)
     figure, axes = panels(len(END_EFFECTOR), len(directions))
     for row, (variable, quantity, factor) in zip(axes, END_EFFECTOR, strict=True):
         desired = factor * run[f"{variable}_desired"]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
-from paraflex.plots.scene import Limits, Scene, common_limits, figure_of, is_plate, scene
+from paraflex.plots.scene import Limits, Scene, common_limits, default_magnification, figure_of, is_plate, scene
 from paraflex.report.packing import packed
 
 Array = NDArray[np.float64]
@@ -42,6 +42,8 @@ class Animation:
         Of each run, with its true deflections; none of a run without a sample.
     path : (samples, 2) or (runs, samples, 2) array, optional
         Where the end-effector should go [m], in all runs or in each.
+    magnify : float
+        How many times deflections are drawn at first.
     """
 
     time: Array
@@ -50,6 +52,7 @@ class Animation:
     bodies: Sequence[tuple[str, int, int]]
     scenes: Sequence[Scene | None]
     path: Array | None = None
+    magnify: float = 1.0
 
     def to_dict(self) -> dict[str, Any]:
         """The animation in plain values for JSON."""
@@ -67,6 +70,7 @@ class Animation:
                 for (name, first, _), figure in zip(self.bodies, figures, strict=True)
             ],
             "looks": LOOKS,
+            "magnify": self.magnify,
             "marks": [one and [_marks(still_marks(one, limits), 1), _marks(moving_marks(one, limits), self.time.size)]
                       for one in self.scenes],
             "tips": [one and one.followed for one in self.scenes],
@@ -105,6 +109,7 @@ def animation(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Animation | 
             for chosen in product(*(range(data.sizes[dim]) for dim in dims))
         ],
         path=path,
+        magnify=default_magnification([few]),
     )
 
 

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 # Joints of wheels and of racks: whether they slide, and what they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
+# How far a rack's axis is from its pinion, in radii.
+_NEAREST, _FARTHEST = 0.5, 2.0
 
 
 @dataclass(frozen=True)
@@ -126,13 +128,18 @@ def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
         return np.array([pose.position or (np.nan, np.nan)]), np.array([pose.angle])
 
     shapes = {one.body: turned(*frame(one.body), one.places) for one in outlines(mechanism)}
-    one = drawing(mechanism, shapes, lambda ref: frame(ref.body)[1], frame)
+    return drawing_data(mechanism, drawing(mechanism, shapes, lambda ref: frame(ref.body)[1], frame), np.zeros(1))
+
+
+def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
+    """A drawing at times (k,) as a run: what is drawn, and nothing else."""
     points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+    effector = mechanism.end_effector
     return xr.Dataset(
         {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(one).items()},
-        coords={"time": [0.0], "point": points, "joint": [joint.name for joint in mechanism.joints],
+        coords={"time": time, "point": points, "joint": [joint.name for joint in mechanism.joints],
                 **drawing_coordinates(mechanism)},
-        attrs={"mechanism": mechanism.name},
+        attrs={"mechanism": mechanism.name} | ({} if effector is None else {"end_effector_point": str(effector.point)}),
     )  # fmt: skip
 
 
@@ -152,7 +159,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     """Labels of these variables: bodies of the stations, stations of the points, kinds of the joints.
 
     Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
-    -1.
+    -1, and so has the rail of a joint without one on a moving body.
     """
     drawn = outlines(mechanism)
     first = dict(zip([one.body for one in drawn], np.cumsum([0, *(len(one.places) for one in drawn)]), strict=False))
@@ -162,6 +169,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         for point in body.points
     }
     joints, springs = mechanism.joints, mechanism.linear_springs
+    driven = {motor.joint for motor in mechanism.motors}
     of_springs: dict[str, Any] = {}
     if springs:
         ends = [[stations.get(ref, -1) for ref in (spring.a, spring.b)] for spring in springs]
@@ -184,16 +192,24 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
         "joint_kind": ("joint", [joint.symbol for joint in joints]),
         "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
+        "joint_driven": ("joint", np.array([joint.name in driven for joint in joints], dtype=bool)),
+        "joint_rail": ("joint", np.array([_rail_station(joint, stations) for joint in joints], dtype=np.int32)),
         **of_springs,
         **of_gears,
     }
+
+
+def _rail_station(joint: Joint, stations: Mapping[PointRef, int]) -> int:
+    """The station that a joint's rail goes through; the rail of what slides along a beam is the beam."""
+    return stations.get(joint.a, -1) if joint.slides and not joint.follows_beam else -1
 
 
 def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
     """Radii of two external gears, or of a pinion and its rack, at joints on one body or the ground.
 
     Of a rack, whose joint slides without turning, infinity: positive where its pitch line lies to the right of the
-    joint's direction as seen from the pinion, else negative. NaN of anything else [m].
+    joint's direction as seen from the pinion, else negative. NaN of anything else [m], also where the rack's axis is
+    not about a radius from the pinion: a screw's ratio is no radius.
     """
     unknown = np.nan, np.nan
     joints = first, second = [mechanism.joint(name) for name in one.joints]
@@ -205,16 +221,24 @@ def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
     # Ratio of their rotations and travels relative to the carrier.
     sides = [1.0 if joint.a.body == carrier else -1.0 for joint in joints]
     ratio = one.transmission * sides[0] * sides[1]
-    if kinds == [_WHEEL, _RACK]:
-        return abs(ratio), np.copysign(np.inf, ratio)
-    if kinds == [_RACK, _WHEEL]:
-        return np.copysign(np.inf, ratio), abs(1.0 / ratio)
-    if kinds == [_RACK, _RACK] or ratio > 0.0:
-        return unknown
     places = mechanism.ground if carrier == GROUND else local_points(mechanism.body(carrier))
     ends = [places[(joint.a if joint.a.body == carrier else joint.b).point] for joint in joints]
+    if kinds in ([_WHEEL, _RACK], [_RACK, _WHEEL]):
+        radius, rack = (abs(ratio), 1) if kinds[1] == _RACK else (abs(1.0 / ratio), 0)
+        if not _touches(joints[rack], sides[rack], np.subtract(ends[rack], ends[1 - rack]), radius):
+            return unknown
+        return (radius, np.copysign(np.inf, ratio)) if rack else (np.copysign(np.inf, ratio), radius)
+    if kinds == [_RACK, _RACK] or ratio > 0.0:
+        return unknown
     apart = float(np.hypot(*np.subtract(ends[1], ends[0])))
     return apart * ratio / (ratio - 1.0), apart / (1.0 - ratio)
+
+
+def _touches(rail: Joint, side: float, arm: Array, radius: float) -> bool:
+    """Whether a rail is about a radius from a pinion, at an arm from it in their carrier."""
+    direction = rail.direction - (0.0 if side > 0.0 else rail.angle)
+    distance = abs(arm[0] * np.sin(direction) - arm[1] * np.cos(direction))
+    return bool(_NEAREST * radius <= distance <= _FARTHEST * radius)
 
 
 def _base(

@@ -80,6 +80,8 @@ UNITS = (
         "point_station": ("drawn point that a named point is", "1"),
         "joint_kind": ("kind of joint", "1"),
         "joint_grounded": ("whether the joint is on the ground", "1"),
+        "joint_driven": ("whether a motor is at the joint", "1"),
+        "joint_rail": ("drawn point that a sliding joint's axis goes through; -1 on the ground and along a beam", "1"),
         "spring_station": ("drawn points that a spring is at; -1 on the ground", "1"),
         "gear_joint": ("joints that a gear or another relation relates, counted from 0", "1"),
         "gear_radius": ("pitch radii of wheels that mesh outside, or of a pinion and its rack, then infinite", "m"),

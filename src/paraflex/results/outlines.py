@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,9 +159,10 @@ class Hold:
 def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
     """Stations (k, s, 2) of the undeformed body between the places that hold it [m].
 
-    Between neighbouring ones the undeformed body, turned and scaled so that both are where they are; beyond the last
-    ones turned as the piece before. A body held at places that are not in line is fitted to them as a whole, what is
-    left shared out by distance; one held at a single place is turned as the material is there.
+    Between two the undeformed body, turned and scaled so that both are where they are; beyond them turned as between.
+    Through three or more in line a natural cubic spline, so that deflections drawn magnified from it have no kink at a
+    joint in mid-span. A body held at places that are not in line is fitted to them as a whole, what is left shared out
+    by distance; one held at a single place is turned as the material is there.
 
     Parameters
     ----------
@@ -176,14 +178,15 @@ def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
     if len(holds) == 1:
         out = place + np.exp(1j * turn)[:, None] * (z - rest)
     else:
-        axis = _axis(np.append(z, rest[0]), drawn.size)
-        out = _fitted(z, rest, place) if axis is None and len(holds) > 2 else _pieces(
-            z, rest, place, turn, 1.0 if axis is None else axis, _SHORT_PIECE * drawn.size
-        )  # fmt: skip
+        axis, short = _axis(np.append(z, rest[0]), drawn.size), _SHORT_PIECE * drawn.size
+        if len(holds) == 2:
+            out = _between(z, rest, place, turn, 1.0 if axis is None else axis, short)
+        else:
+            out = _fitted(z, rest, place) if axis is None else _spline(z, rest, place, axis, short)
     return np.stack([out.real, out.imag], axis=-1)
 
 
-def _pieces(
+def _between(
     z: NDArray[np.complex128],
     rest: NDArray[np.complex128],
     place: NDArray[np.complex128],
@@ -191,25 +194,61 @@ def _pieces(
     axis: complex,
     short: float,
 ) -> NDArray[np.complex128]:
-    """Similarities between neighbours along an axis."""
-    order = np.argsort((rest * np.conj(axis)).real, axis=1)
-    rest, place = np.take_along_axis(rest, order, axis=1), np.take_along_axis(place, order, axis=1)
-    gap, step = np.diff(rest, axis=1), np.diff(place, axis=1)
+    """The similarity between two holds; beyond them a free end keeps its length."""
+    rest, place = _in_order(rest, place, axis)
+    gap, step = np.diff(rest, axis=1)[:, 0], np.diff(place, axis=1)[:, 0]
     long = np.abs(gap) > short
-    ratio = np.where(long, step / np.where(long, gap, 1.0), np.exp(1j * turn)[:, None])
-    along = (z * np.conj(axis)).real
-    knots = (rest * np.conj(axis)).real
-    out = np.empty((place.shape[0], z.size), dtype=complex)
-    for i, x in enumerate(along):
-        piece = np.clip(np.sum(x >= knots, axis=1) - 1, 0, ratio.shape[1] - 1)
-        rows = np.arange(piece.size)
-        after, before = x > knots[:, -1], x < knots[:, 0]
-        end = np.where(after, piece + 1, piece)
-        scale = ratio[rows, piece]
-        # A free end keeps its length.
-        scale = np.where(after | before, scale / np.abs(scale), scale)
-        out[:, i] = place[rows, end] + scale * (z[i] - rest[rows, end])
+    ratio = np.where(long, step / np.where(long, gap, 1.0), np.exp(1j * turn))[:, None]
+    along, knots = (z * np.conj(axis)).real[None], (rest * np.conj(axis)).real
+    after, before = along > knots[:, 1:], along < knots[:, :1]
+    scale = np.where(after | before, ratio / np.abs(ratio), ratio)
+    return np.where(after, place[:, 1:] + scale * (z - rest[:, 1:]), place[:, :1] + scale * (z - rest[:, :1]))
+
+
+def _spline(
+    z: NDArray[np.complex128], rest: NDArray[np.complex128], place: NDArray[np.complex128], axis: complex, short: float
+) -> NDArray[np.complex128]:
+    """The natural cubic spline through holds in line, continued straight and as long as the body beyond the last ones.
+
+    With second derivatives M and slopes s of the chords: h_i M_i + 2 (h_i + h_i+1) M_i+1 + h_i+1 M_i+2 =
+    6 (s_i+1 - s_i).
+    """
+    rest, place = _in_order(rest, place, axis)
+    x, knots = (z * np.conj(axis)).real, (rest * np.conj(axis)).real
+    h = np.maximum(np.diff(knots, axis=1), short)
+    slopes = np.diff(place, axis=1) / h
+    inner = knots.shape[1] - 2
+    rows = np.zeros((len(knots), inner, inner))
+    for i in range(inner):
+        rows[:, i, i] = 2.0 * (h[:, i] + h[:, i + 1])
+        if i + 1 < inner:
+            rows[:, i, i + 1] = rows[:, i + 1, i] = h[:, i + 1]
+    bends = np.zeros_like(place)
+    bends[:, 1:-1] = np.linalg.solve(rows, 6.0 * np.diff(slopes, axis=1)[..., None])[..., 0]
+    piece = np.clip(np.sum(x[None, :, None] >= knots[:, None, :], axis=2) - 1, 0, inner)
+
+    def of(values: NDArray[Any], shift: int = 0) -> NDArray[Any]:
+        return np.take_along_axis(values, piece + shift, axis=1)
+
+    width, u, w = of(h), x - of(knots), of(knots, 1) - x
+    out = (of(bends) * w**3 + of(bends, 1) * u**3) / (6.0 * width)
+    out += (of(place) / width - of(bends) * width / 6.0) * w + (of(place, 1) / width - of(bends, 1) * width / 6.0) * u
+    for end, slope in (
+        (0, slopes[:, 0] - h[:, 0] * bends[:, 1] / 6.0),
+        (-1, slopes[:, -1] + h[:, -1] * bends[:, -2] / 6.0),
+    ):
+        beyond = (x < knots[:, :1]) if end == 0 else (x > knots[:, -1:])
+        straight = place[:, [end]] + (slope / np.abs(slope))[:, None] * (x - knots[:, [end]])
+        out = np.where(beyond, straight, out)
     return out
+
+
+def _in_order(
+    rest: NDArray[np.complex128], place: NDArray[np.complex128], axis: complex
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Holds in their order along an axis."""
+    order = np.argsort((rest * np.conj(axis)).real, axis=1)
+    return np.take_along_axis(rest, order, axis=1), np.take_along_axis(place, order, axis=1)
 
 
 def _fitted(

@@ -37,6 +37,25 @@ class InfoRequest:
 
 
 @dataclass(frozen=True, kw_only=True)
+class DrawRequest:
+    """What `paraflex draw` is asked for."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    assembly: AssemblyOption = None
+    path: PathOption = None
+    output: Annotated[
+        str | None,
+        Option("--output", "--out", metavar="FILE", help="FILE.html, .svg, .png or .pdf. Default: a temporary page."),
+    ] = None
+    theme: Annotated[str, Option(metavar="light|dark", help="Colours.")] = "light"
+    open: Annotated[
+        bool | None,
+        Option("--open/--no-open", help="Show it in a browser, or not. Default: without --output, at a screen."),
+    ] = None
+    force: Annotated[bool, Option("--force", help="Write over a file that is there.")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
 class ModesRequest:
     """What `paraflex modes` is asked for."""
 

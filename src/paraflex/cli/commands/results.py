@@ -38,7 +38,10 @@ class AnimateRequest:
         list[str],
         Option("--mode", metavar="MODE", help="Actuation mode; repeated they stand side by side. Default: the first."),
     ] = field(default_factory=list)
-    magnify: Annotated[float, Option(metavar="TIMES", help="How many times deflections are drawn.")] = 1.0
+    magnify: Annotated[
+        float | None,
+        Option(metavar="TIMES", help="How many times deflections are drawn. Default: a round one that shows bending."),
+    ] = None
     fps: Annotated[float, Option(metavar="N", help="Pictures a second.")] = 30.0
     speed: Annotated[
         float | None,

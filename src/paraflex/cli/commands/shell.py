@@ -10,7 +10,14 @@ from typing import Any, NamedTuple
 
 import typer
 
-from paraflex.cli.commands.models import InfoRequest, MethodsRequest, ModesRequest, NewRequest, SchemaRequest
+from paraflex.cli.commands.models import (
+    DrawRequest,
+    InfoRequest,
+    MethodsRequest,
+    ModesRequest,
+    NewRequest,
+    SchemaRequest,
+)
 from paraflex.cli.commands.results import AnimateRequest, CompareRequest, ExportRequest, PlotRequest, ReportRequest
 from paraflex.cli.commands.runs import CompareMethodsRequest, RunRequest, VerifyRequest
 from paraflex.cli.commands.studies import IndicesRequest, SearchRequest, SensitivityRequest, SweepRequest
@@ -96,6 +103,10 @@ COMMANDS = (
         Describe a mechanism and its study, and judge them: sound, doubtful or wrong, each reason with its remedy.
 
         Exit code 1 where it is wrong. Without a name: what the library has."""),
+    ListedCommand("draw", DrawRequest, "draw.draw_command", """
+        Draw a mechanism before anything runs: bodies, joints by kind, motors, springs, loads, path, and their names.
+
+        Loops that do not close are drawn as given, open joints marked."""),
     ListedCommand("new", NewRequest, "create.new_command", """
         Write a commented model file to edit."""),
     ListedCommand("schema", SchemaRequest, "create.schema_command", """

@@ -274,6 +274,7 @@ const player = (() => {
     const marks = await Promise.all(film.marks.map((sets) => Promise.all((sets || []).map((set) => report.unpacked(set.places)))));
     // At once and last: from here on the page may paint.
     arrays = { ...Object.fromEntries(names.map((name, k) => [name, read[k]])), marks };
+    showMagnification();
     recolour();
   }
 

@@ -5,7 +5,7 @@ const report = (() => {
   const root = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const listeners = { run: [], time: [], theme: [], magnify: [], playing: [] };
-  const state = { run: told.selected, time: 0, magnify: 1, playing: false };
+  const state = { run: told.selected, time: 0, magnify: told.film ? told.film.magnify : 1, playing: false };
   let rows = [];
 
   async function inflated(text) {

@@ -1,0 +1,87 @@
+"""A model drawn before it runs."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
+
+from paraflex.errors import InputError, ModelWarning
+from paraflex.files import Model, load
+from paraflex.mechanism import Mechanism
+from paraflex.results.posed import Posed, posed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def pose_of(
+    model: Model | Mechanism | str | FilePath, *, assembly: str | None = None, path: str | None = None
+) -> Posed:
+    """The pose that a model starts from: on its path where it has one, else as its start or its assembly says.
+
+    Parameters
+    ----------
+    model : Model, Mechanism, str or Path
+        A name or file is loaded.
+    assembly : str, optional
+        The study's, or the first.
+    path : str, optional
+        One of the model's paths; the study's by default.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, an unknown path or assembly, or no assembly at all.
+    """
+    if isinstance(model, str | FilePath):
+        model = load(model)
+    if isinstance(model, Mechanism):
+        model = Model(model)
+    if not isinstance(model, Model):
+        raise InputError(
+            "not a model", field="model", value=model, remedy="give a model, a mechanism, or a file's name"
+        )
+    followed = None
+    if path is not None or (model.paths and model.start is None):
+        name = model.path_name(path)
+        followed = (name, model.path(name))
+    return posed(model.mechanism, assembly or model.study.assembly, followed, model.start)
+
+
+def draw(
+    model: Model | Mechanism | str | FilePath,
+    *,
+    assembly: str | None = None,
+    path: str | None = None,
+    width: float = 174.0,
+    theme_name: str = "light",
+) -> Figure:
+    """A model drawn before anything runs: bodies, joints by kind, motors, springs, loads and path, with their names.
+
+    Loops that do not close are drawn as given, their open joints marked, with a warning.
+
+    Parameters
+    ----------
+    model, assembly, path
+        See `pose_of`.
+    width : float
+        [mm]
+    theme_name : str
+        "light" or "dark".
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        See `pose_of`.
+    """
+    from paraflex.plots.model_drawing import model_drawing  # Matplotlib takes long to import
+
+    shown = pose_of(model, assembly=assembly, path=path)
+    for problem in shown.problems:
+        warnings.warn(problem, ModelWarning, stacklevel=2)
+    return model_drawing(shown, width=width, theme_name=theme_name)

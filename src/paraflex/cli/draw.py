@@ -1,0 +1,121 @@
+"""`paraflex draw`: a mechanism drawn before anything runs."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import webbrowser
+from html import escape
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from paraflex.checks import pose_of
+from paraflex.cli import COMPLETE
+from paraflex.cli.animate import refuse_existing
+from paraflex.cli.commands.models import DrawRequest
+from paraflex.cli.tables import plain_console
+from paraflex.errors import InputError
+from paraflex.files import Model, load
+from paraflex.mechanism import Mechanism
+from paraflex.writing import portable_name, whole_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from paraflex.results.posed import Posed
+
+FORMATS = (".html", ".svg", ".png", ".pdf")
+# Dots an inch of PNG, and rows of a table that are worth reading.
+_DPI, _LISTED = 200.0, 12
+_PAGE = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>{name}</title>
+<style>body {{ font: 15px sans-serif; margin: 1.5em auto; max-width: 1100px; padding: 0 1em }}
+svg {{ width: 100%; height: auto; max-height: 92vh }} p.open {{ color: #c8102e }}</style>
+{problems}
+{svg}
+</html>
+"""
+
+
+def draw_command(request: DrawRequest) -> int:
+    """Draw the mechanism and say where the file is; the exit code."""
+    output = None if request.output is None else Path(request.output)
+    if output is not None:
+        if output.suffix.lower() not in FORMATS:
+            raise InputError(
+                "unknown kind of drawing", field="--output", value=request.output,
+                remedy="end it in .html, .svg, .png or .pdf",
+            )  # fmt: skip
+        refuse_existing(output, request.force)
+    model = load(request.model.name)
+    shown = pose_of(model, assembly=request.assembly, path=request.path)
+    if output is None:
+        output = Path(tempfile.mkdtemp(prefix="paraflex-")) / f"{portable_name(model.mechanism.name)}.html"
+    # Only now: Matplotlib takes longer to import than all until here.
+    from paraflex.plots.model_drawing import model_drawing
+
+    _write(model_drawing(shown, theme_name=request.theme), shown, output)
+    _tell(plain_console(), model, shown, request, output)
+    wanted = (request.output is None and _has_screen()) if request.open is None else request.open
+    if wanted and not webbrowser.open(output.resolve().as_uri()):
+        plain_console(stderr=True).print("no browser opens it here", soft_wrap=True)
+    return COMPLETE
+
+
+def _write(figure: Figure, shown: Posed, output: Path) -> None:
+    kind = output.suffix.lower()
+    from paraflex.plots.save import write_figure
+
+    with whole_file(output, field=str(output.parent)) as unfinished:
+        if kind == ".html":
+            svg = StringIO()
+            write_figure(figure, svg, "svg")
+            text = svg.getvalue()
+            problems = "".join(f'<p class="open">{escape(problem)}</p>' for problem in shown.problems)
+            name = escape(shown.mechanism.name)
+            page = _PAGE.format(name=name, problems=problems, svg=text[text.index("<svg") :])
+            unfinished.write_text(page, encoding="utf-8")
+        else:
+            write_figure(figure, unfinished, kind[1:], _DPI)
+
+
+def _has_screen() -> bool:
+    """Whether somebody sits in front of a terminal with a screen beside it."""
+    screen = sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return screen and sys.stdout.isatty()
+
+
+def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
+    """Bodies, joints and motors, what is open, where the drawing is and how to go on."""
+    mechanism = model.mechanism
+    console.print(f"{mechanism.name} ({model.source})", soft_wrap=True)
+    console.print(_joints(mechanism, shown))
+    bodies = [body.name for body in mechanism.bodies]
+    more = f" and {len(bodies) - _LISTED} more" if len(bodies) > _LISTED else ""
+    console.print(f"bodies: {', '.join(bodies[:_LISTED])}{more}", soft_wrap=True)
+    for problem in shown.problems:
+        console.print(f"warning: {problem}", soft_wrap=True)
+    if shown.gaps:
+        listed = ", ".join(f"{name} by {gap}" for name, gap in shown.gaps.items())
+        console.print(f"drawn as given, with open joints: {listed}", soft_wrap=True)
+    console.print(f"drawn in {output}", soft_wrap=True)
+    name = request.model.name
+    console.print(f"next: paraflex info {name}, paraflex run --mechanism {name}", soft_wrap=True)
+
+
+def _joints(mechanism: Mechanism, shown: Posed) -> Table:
+    table = Table(title="joints", title_justify="left")
+    for heading in ("joint", "kind", "between", "motor", *(["open by"] if shown.gaps else [])):
+        table.add_column(heading)
+    motors = {motor.joint: motor.name for motor in mechanism.motors}
+    for joint in mechanism.joints[:_LISTED]:
+        row = [joint.name, joint.kind, f"{joint.a}, {joint.b}", motors.get(joint.name, "")]
+        table.add_row(*row, *([shown.gaps.get(joint.name, "")] if shown.gaps else []))
+    if len(mechanism.joints) > _LISTED:
+        table.add_row(f"and {len(mechanism.joints) - _LISTED} more")
+    return table

@@ -1,0 +1,139 @@
+"""The pose a mechanism starts from, to draw before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System, build_system, closure_of, start_state
+from paraflex.dynamics.projection import joint_gaps
+from paraflex.dynamics.rank import joint_of_row
+from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.state import reference_pose
+from paraflex.errors import InputError, NumericalError
+from paraflex.kinematics import Path, follow_path
+from paraflex.mechanism import Mechanism, Start
+from paraflex.results.drawing import drawing_data, system_drawing
+
+Array = NDArray[np.float64]
+
+# Poses along a path, for rails as long as the travel, and places of the path that is drawn.
+_POSES, _PLACES = 81, 801
+# A gap of joints below this is none [m, rad].
+_CLOSED = 1e-9
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A mechanism at the pose it starts from.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    assembly : str
+        Empty where the start gives all coordinates.
+    data : xarray.Dataset
+        What is drawn, as a run: the start, and the rigid motion along the path where there is one.
+    path : str
+        Name of the path it starts on; empty without.
+    desired : (d, 2) array or None
+        The path's places [m].
+    gaps : mapping of str to str
+        Joints, gears and prescribed motions that are open as drawn, and how far, with the unit; the widest first.
+    problems : tuple of str
+        Why the loops do not close, and why the path cannot be followed.
+    """
+
+    mechanism: Mechanism
+    assembly: str
+    data: xr.Dataset
+    path: str = ""
+    desired: Array | None = None
+    gaps: Mapping[str, str] = field(default_factory=dict)
+    problems: tuple[str, ...] = ()
+
+    @property
+    def closes(self) -> bool:
+        """Whether all loops are closed."""
+        return not self.gaps
+
+
+def posed(
+    mechanism: Mechanism, assembly: str | None = None, path: tuple[str, Path] | None = None, start: Start | None = None
+) -> Posed:
+    """The pose that a run starts from; as given, with its open joints, where the loops do not close.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    assembly : str, optional
+        The first by default.
+    path : (str, Path), optional
+        Its name, and the path that the end-effector starts on.
+    start : Start, optional
+        Of a run without a path.
+
+    Raises
+    ------
+    InputError
+        Nothing says where the bodies are, or an unknown assembly.
+    """
+    if start is not None and path is None:
+        return _started(mechanism, assembly, start)
+    chosen = mechanism.assembly(assembly)
+    rigid = build_system(mechanism.rigid())
+    found = closure_of(rigid, chosen)
+    if found.state is None:
+        q = reference_pose(rigid, chosen)
+        return _open(_of(mechanism, rigid, chosen.name, q[None], path), rigid, q, found.problem)
+    if path is None:
+        return _of(mechanism, rigid, chosen.name, found.state.q[None])
+    try:
+        times = np.linspace(0.0, path[1].duration, _POSES)
+        motion = follow_path(mechanism, path[1], times, assembly=chosen)
+    except (InputError, NumericalError) as error:
+        return _of(mechanism, rigid, chosen.name, found.state.q[None], path, (f"path {path[0]}: {error}",))
+    return _of(mechanism, rigid, chosen.name, motion.q, path)
+
+
+def _started(mechanism: Mechanism, assembly: str | None, start: Start) -> Posed:
+    """The pose of a start; where it cannot be taken, that of the assembly."""
+    system = build_system(mechanism)
+    chosen = mechanism.assembly(assembly) if mechanism.assemblies else None
+    try:
+        state = start_state(system, start, chosen)
+    except (InputError, NumericalError) as error:
+        if chosen is None:
+            raise
+        instead = posed(mechanism, assembly)
+        return replace(instead, problems=(*instead.problems, f"start: {error}"))
+    return _of(mechanism, system, "" if chosen is None else chosen.name, state.q[None])
+
+
+def _of(
+    mechanism: Mechanism,
+    system: System,
+    assembly: str,
+    q: Array,
+    path: tuple[str, Path] | None = None,
+    problems: tuple[str, ...] = (),
+) -> Posed:
+    data = drawing_data(mechanism, system_drawing(system, q), np.arange(len(q), dtype=float))
+    if path is None:
+        return Posed(mechanism, assembly, data, problems=problems)
+    name, followed = path
+    desired = followed.evaluate(np.linspace(0.0, followed.duration, _PLACES)).position
+    return Posed(mechanism, assembly, data, name, desired, problems=problems)
+
+
+def _open(drawn: Posed, rigid: System, q: Array, problem: str) -> Posed:
+    phi = rigid.constraints(moment_signals(rigid.mechanism, 0.0), 0.0, q)[0]
+    # The row that is off most has the unit.
+    rows = [rigid.rows[k] for k in np.argsort(np.abs(phi))]
+    units = {joint_of_row(row): "rad" if row.endswith(" angle") else "m" for row in rows}
+    gaps = {name: f"{gap:.3g} {units[name]}" for name, gap in joint_gaps(rigid, phi).items() if gap > _CLOSED}
+    return replace(drawn, gaps=gaps, problems=(problem,))
