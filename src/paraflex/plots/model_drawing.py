@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
-from paraflex.mechanism import GROUND, Mechanism, PointForce, PointRef
+from paraflex.mechanism import GROUND, Load, Mechanism, PointForce, PointRef, TabulatedLaw
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import three_digits
 from paraflex.plots.layout import TWO_COLUMNS, page_width
@@ -137,19 +137,27 @@ def _draw_loads(axes: Axes, posed: Posed, limits: Limits, look: Theme) -> list[A
     lines = []
     for load in posed.mechanism.loads:
         at = _point(posed, load.point)
+        value = _shown_value(load)
         if isinstance(load, PointForce):
-            if not load.size:
+            if not value.any():
                 continue
-            tail = at - _ARROW * limits.size * np.array(load.force) / load.size
+            tail = at - _ARROW * limits.size * value / np.linalg.norm(value)
             _arrow(axes, tail, at, look.trail, 11.0, 1.6)
             lines.append(np.array([tail, at]))
         else:
-            turn = np.linspace(-0.4, 1.5 * np.pi - 0.4, 40)[:: 1 if load.torque >= 0.0 else -1]
+            turn = np.linspace(-0.4, 1.5 * np.pi - 0.4, 40)[:: 1 if value[0] >= 0.0 else -1]
             arc = at + _TURN * limits.size * np.column_stack([np.cos(turn), np.sin(turn)])
             axes.plot(*arc[:-2].T, color=look.trail, linewidth=1.4, zorder=3.7)
             _arrow(axes, arc[-4], arc[-1], look.trail, 10.0, 1.4)
             lines.append(arc)
     return lines
+
+
+def _shown_value(load: Load) -> Array:
+    """Components of a load at the start; where it begins later, when it is largest within the first second."""
+    ends = [law.times[-1] for law in load.laws if isinstance(law, TabulatedLaw)]
+    values = load.evaluate(np.linspace(0.0, min([1.0, *ends]), 101))
+    return values[0] if values[0].any() else values[np.argmax(np.linalg.norm(values, axis=1))]
 
 
 def _draw_gravity(axes: Axes, mechanism: Mechanism, limits: Limits, look: Theme) -> list[Array]:
@@ -239,8 +247,9 @@ def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> lis
         names.append(Name(f"gear {gear.name}", np.array([_along(line, s) for s in (0.5, 0.25, 0.75)]), look.earth))
     for load in mechanism.loads:
         at = _point(posed, load.point)
-        if isinstance(load, PointForce) and load.size:
-            at = at - 0.8 * _ARROW * limits.size * np.array(load.force) / load.size
+        value = _shown_value(load)
+        if isinstance(load, PointForce) and value.any():
+            at = at - 0.8 * _ARROW * limits.size * value / np.linalg.norm(value)
         names.append(Name(f"load {load.name}", at[None], look.trail))
     held = [joint.place[0] for joint in shown.joints]
     for name, place in mechanism.ground.items():
