@@ -187,7 +187,7 @@ def test_every_public_name_stands_on_one_page():
         for name in public_names(package):
             assert _origin(package, name) in origins, (package, name)
     index = pages["reference/api/index.md"]
-    described = dict(re.findall(r"^\| `pf\.(\w+)` \|[^|]+\| (.+) \|$", index, flags=re.MULTILINE))
+    described = dict(re.findall(r"^\| \[`pf\.(\w+)`\]\S+ \| (.+) \|$", index, flags=re.MULTILINE))
     assert set(described) == set(paraflex.__all__)
     assert described["plan"].startswith("Plan a run of the end-effector along a path")
 

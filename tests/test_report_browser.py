@@ -127,6 +127,20 @@ def test_a_print_keeps_proportions_and_cuts_nothing(opened):
     assert not page.locator("#dock").is_visible()
 
 
+def test_charts_wider_than_paper_are_printed_smaller_as_a_whole(opened):
+    page = opened(viewport={"width": 2000, "height": 1100})
+    curves(page, "path")
+    size = "((box) => [box.width, box.height])(document.querySelector('#chart-path .main-svg').getBoundingClientRect())"
+    wide = page.evaluate(size)
+    assert wide[0] > 700
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    printed = page.evaluate(size)
+    assert printed[0] == pytest.approx(640, abs=2)
+    assert printed[1] / printed[0] == pytest.approx(wide[1] / wide[0], rel=0.01)
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate(size) == pytest.approx(wide)
+
+
 def test_a_table_on_a_phone_says_that_it_scrolls(opened):
     page = opened(viewport=PHONE)
     table = page.locator("#part-modes .scroll")

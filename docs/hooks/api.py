@@ -113,7 +113,7 @@ def _package_page(package: str, names: list[str]) -> str:
 
 def _index_page(homes: dict[str, str]) -> str:
     names = public_names("")
-    rows = [f"| `pf.{name}` | {_link(name, homes)} | {_described(name)} |" for name in names]
+    rows = [f"| {_link(name, homes)} | {_described(name)} |" for name in names]
     packages = [f"| [paraflex.{package}]({package}.md) | {_about(package)} |" for package in PACKAGES]
     return "\n".join(
         [
@@ -121,7 +121,7 @@ def _index_page(homes: dict[str, str]) -> str:
             "",
             "Made from the docstrings. `import paraflex as pf`; what stands here is public.",
             "",
-            *["| Name | Described under | |", "|---|---|---|", *rows, ""],
+            *["| Name | |", "|---|---|", *rows, ""],
             *["| Package | |", "|---|---|", *packages, ""],
             _about(""),
         ]
@@ -130,8 +130,8 @@ def _index_page(homes: dict[str, str]) -> str:
 
 def _link(name: str, homes: dict[str, str]) -> str:
     if name in _MODULES:
-        return f"[paraflex.{_MODULES[name]}]({_MODULES[name]}.md)"
-    return f"[{homes[name]}][]"
+        return f"[`pf.{name}`]({_MODULES[name]}.md)"
+    return f"[`pf.{name}`][{homes[name]}]"
 
 
 def _described(name: str) -> str:

@@ -89,7 +89,7 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
     ]
     for name, mode in summary["modes"].items():
         more += [
-            (f"Largest distance between the paths of two models, mode {name}", _distances(mode, wide)),
+            (f"Distances of paths, mode {name}", _distances(mode, wide)),
             (f"Difference from {printed(reference)}, mode {name}", _differences(mode, summary["links"], reference)),
         ]
     facts = [(name, value) for name, value in common_facts(data) if name != "integration"]
@@ -155,7 +155,8 @@ def _distances(mode: Mapping[str, Any], wide: float) -> str:
         (printed(a), [NO_VALUE if a == b else number(mode["distances"][a][b], beside=wide) for b in names])
         for a in names
     ]  # fmt: skip
-    return table([("[m]", ""), *((printed(name), "") for name in names)], rows, caption="Distances between models")
+    return table([("[m]", ""), *((printed(name), "") for name in names)], rows, caption="Distances between models",
+                 note="Largest distance between the paths of two models.")  # fmt: skip
 
 
 def _differences(mode: Mapping[str, Any], links: Sequence[str], reference: str) -> str:

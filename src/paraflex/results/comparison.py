@@ -287,9 +287,9 @@ def _differing_ends(data: tuple[xr.Dataset, xr.Dataset], names: tuple[str, str])
         ends = [str(_run(each, mode)["status"].item()) for each in data]
         if ends[0] != ends[1]:
             yield f"{f'mode {mode}: ' if mode else ''}{names[0]} is {ends[0]}, {names[1]} {ends[1]}"
-    times = [each["time"].values for each in data]
-    if not np.array_equal(*times):
-        end = min(each[-1] for each in times)
+    first, second = (each["time"].values for each in data)
+    if not np.array_equal(first, second):
+        end = min(first[-1], second[-1])
         how = f"motions are compared until {end:g} s, {names[1]} interpolated by cubic splines"
         yield f"samples at different times: {how}"
 
@@ -307,9 +307,9 @@ def _numbers(mode: str, first: xr.Dataset, second: xr.Dataset) -> list[NumberPai
         for part in parts:
             if part and part not in second["motor"].values:
                 continue
-            both = [float((run[name].sel(motor=part) if part else run[name]).item()) for run in (first, second)]
-            if np.isfinite(both).any():
-                pairs.append(NumberPair(mode, f"{name}.{part}" if part else name, unit, *both, of_solver=solver))
+            one, other = (float((run[name].sel(motor=part) if part else run[name]).item()) for run in (first, second))
+            if np.isfinite([one, other]).any():
+                pairs.append(NumberPair(mode, f"{name}.{part}" if part else name, unit, one, other, of_solver=solver))
     return sorted(pairs, key=lambda pair: (pair.of_solver, -_weight(pair)))
 
 
@@ -337,14 +337,19 @@ def _motion(mode: str, name: str, part: str, first: xr.Dataset, second: xr.Datas
     time, here, there = on_times_of(first, second, name)
     apart = _sizes(there - here)
     at = int(np.argmax(apart)) if apart.size else -1
-    peaks = []
-    for run in (first, second):
-        values = _sizes(run[name].transpose("time", ...).values)
-        peaks.append(float(np.nanmax(values)) if np.isfinite(values).any() else float("nan"))
-    unit = str(first[name].attrs.get("units", "1"))
     nothing = float("nan")
-    difference, when = (float(apart[at]), float(time[at])) if at >= 0 else (nothing, nothing)
-    return MotionPair(mode, name, part, unit, *peaks, difference, when)
+    return MotionPair(
+        mode, name, part, str(first[name].attrs.get("units", "1")),
+        first=_largest(first[name]),
+        second=_largest(second[name]),
+        difference=float(apart[at]) if at >= 0 else nothing,
+        time=float(time[at]) if at >= 0 else nothing,
+    )  # fmt: skip
+
+
+def _largest(values: xr.DataArray) -> float:
+    sizes = _sizes(values.transpose("time", ...).values)
+    return float(np.nanmax(sizes)) if np.isfinite(sizes).any() else float("nan")
 
 
 def _sizes(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -80,7 +80,7 @@ const charts = (() => {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
       xaxis: axis(chart.told.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : {}),
-      yaxis: axis(chart.told.y, { ...(log ? { type: "log", range: decades(chart), dtick: 1, tickformat: "~g" } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
+      yaxis: axis(chart.told.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), dtick: 1, tickformat: "~g" } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
     };
   }
 
@@ -164,6 +164,15 @@ const charts = (() => {
     });
   }
 
+  // A chart keeps the size of the screen on paper; one that is wider is made smaller as a whole, else it would be cut.
+  const PAPER = 640;
+  function fitToPaper(chart) {
+    const drawn = chart.plot._fullLayout;
+    if (!drawn || drawn.width <= PAPER) return;
+    chart.plot.style.zoom = PAPER / drawn.width;
+    chart.plot.parentElement.style.height = `${Math.ceil(drawn.height * PAPER / drawn.width) + 2}px`;
+  }
+
   // Charts in view now, others when they come into view.
   function refresh() {
     for (const chart of all) chart.stale = true;
@@ -215,7 +224,14 @@ const charts = (() => {
     report.on("run", refresh);
     report.on("theme", refresh);
     report.on("time", () => { for (const chart of all) if (chart.inView) moveCursor(chart); });
-    addEventListener("beforeprint", () => { for (const chart of all) if (chart.stale && window.Plotly) draw(chart); });
+    addEventListener("beforeprint", () => {
+      if (!window.Plotly) return;
+      for (const chart of all) if (chart.stale) draw(chart);
+      for (const chart of all) fitToPaper(chart);
+    });
+    addEventListener("afterprint", () => {
+      for (const chart of all) chart.plot.style.zoom = chart.plot.parentElement.style.height = "";
+    });
   }
 
   return { start, refresh, all };
