@@ -171,7 +171,7 @@ def swinging():
     """A pendulum that falls from the horizontal, in four elements."""
     mechanism = held(beam(elements=2), PIN, gravity=(0.0, -9.81), geometry="second-order")
     options = pf.IntegrationOptions(tolerance=1e-7)
-    return simulate_motion(mechanism, 0.3, samples=301, options=options)
+    return simulate_motion(mechanism, 0.15, samples=151, options=options)
 
 
 def test_a_pendulum_bends_as_a_falling_chimney_does_and_hangs_on_its_pin(swinging):
@@ -194,7 +194,7 @@ def test_the_moment_in_motion_is_that_of_exudyn(swinging):
     from exudyn import itemInterface as items
 
     container = exudyn.SystemContainer()
-    mbs, n, places = container.AddSystem(), 12, (0.25 * L, 0.5 * L)
+    mbs, n, places = container.AddSystem(), 20, (0.25 * L, 0.5 * L)
     ground = mbs.AddObject(items.ObjectGround())
     nodes = [
         mbs.AddNode(items.NodePoint2DSlope1(referenceCoordinates=[k * L / n, 0.0, 1.0, 0.0])) for k in range(n + 1)
@@ -227,7 +227,7 @@ def test_the_moment_in_motion_is_that_of_exudyn(swinging):
     mbs.Assemble()
     settings = exudyn.SimulationSettings()
     timing = settings.timeIntegration
-    timing.endTime, timing.numberOfSteps = 0.3, 3000
+    timing.endTime, timing.numberOfSteps = 0.15, 3000
     timing.generalizedAlpha.spectralRadius = 0.9
     settings.solution.sensors.writePeriod = 1e-3
     settings.solution.file.write = False

@@ -65,9 +65,10 @@ def _check_stresses(stresses: NDArray[np.float64], figure: str) -> None:
 def joint_motions(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Angle and rate of every joint that turns, travel and speed of every one that slides; at most seven of each."""
     run = one_run(data, mode)
-    kinds = [(["revolute"], ("angle", "angular_velocity")), (["prismatic", "slot", "sliding"], ("travel", "speed"))]
-    shown = [(np.isin(run["joint_kind"].values, kind), labels) for kind, labels in kinds]
-    shown = [(own, labels) for own, labels in shown if own.any()]
+    slides = np.isfinite(run["joint_direction"].transpose("time", "joint").values).any(axis=0)
+    moves = run["joint_kind"].values != "weld"
+    kinds = ((~slides & moves, ("angle", "angular_velocity")), (slides, ("travel", "speed")))
+    shown = [(own, labels) for own, labels in kinds if own.any()]
     figure, axes = panels(max(len(shown), 1), 2)
     for row, (own, labels) in zip(axes, shown, strict=False):
         joints = run.isel(joint=np.flatnonzero(own))
@@ -96,6 +97,11 @@ def drive_efforts(data: xr.Dataset, mode: str | None = None) -> Figure:
                 label = symbol(name)
                 efforts["torque"][label], efforts["speed"][label] = force, one[f"{dim}_speed"].values
                 efforts["power"][label] = one[f"{dim}_power"].values
+    if not efforts["torque"]:
+        raise InputError(
+            "this mechanism has no motor and no prescribed motion", field="figure", value="drive_efforts",
+            remedy="choose another figure",
+        )  # fmt: skip
     figure, axes = panels(3, 1)
     labels = (effort_label(", ".join(sorted(units, reverse=True))), "speed", axis_label("power"))
     speed = {"N m": axis_label("angular_velocity"), "N": axis_label("speed")}
@@ -112,12 +118,15 @@ def frame_loads(data: xr.Dataset, mode: str | None = None) -> Figure:
     force = run["frame_force"].transpose("time", "axis").values
     figure, axes = panels(2, 1)
     _about_zero(axes[0, 0], run, {"$F_x$": force[:, 0], "$F_y$": force[:, 1]}, axis_label("force"))
-    moment = {"$F_x$": np.full(len(force), np.nan), "$M$ about the origin": run["frame_moment"].values}
-    _about_zero(axes[1, 0], run, moment, axis_label("moment"))
+    moment = {"$M$ about the origin": run["frame_moment"].values}
+    # Looks go on where those of the force end.
+    _about_zero(axes[1, 0], run, moment, axis_label("moment"), first=2)
     return finish_over_time(figure, axes, data, panel_height=40.0)
 
 
-def _about_zero(panel: Axes, run: xr.Dataset, curves: dict[str, NDArray[np.float64]], label: str) -> None:
-    draw_curves(panel, run, curves)
+def _about_zero(
+    panel: Axes, run: xr.Dataset, curves: dict[str, NDArray[np.float64]], label: str, first: int = 0
+) -> None:
+    draw_curves(panel, run, curves, first=first)
     panel.axhline(0.0, **ZERO)
     panel.set_ylabel(label)

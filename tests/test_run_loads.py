@@ -1,0 +1,174 @@
+"""Loads in the results of every run: joints, drives, the ground, stresses, and where they are told."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import paraflex as pf
+from paraflex.designs.measure import measure
+from paraflex.dynamics import momentum
+from paraflex.dynamics.state import State
+from paraflex.mechanism import LinearSpring, PointRef
+from paraflex.motion import simulate_motion
+from paraflex.report import motion_page, tracking_page
+from paraflex.results import load_results, motion_dataset, motion_summary, save_results, summary, tracking_dataset
+from paraflex.results.export import result_tables
+from paraflex.results.loads import load_figures, stress_line
+from paraflex.tracking import plan_tracking
+
+OPTIONS = pf.IntegrationOptions(tolerance=1e-7)
+
+
+@pytest.fixture(scope="module")
+def crank():
+    """A crank that turns at a constant speed, a flexible rod, a slider on a rail; a spring from it to the ground."""
+    mechanism = pf.load("slider_crank_flexible").mechanism
+    spring = LinearSpring("coil", PointRef("ground", "O"), PointRef("slider", "B"), 300.0, 0.1, 2.0)
+    mechanism = replace(mechanism, linear_springs=(spring,))
+    strong = [replace(body, material=replace(body.material, strength=3e7)) if hasattr(body, "material") else body
+              for body in mechanism.bodies]  # fmt: skip
+    return simulate_motion(replace(mechanism, bodies=tuple(strong)), 0.02, samples=401, options=OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def data(crank):
+    return motion_dataset(crank)
+
+
+def test_a_prescribed_motion_has_its_torque_speed_and_power(crank, data):
+    moment = data["joint_moment"].sel(joint="O")
+    np.testing.assert_allclose(data["drive_torque"].sel(drive="drive"), moment, rtol=1e-12)
+    np.testing.assert_allclose(data["drive_speed"].sel(drive="drive"), 150.0, rtol=1e-9)
+    np.testing.assert_allclose(data["drive_power"], data["drive_torque"] * data["drive_speed"])
+    assert data["drive_torque"].attrs["units"] == "N m"
+    # It does all the work that is stored or damped by the spring.
+    power = data["drive_power"].sel(drive="drive").values
+    done = np.trapezoid(power, data["time"])
+    stored = (data["kinetic_energy"] + data["strain_energy"]).values
+    speed = data["joint_speed"].sel(joint=slider_joint(data)).values
+    damped = np.trapezoid(2.0 * speed**2, data["time"])
+    assert done == pytest.approx(stored[-1] - stored[0] + damped, rel=5e-3)
+
+
+def slider_joint(data):
+    return next(str(name) for name in data["joint"].values if data["joint_kind"].sel(joint=name) == "slider")
+
+
+def test_the_travel_of_a_slider_is_the_place_of_its_point(data):
+    joint, place = slider_joint(data), data["point_position"].sel(point="slider.B", axis="x")
+    np.testing.assert_allclose(data["joint_coordinate"].sel(joint=joint), place, rtol=0, atol=1e-9)
+    rate = np.gradient(place.values, data["time"].values)
+    np.testing.assert_allclose(
+        data["joint_speed"].sel(joint=joint)[1:-1], rate[1:-1], rtol=0, atol=0.01 * np.abs(rate).max()
+    )
+    assert data["joint_coordinate"].attrs["units"] == "rad, m"
+
+
+def test_what_shakes_the_ground_is_what_changes_the_momentum(crank):
+    """Springs to the ground among it: without them the sum would be wrong by their pull of up to 70 N."""
+    system, solution = crank.system, crank.solution
+    h = 1e-7
+    data = motion_dataset(crank)
+    for k in (70, 230):
+        q, v, a = solution.q[k], solution.v[k], solution.a[k]
+        ahead = momentum(system, State(0.0, q + h * v + 0.5 * h**2 * a, v + h * a))
+        behind = momentum(system, State(0.0, q - h * v + 0.5 * h**2 * a, v - h * a))
+        force, moment = (ahead[0] - behind[0]) / (2 * h), (ahead[1] - behind[1]) / (2 * h)
+        weight = np.array(system.mechanism.gravity) * system.total_mass
+        assert not weight.any()
+        # Accelerations and multipliers between steps are interpolated, each for itself.
+        for name, change in (("frame_force", force), ("frame_moment", moment)):
+            most = np.abs(data[name]).max().item()
+            np.testing.assert_allclose(data[name][k], -change, rtol=0, atol=3e-3 * most)
+
+
+def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_path):
+    k, place = float(data["stress_time"].sel(body="rod")), float(data["stress_place"].sel(body="rod"))
+    own = data.sel(time=k)
+    station = np.flatnonzero(own["section_place"].values == place)[0]
+    by_hand = abs(own["section_moment"] / own["section_modulus"]) + abs(own["section_force"] / own["section_area"])
+    by_hand = by_hand.values[station]
+    most = data["stress_max"].sel(body="rod").item()
+    assert most == pytest.approx(by_hand, rel=1e-6)
+    assert most == pytest.approx(data["stress"].sel(body="rod").max().item(), rel=1e-6)
+    assert data["safety_factor"].sel(body="rod").item() == pytest.approx(3e7 / most)
+    assert np.isnan(data["stress_max"].sel(body="crank").item())
+    told = motion_summary(data)["loads"]
+    assert told["beams"]["rod"]["stress_max"] == most
+    assert set(told) == {"beams", "joints", "motors", "drives", "frame"}
+    assert list(told["beams"]) == ["rod"]
+    assert "MPa in rod at" in stress_line({"": told})
+    # Below one, which is said three times.
+    assert told["beams"]["rod"]["safety_factor"] < 1.0
+    assert "stress-over-strength" in {one.code for one in crank.doubts}
+    page = motion_page(data)
+    titles = [title for title, _ in page.tables]
+    assert titles == ["Run", "Stresses of beams", "Motors and prescribed motions", "Joints and ground"]
+    assert "over strength" in page.tables[1][1]
+    assert any("stress-over-strength" in note for note in page.notes)
+    tables = result_tables(data, shapes=True)
+    assert "joint_speed_" + slider_joint(data) in tables["time_series"]
+    assert len(tables["sections"]) == data.sizes["time"] * data.sizes["section"]
+    save_results(data, tmp_path / "results.nc")
+    xr.testing.assert_equal(load_results(tmp_path / "results.nc")["stress"], data["stress"])
+
+
+def test_results_of_earlier_versions_have_no_loads_and_are_drawn(data):
+    new = {name for name in data.variables if "section" in str(name) or "drive" in str(name) or "frame" in str(name)}
+    new |= {name for name in data.variables if "stress" in str(name) or str(name).startswith(("joint_c", "joint_s"))}
+    old = data.drop_vars(new | {"safety_factor", "motor_energy"})
+    assert load_figures(old) == {}
+    assert [title for title, _ in motion_page(old).tables] == ["Run"]
+    assert json.loads(json.dumps(motion_summary(old)))["loads"] == {}
+
+
+@pytest.fixture(scope="module")
+def run():
+    model = pf.load("five_bar")
+    task = plan_tracking(model, "line", duration=0.05, samples=26, assembly="outward")
+    return task.simulate("++", options=pf.IntegrationOptions(step=1e-3, tolerance=1e-9))
+
+
+def test_metrics_are_the_largest_of_the_dataset(run):
+    found = measure(run, ("stress_max", "section_moment_max", "safety_factor_min", "motor_energy"))
+    data = tracking_dataset([run])
+    assert found["stress_max"] == pytest.approx(data["stress_max"].max().item(), rel=1e-6)
+    assert found["section_moment_max"] == pytest.approx(np.abs(data["section_moment"]).max().item(), rel=1e-6)
+    assert found["motor_energy"] == pytest.approx(data["motor_energy"].sum().item(), rel=1e-6)
+    assert np.isnan(found["safety_factor_min"])
+    assert summary(data)["modes"]["++"]["loads"]["beams"]
+    assert any(title == "Stresses of beams" for title, _ in tracking_page(data).tables)
+
+
+STUDY = """
+mechanism = "five_bar"
+paths = ["line"]
+duration = 0.05
+samples = 26
+metrics = ["stress_max", "section_moment_max"]
+
+[integration]
+step = 1e-3
+tolerance = 1e-9
+
+[vary.thickness]
+fields = ["section.bar.thickness"]
+"""
+
+
+def test_the_stress_has_exact_derivatives(tmp_path):
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    found = pf.sensitivities(tmp_path / "study.toml")
+    thickness = pf.load("five_bar").mechanism.bodies[0].section.sides[1]
+    step = 1e-6
+    near = STUDY + f"values = [{thickness - step}, {thickness + step}]\n"
+    (tmp_path / "near.toml").write_text(near, encoding="utf-8")
+    table = pf.sweep(tmp_path / "near.toml", tmp_path / "out", workers=1).data
+    for k, metric in enumerate(found.metrics):
+        low, high = table[metric].values.ravel()
+        assert np.asarray(found.derivatives).ravel()[k] == pytest.approx((high - low) / (2 * step), rel=2e-4)
