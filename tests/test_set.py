@@ -7,6 +7,7 @@ import shlex
 import pytest
 
 import paraflex as pf
+from paraflex.designs.sweep import load_sweep
 from paraflex.files import load_data
 from paraflex.files.overlay import find_place, value_of, with_values
 from paraflex.report.provenance import asked, run_command_line
@@ -142,3 +143,16 @@ def test_options_take_units(tmp_path, monkeypatch):
         assert wrong.returncode == 2
         assert "--duration" in wrong.stderr
         assert re.search(says, " ".join(wrong.stderr.split()))
+
+
+def test_a_study_sets_values_of_its_mechanism(tmp_path):
+    study = 'mechanism = "five_bar"\nset = { "bar.width" = "4 cm", "study.samples" = 11 }\n'
+    study += '[vary.thickness]\nvalues = ["5 mm", "6 mm"]\nfields = ["bar.thickness"]\n'
+    (tmp_path / "study.toml").write_text(study)
+    loaded = load_sweep(tmp_path / "study.toml")
+    model, _ = loaded.setting.design((0.006,))
+    assert model.mechanism.bodies[0].section == pf.Section.rectangle(0.04, 0.006)
+    assert model.study.samples == 11
+    (tmp_path / "study.toml").write_text(study.replace("4 cm", "4 kg"))
+    with pytest.raises(pf.InputError, match=r"five_bar.toml: section.bar.width: a quantity in kg where one in m"):
+        load_sweep(tmp_path / "study.toml")
