@@ -4,6 +4,7 @@ import json
 import re
 import shlex
 
+import numpy as np
 import pytest
 
 import paraflex as pf
@@ -90,7 +91,7 @@ def test_a_name_of_several_tables_is_refused():
 @pytest.mark.parametrize(
     ("text", "value"),
     [("0.3", 0.3), ("4", 4), ("true", True), ("[0, -9.81]", [0, -9.81]), ("30 deg", "30 deg"), ("circle", "circle"),
-     ('"4"', "4"), ("-l1 / 2", "-l1 / 2"), (".5", ".5"), ("[" * 9999, "[" * 9999)],
+     ('"4"', "4"), ("1\nb = 2", "1\nb = 2"), ("-l1 / 2", "-l1 / 2"), (".5", ".5"), ("[" * 9999, "[" * 9999)],
 )  # fmt: skip
 def test_texts_of_a_shell_stand_for_values(text, value):
     found = value_of(text)
@@ -156,3 +157,18 @@ def test_a_study_sets_values_of_its_mechanism(tmp_path):
     (tmp_path / "study.toml").write_text(study.replace("4 cm", "4 kg"))
     with pytest.raises(pf.InputError, match=r"five_bar.toml: section.bar.width: a quantity in kg where one in m"):
         load_sweep(tmp_path / "study.toml")
+
+
+def test_values_may_be_numpy_ones_and_names_of_files(tmp_path):
+    model = pf.load("five_bar", set={"gravity": np.array([0.0, -9.81]), "distal1.elements": np.int64(2)})
+    assert model.mechanism.gravity == (0.0, -9.81)
+    assert model.mechanism.body("distal1").elements == 2
+    (tmp_path / "rows.csv").write_text("t, angle\n0, 0\n1, 0.5\n2, 1.0\n")
+    text = (
+        'name = "rotor"\nground = { O = [0, 0] }\njoint = { O = ["ground.O", "rotor.O"] }\n'
+        'body.rotor = { type = "rigid", mass = 1.0, inertia = 1.0, points = { O = [0, 0] } }\n'
+        'prescribed.drive = { joint = "O", table = [[0.0, 0.0], [1.0, 1.0]] }\n'
+    )
+    (tmp_path / "rotor.toml").write_text(text)
+    (drive,) = pf.load(tmp_path / "rotor.toml", set={"drive.table": "rows.csv"}).mechanism.prescribed
+    assert list(drive.law.values) == [0.0, 0.5, 1.0]
