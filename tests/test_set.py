@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import paraflex as pf
+from paraflex.cli.sensitivity import _values
 from paraflex.designs.sweep import load_sweep
 from paraflex.files import load_data
 from paraflex.files.overlay import find_place, value_of, with_values
 from paraflex.report.provenance import asked, run_command_line
+from paraflex.studies import load_sensitivities
 from shell import paraflex
 
 
@@ -172,3 +174,13 @@ def test_values_may_be_numpy_ones_and_names_of_files(tmp_path):
     (tmp_path / "rotor.toml").write_text(text)
     (drive,) = pf.load(tmp_path / "rotor.toml", set={"drive.table": "rows.csv"}).mechanism.prescribed
     assert list(drive.law.values) == [0.0, 0.5, 1.0]
+
+
+def test_a_sensitivity_is_taken_at_values_with_units(tmp_path):
+    (tmp_path / "study.toml").write_text('mechanism = "five_bar"\n[vary.t]\nfields = ["bar.thickness"]\n')
+    setting = load_sensitivities(tmp_path / "study.toml").setting
+    assert _values(["t = 6 mm"], setting) == {"t": 0.006}
+    assert _values(["t=0.006"], setting) == {"t": 0.006}
+    for entry, says in [("t=6 kg", "--at: a quantity in kg where one in m"), ("t", "--at: not NAME=VALUE")]:
+        with pytest.raises(pf.InputError, match=says):
+            _values([entry], setting)
