@@ -4,12 +4,16 @@ import json
 import re
 import shlex
 
+import numpy as np
 import pytest
 
 import paraflex as pf
+from paraflex.cli.sensitivity import _values
+from paraflex.designs.sweep import load_sweep
 from paraflex.files import load_data
 from paraflex.files.overlay import find_place, value_of, with_values
 from paraflex.report.provenance import asked, run_command_line
+from paraflex.studies import load_sensitivities
 from shell import paraflex
 
 
@@ -89,7 +93,7 @@ def test_a_name_of_several_tables_is_refused():
 @pytest.mark.parametrize(
     ("text", "value"),
     [("0.3", 0.3), ("4", 4), ("true", True), ("[0, -9.81]", [0, -9.81]), ("30 deg", "30 deg"), ("circle", "circle"),
-     ('"4"', "4"), ("-l1 / 2", "-l1 / 2"), (".5", ".5"), ("[" * 9999, "[" * 9999)],
+     ('"4"', "4"), ("1\nb = 2", "1\nb = 2"), ("-l1 / 2", "-l1 / 2"), (".5", ".5"), ("[" * 9999, "[" * 9999)],
 )  # fmt: skip
 def test_texts_of_a_shell_stand_for_values(text, value):
     found = value_of(text)
@@ -142,3 +146,41 @@ def test_options_take_units(tmp_path, monkeypatch):
         assert wrong.returncode == 2
         assert "--duration" in wrong.stderr
         assert re.search(says, " ".join(wrong.stderr.split()))
+
+
+def test_a_study_sets_values_of_its_mechanism(tmp_path):
+    study = 'mechanism = "five_bar"\nset = { "bar.width" = "4 cm", "study.samples" = 11 }\n'
+    study += '[vary.thickness]\nvalues = ["5 mm", "6 mm"]\nfields = ["bar.thickness"]\n'
+    (tmp_path / "study.toml").write_text(study)
+    loaded = load_sweep(tmp_path / "study.toml")
+    model, _ = loaded.setting.design((0.006,))
+    assert model.mechanism.bodies[0].section == pf.Section.rectangle(0.04, 0.006)
+    assert model.study.samples == 11
+    (tmp_path / "study.toml").write_text(study.replace("4 cm", "4 kg"))
+    with pytest.raises(pf.InputError, match=r"five_bar.toml: section.bar.width: a quantity in kg where one in m"):
+        load_sweep(tmp_path / "study.toml")
+
+
+def test_values_may_be_numpy_ones_and_names_of_files(tmp_path):
+    model = pf.load("five_bar", set={"gravity": np.array([0.0, -9.81]), "distal1.elements": np.int64(2)})
+    assert model.mechanism.gravity == (0.0, -9.81)
+    assert model.mechanism.body("distal1").elements == 2
+    (tmp_path / "rows.csv").write_text("t, angle\n0, 0\n1, 0.5\n2, 1.0\n")
+    text = (
+        'name = "rotor"\nground = { O = [0, 0] }\njoint = { O = ["ground.O", "rotor.O"] }\n'
+        'body.rotor = { type = "rigid", mass = 1.0, inertia = 1.0, points = { O = [0, 0] } }\n'
+        'prescribed.drive = { joint = "O", table = [[0.0, 0.0], [1.0, 1.0]] }\n'
+    )
+    (tmp_path / "rotor.toml").write_text(text)
+    (drive,) = pf.load(tmp_path / "rotor.toml", set={"drive.table": "rows.csv"}).mechanism.prescribed
+    assert list(drive.law.values) == [0.0, 0.5, 1.0]
+
+
+def test_a_sensitivity_is_taken_at_values_with_units(tmp_path):
+    (tmp_path / "study.toml").write_text('mechanism = "five_bar"\n[vary.t]\nfields = ["bar.thickness"]\n')
+    setting = load_sensitivities(tmp_path / "study.toml").setting
+    assert _values(["t = 6 mm"], setting) == {"t": 0.006}
+    assert _values(["t=0.006"], setting) == {"t": 0.006}
+    for entry, says in [("t=6 kg", "--at: a quantity in kg where one in m"), ("t", "--at: not NAME=VALUE")]:
+        with pytest.raises(pf.InputError, match=says):
+            _values([entry], setting)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
+from paraflex.checks.unused import file_findings
 from paraflex.files import library_text, load_data, model_from
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
 from paraflex.files.expressions import ExpressionError, evaluate
@@ -219,3 +220,11 @@ def test_saved_files_keep_units_and_write_si_numbers(tmp_path):
     replace(model, mechanism=model.mechanism.with_bodies(bodies)).save(tmp_path / "wider.toml")
     lines = (tmp_path / "wider.toml").read_text().splitlines()
     assert [line.split("#")[0].strip() for line in lines if line.startswith("width")] == ["width = 0.04"]
+
+
+def test_a_unit_is_no_use_of_a_parameter_of_its_name():
+    data, source = load_data("five_bar")
+    data["parameters"] |= {"m": 1.0, "half": 0.5}
+    data["section"]["bar"] |= {"width": "0.03 m", "thickness": "half * 10 mm"}
+    found = [finding.place for finding in file_findings(model_from(data, source)) if finding.code == "unused"]
+    assert found == ["parameters.m"]

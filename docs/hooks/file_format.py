@@ -16,9 +16,10 @@ HEAD = """# The model file, field by field
 This page is made from the schema that files are checked by; `paraflex schema` prints the same as JSON Schema, for
 editors. [Your own mechanism](../model-file.md) explains the tables with examples.
 
-Plain numbers are in SI units and radians. Wherever a *number* may stand, so may one with a unit, `"80 mm"`, and an expression
-in quotes, `"l1 - 0.5 * l2"`: of numbers, names from `[parameters]`, `pi`, `+ - * / **`, brackets, and of one argument `sin cos tan asin acos atan`
-`sinh cosh tanh exp log sqrt`. Where *of the time* is said it may hold `t` as well. NAME stands for one that you choose.
+Plain numbers are in SI units and radians. Wherever a *number* may stand, so may one with a unit, `"80 mm"`, and an
+expression in quotes, `"l1 - 0.5 * l2"`: of numbers, names from `[parameters]`, `pi`, `+ - * / **`, brackets, and of one
+argument `sin cos tan asin acos atan sinh cosh tanh exp log sqrt`. Where *of the time* is said it may hold
+`t` as well. NAME stands for one that you choose.
 
 """
 

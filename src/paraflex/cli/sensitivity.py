@@ -15,7 +15,10 @@ from paraflex.cli.ending import tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.tables import number, plain_table, print_titled
 from paraflex.cli.writing import write_drawn
+from paraflex.designs.setting import Setting
+from paraflex.designs.units import check_unit_of
 from paraflex.errors import InputError
+from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.folders import SENSITIVITY
 from paraflex.studies import Sensitivities, load_sensitivities
 from paraflex.studies.sensitivities.study import FIGURES, LINES, TABLE
@@ -29,7 +32,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     named = [name.strip() for entry in request.metrics for name in entry.split(",")]
     study = load_sensitivities(request.study, [name for name in named if name])
     folder = request.folder
-    study = replace(study, at=_values(request.at))
+    study = replace(study, at=_values(request.at, study.setting))
     with hold_results(folder, SENSITIVITY, force=request.force, field="--output") as held:
         found = study.run()
         found.save_in(held)
@@ -45,14 +48,17 @@ def sensitivity_command(request: SensitivityRequest) -> int:
     return COMPLETE
 
 
-def _values(entries: list[str]) -> dict[str, float]:
+def _values(entries: list[str], setting: Setting) -> dict[str, float]:
+    """Values by name, in SI units; a unit is that of the parameter's fields."""
     values = {}
     for entry in entries:
-        name, _, value = entry.partition("=")
+        name, _, value = (part.strip() for part in entry.partition("="))
         try:
-            values[name.strip()] = float(value)
-        except ValueError:
+            values[name] = evaluate(value, {})
+        except ExpressionError:
             raise InputError("not NAME=VALUE", field="--at", value=entry, remedy="say --at thickness=0.006") from None
+        for place in dict(zip(setting.names, setting.places, strict=True)).get(name, ()):
+            check_unit_of(setting.data, place, value, "--at")
     return values
 
 

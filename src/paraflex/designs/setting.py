@@ -155,7 +155,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
     InputError
         Anything that does not fit the mechanism, whatever designs are taken.
     """
-    model = read_model(_mechanism(table.mechanism, folder))
+    model = read_model(_mechanism(table.mechanism, folder), table.set)
     data = model.parameters
     parameters = tuple(_varied(name, entry, data) for name, entry in table.vary.items())
     setting = Setting(

@@ -102,7 +102,7 @@ def read_section(name: str, table: SectionTable) -> Section:
     own = {each.name: each for each in fields(made) if each.name != "shape"}
     for key, value in given.items():
         if key not in own:
-            what = kind or "section by its area"
+            what = "section by its area" if kind is None else f"{kind} section"
             raise InputError(
                 f"a {what} has no {key}", field=f"section.{name}.{key}", value=value, remedy="leave it out"
             )

@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.mechanism import JOINT_KINDS
-from paraflex.units import FIELD_UNITS, PLAIN, Dimension, spelt, unit_named
+from paraflex.units import FIELD_UNITS, PLAIN, Dimension, quantities_in, spelt, unit_named
 
 # A place in parsed TOML: keys of tables and indices of lists.
 Place = tuple[str | int, ...]
@@ -21,6 +21,8 @@ Place = tuple[str | int, ...]
 _SI = f"(?:{'|'.join(map(re.escape, FIELD_UNITS))})"
 # "in m", "in rad/s or m/s", "in s and rad or m"; the longest unit that fits stands first in the list.
 _IN_UNITS = re.compile(rf"\bin ({_SI}(?:,? (?:or|and) {_SI})*)(?=[\s,.)]|$)")
+# Tables of numbers by names of the user's, and of values whose fields are those of another file.
+_OF_ANY_UNIT = ("parameters", "set")
 # What a spring's stiffness, a rest, a torque or a speed at a joint is where the joint slides.
 _WHERE_IT_SLIDES = {"N m/rad": "N/m", "N m s/rad": "N s/m", "N m": "N", "rad": "m", "rad/s": "m/s"}
 _WHERE_IT_TURNS = {slides: turns for turns, slides in _WHERE_IT_SLIDES.items()}
@@ -76,7 +78,7 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
     place : tuple
     """
     found = field_at(schema, data, place)
-    if place[0] == "parameters" or "unit of" in found.description:
+    if place[0] in _OF_ANY_UNIT or "unit of" in found.description:
         return None
     units = _units_in(found.description, _row(data, place), place[-1])
     slides = _slides(data, place)
@@ -96,7 +98,10 @@ def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
     """
     table = data.get("parameters", {})
     parameters = dimensions_of_parameters(table if isinstance(table, dict) else {})
+    with_units = any(dimension is not None for dimension in parameters.values())
     for place, text in _texts(data, ()):
+        if not (with_units or quantities_in(text)):
+            continue
         found = field_at(schema, data, place)
         if _is_number(found.annotation):
             units = units_at(schema, data, place)

@@ -13,7 +13,7 @@ from paraflex.files.generators import generated_text, generator_names, is_genera
 from paraflex.files.library import library_file, library_names
 from paraflex.files.mechanism import read_mechanism, read_path, read_paths, read_torques
 from paraflex.files.merge import merged, same
-from paraflex.files.overlay import with_values
+from paraflex.files.overlay import plain, with_values
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
 from paraflex.files.rows import with_names, with_rows
 from paraflex.files.schema import ModelTable, PathFile
@@ -270,10 +270,8 @@ def load(name_or_file: str | FilePath, *, set: Mapping[str, Any] | None = None) 
 def read_model(name_or_file: str | FilePath, settings: Mapping[str, Any] | None = None) -> Model:
     """What `load` reads, without its warnings."""
     text, source, folder = _read(name_or_file)
-    data = _parsed(text, source, folder)
-    with naming(source):
-        data = with_values(data, settings or {})
-    return replace(model_from(data, source, text), settings=dict(settings or {}))
+    values = {name: plain(value) for name, value in (settings or {}).items()}
+    return replace(model_from(_parsed(text, source, folder, values), source, text), settings=values)
 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
@@ -286,7 +284,7 @@ def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:
         Unknown name, unreadable file, or a file it names that cannot be read.
     """
     text, source, folder = _read(name_or_file)
-    return _parsed(text, source, folder), source
+    return _parsed(text, source, folder, {}), source
 
 
 @checked_arguments()
@@ -306,9 +304,9 @@ def model_from(data: dict[str, Any], source: str, text: str = "") -> Model:
         return _model(validate(ModelTable, data, source), data, source, text)
 
 
-def _parsed(text: str, source: str, folder: FilePath) -> dict[str, Any]:
+def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any]) -> dict[str, Any]:
     with naming(source):
-        return with_rows(parse_toml(text, source), folder)
+        return with_rows(with_values(parse_toml(text, source), settings), folder)
 
 
 def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:

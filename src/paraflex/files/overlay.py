@@ -64,16 +64,23 @@ def with_values(data: dict[str, Any], values: Mapping[str, Any]) -> dict[str, An
         place = _place_to_set(data, field)
         if isinstance(value, Mapping):
             raise InputError("a table", field=field, value=value, remedy="set its fields one by one")
-        data = overlaid(data, [(place, list(value) if isinstance(value, tuple) else value)])
+        data = overlaid(data, [(place, value)])
     return data
+
+
+def plain(value: Any) -> Any:
+    """A value as TOML has it: numbers and arrays of NumPy, and tuples, as numbers and lists."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return list(value) if isinstance(value, tuple) else value
 
 
 def value_of(text: str) -> Any:
     """What a text stands for in a file: a number, truth value, list, or text without its quotes."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
         return text
+    return found["value"] if len(found) == 1 else text
 
 
 def _place_to_set(data: Mapping[str, Any], field: str) -> Place:
