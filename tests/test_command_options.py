@@ -10,7 +10,7 @@ COMMANDS = get_command(program.app).commands
 NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}
 STUDIES = ("sensitivity", "sweep", "optimise", "optimize", "identify", "indices")
 NEEDED |= {name: ["study.toml"] for name in STUDIES}
-MODEL_COMMANDS = ("run", "verify", "compare-methods", "modes", "info")
+MODEL_COMMANDS = ("run", "verify", "compare-methods", "modes", "draw", "info")
 
 
 def options():
@@ -52,7 +52,7 @@ def called(monkeypatch, command, line):
         loaded.append(name)
         raise InputError("enough", field="test")
 
-    for module in ("run", "verify", "compare", "modes", "inspect"):
+    for module in ("run", "verify", "compare", "modes", "draw", "inspect"):
         monkeypatch.setattr(f"paraflex.cli.{module}.load", load)
     with pytest.raises(InputError, match="enough"):
         COMMANDS[command].main([*line], standalone_mode=False)

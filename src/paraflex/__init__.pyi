@@ -45,7 +45,8 @@ from .kinematics import Circle as Circle, Line as Line, PointPath as PointPath, 
 
 # Models: read, checked, planned, run
 from .files import Model as Model, load as load, load_path as load_path, plan as plan
-from .checks import check as check, draw as draw
+from .checks import check as check
+from .checks.drawing import draw as draw
 from .tracking import simulate as simulate
 from .motion import simulate_motion as simulate_motion
 

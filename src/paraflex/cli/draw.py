@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from paraflex.checks import pose_of
+from paraflex.checks.drawing import pose_of
 from paraflex.cli import COMPLETE
 from paraflex.cli.animate import refuse_existing
 from paraflex.cli.commands.models import DrawRequest
