@@ -10,7 +10,7 @@ COMMANDS = get_command(program.app).commands
 NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}
 STUDIES = ("sensitivity", "sweep", "optimise", "optimize", "identify", "indices")
 NEEDED |= {name: ["study.toml"] for name in STUDIES}
-MODEL_COMMANDS = ("run", "verify", "compare-methods", "modes", "info")
+MODEL_COMMANDS = ("run", "verify", "compare-methods", "modes", "draw", "info")
 
 
 def options():
@@ -48,12 +48,11 @@ def called(monkeypatch, command, line):
     """The model that a command would load."""
     loaded = []
 
-    def load(name):
+    def load(name, **_):
         loaded.append(name)
         raise InputError("enough", field="test")
 
-    for module in ("run", "verify", "compare_methods", "modes", "inspect"):
-        monkeypatch.setattr(f"paraflex.cli.{module}.load", load)
+    monkeypatch.setattr("paraflex.cli.request.load", load)
     with pytest.raises(InputError, match="enough"):
         COMMANDS[command].main([*line], standalone_mode=False)
     return loaded

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.text
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from paraflex.checks import pose_of
+from paraflex.checks.drawing import pose_of
 from paraflex.cli import draw as command
 from paraflex.errors import ModelWarning
 from paraflex.files import library_names, library_text
@@ -249,3 +250,5 @@ def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:
         assert said in done.stderr
     with pytest.raises(pf.InputError, match="not a model"):
         pf.draw(3)
+    with pytest.raises(pf.InputError, match="nothing says where the bodies are"):
+        pf.draw(replace(pf.load("slider_crank").mechanism, assemblies=()))

@@ -167,7 +167,8 @@ def test_the_sketch_puts_links_end_to_end() -> None:
     assert places["link1"]["B1"] == pytest.approx(places["link4"]["B1"])
     drawn = sketch(mechanism)
     assert drawn.count('stroke-linecap="round"') == 8
-    assert drawn.count("<circle") == 11
+    # Eleven pins and the end-effector.
+    assert drawn.count("<circle") == 12
     assert sketch(replace(mechanism, assemblies=())) == ""
     assert 'fill-opacity="0.25"' in sketch(pf.load("3rrr").mechanism)
     assert 'fill-opacity="0.25"' not in drawn

@@ -53,7 +53,8 @@ from .kinematics import (
 
 # Models: read, checked, planned, run
 from .files import Model as Model, load as load, load_path as load_path, plan as plan
-from .checks import check as check, draw as draw
+from .checks import check as check
+from .checks.drawing import draw as draw
 from .tracking import simulate as simulate
 from .motion import simulate_motion as simulate_motion
 

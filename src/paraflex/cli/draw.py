@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from paraflex.checks import pose_of
+from paraflex.checks.drawing import pose_of
 from paraflex.cli import COMPLETE
 from paraflex.cli.animate import refuse_existing
 from paraflex.cli.commands.models import DrawRequest
+from paraflex.cli.request import asked_model
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
-from paraflex.files import Model, load
+from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.writing import portable_name, whole_file
 
@@ -52,7 +53,7 @@ def draw_command(request: DrawRequest) -> int:
                 remedy="end it in .html, .svg, .png or .pdf",
             )  # fmt: skip
         refuse_existing(output, request.force)
-    model = load(request.model.name)
+    model = asked_model(request.model)
     shown = pose_of(model, assembly=request.assembly, path=request.path)
     if output is None:
         output = Path(tempfile.mkdtemp(prefix="paraflex-")) / f"{portable_name(model.mechanism.name)}.html"

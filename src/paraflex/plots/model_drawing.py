@@ -37,12 +37,13 @@ _ARROW, _TURN = 0.12, 0.045
 _OPEN = "#c8102e"
 _GAP: dict[str, Any] = {"color": _OPEN, "linewidth": 1.3, "linestyle": (0, (3, 2)), "marker": "x", "markersize": 5.0}
 _START: dict[str, Any] = {"marker": "s", "markersize": 7.0, "markerfacecolor": "none", "linestyle": "none"}
-_KINDS: dict[str, tuple[str, dict[str, Any]]] = {
-    "pin": ("revolute", {"marker": "o", "markerfacecolor": "white", "markersize": 5.0}),
-    "weld": ("weld", {"marker": "s", "markerfacecolor": "black", "markersize": 4.0}),
-    "slider": ("prismatic", {"marker": (4, 0, 45), "markerfacecolor": "white", "markersize": 8.0}),
-    "slot": ("slot", {"marker": "$⊡$", "markersize": 8.0}),
-    "sliding": ("slides along a beam", {"marker": "$⊡$", "markersize": 8.0}),
+# Kinds of joints in the legend by their symbols: words, marker, its size [pt], and what it is filled with.
+_KINDS: dict[str, tuple[str, Any, float, str]] = {
+    "pin": ("revolute", "o", 5.0, "ground"),
+    "weld": ("weld", "s", 4.0, "ink"),
+    "slider": ("prismatic", (4, 0, 45), 8.0, "ground"),
+    "slot": ("slot", "$⊡$", 8.0, "ink"),
+    "sliding": ("slides along a beam", "$⊡$", 8.0, "ink"),
 }
 
 
@@ -277,7 +278,11 @@ def _legend(figure: Figure, posed: Posed, shown: Scene, look: Theme) -> None:
     """The symbols that occur."""
     kinds = {joint.kind for joint in shown.joints}
     plain: dict[str, Any] = {"linestyle": "none", "markeredgecolor": look.ink, "color": look.ink}
-    entries = [Line2D([], [], **plain | drawn, label=text) for kind, (text, drawn) in _KINDS.items() if kind in kinds]
+    entries = [
+        Line2D([], [], **plain, label=text, marker=marker, markersize=size, markerfacecolor=getattr(look, fill))
+        for kind, (text, marker, size, fill) in _KINDS.items()
+        if kind in kinds
+    ]
     if posed.mechanism.motors:
         motor: dict[str, Any] = {
             "marker": "o",
@@ -285,7 +290,7 @@ def _legend(figure: Figure, posed: Posed, shown: Scene, look: Theme) -> None:
             "markersize": 6.5,
             "markeredgewidth": 3.0,
         }
-        entries.append(Line2D([], [], **plain | motor, marker="o", label="motor"))
+        entries.append(Line2D([], [], **plain | motor, label="motor"))
     if posed.mechanism.end_effector is not None:
         tip: dict[str, Any] = {"marker": "o", "color": look.trail, "markeredgecolor": look.trail, "markersize": 4.2}
         entries.append(Line2D([], [], **plain | tip, label="end-effector"))

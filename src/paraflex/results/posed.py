@@ -84,6 +84,11 @@ def posed(
     """
     if start is not None and path is None:
         return _started(mechanism, assembly, start)
+    if not mechanism.assemblies:
+        raise InputError(
+            "no assembly: nothing says where the bodies are", field="assembly",
+            remedy="add an [assembly.NAME] table with an approximate angle of each body, in rad",
+        )  # fmt: skip
     chosen = mechanism.assembly(assembly)
     rigid = build_system(mechanism.rigid())
     found = closure_of(rigid, chosen)
