@@ -50,7 +50,7 @@ def read_csv(file):
 
 def test_tables_are_tidy(data):
     tables = result_tables(data, shapes=True)
-    assert list(tables) == ["time_series", "figures", "shapes"]
+    assert list(tables) == ["time_series", "figures", "shapes", "sections"]
     series = tables["time_series"]
     assert len(series) == 2 * 21
     assert list(series.columns[:2]) == ["mode", "time"]
@@ -189,7 +189,7 @@ def test_the_command_writes_beside_the_results(folder):
     done = CliRunner().invoke(app, ["export", str(folder), "--to", "parquet", "--shapes"])
     assert done.exit_code == 0, done.output
     names = sorted(file.name for file in (folder / "export").iterdir())
-    assert names == ["figures.parquet", "shapes.parquet", "time_series.parquet"]
+    assert names == ["figures.parquet", "sections.parquet", "shapes.parquet", "time_series.parquet"]
 
 
 @pytest.fixture

@@ -97,11 +97,6 @@ def drive_efforts(data: xr.Dataset, mode: str | None = None) -> Figure:
                 label = symbol(name)
                 efforts["torque"][label], efforts["speed"][label] = force, one[f"{dim}_speed"].values
                 efforts["power"][label] = one[f"{dim}_power"].values
-    if not efforts["torque"]:
-        raise InputError(
-            "this mechanism has no motor and no prescribed motion", field="figure", value="drive_efforts",
-            remedy="choose another figure",
-        )  # fmt: skip
     figure, axes = panels(3, 1)
     labels = (effort_label(", ".join(sorted(units, reverse=True))), "speed", axis_label("power"))
     speed = {"N m": axis_label("angular_velocity"), "N": axis_label("speed")}

@@ -26,9 +26,11 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
     """
     out: dict[str, Any] = {}
     if "stress_max" in run:
+        bent = set(map(str, run["section_body"].values))
         out["beams"] = {
-            body: {key: _finite(run[name].sel(body=body).item()) for key, name in _OF_BEAMS.items()}
-            for body in dict.fromkeys(map(str, run["section_body"].values))
+            body: {key: _finite(run[name].values[b]) for key, name in _OF_BEAMS.items()}
+            for b, body in enumerate(map(str, run["body"].values))
+            if body in bent or np.isfinite(run["stress_max"].values[b])
         }
     if "joint_coordinate" in run:
         out["joints"] = {str(joint): _joint(run.sel(joint=joint)) for joint in run["joint"].values}
