@@ -147,7 +147,7 @@ FIELDS = [
     ("stiffness = 2.0", "stiffness = -2.0", "spring.coil.stiffness: must be positive (got -2.0)", "in N m/rad"),
     ("coefficient = 0.1", "coefficient = 0", "damper.oil.coefficient: must be positive (got 0.0)", "in N m s/rad"),
     ("damping = 0.1", "damping = -0.1", "linear_spring.coil.damping: must not be negative (got -0.1)", "in N s/m"),
-    ("torque = 0.2", "torque = nan", "load.twist.torque: should be a finite number (got nan)", "in N m"),
+    ("torque = 0.2", "torque = nan", "load.twist.torque: not a finite number (got nan)", "in N m"),
     ("mass = 0.4", "mass = " + "9" * 400, "body.right.mass: should be a valid number (got 999", "in kg"),
     ("base = 0.1", "base = " + "9" * 400, "parameters.base: too large a number", "digits"),
     ("samples = 51", "samples = 1", "study.samples: too few samples (got 1)", "at least 2"),

@@ -121,3 +121,24 @@ def test_a_sequence_is_planned_as_its_parts_are():
     t = np.linspace(0.0, 0.3, 17)
     found = whole.torques("++").evaluate(there.duration + 0.02 + t)
     np.testing.assert_allclose(found, alone.torques("++").evaluate(t), rtol=0, atol=1e-6 * np.max(np.abs(found)))
+
+
+def test_every_named_point_is_recorded_with_its_velocity_and_acceleration():
+    model = pf.load("raparm_i")
+    task = pf.plan(model, "line", duration=0.1, samples=401)
+    data = pf.tracking_dataset([task.simulate("++++")])
+    effector = str(task.mechanism.end_effector.point)
+    for name in ("velocity", "acceleration"):
+        of_point = data[f"point_{name}"].sel(point=effector).values
+        np.testing.assert_allclose(of_point, data[f"end_effector_{name}"].values, rtol=0, atol=1e-12)
+    # Of flexible links, whose points move against their frames.
+    elsewhere = data.isel(mode=0).sel(point="link1.B1")
+    numeric = np.gradient(elsewhere["point_position"].values, data["time"].values, axis=0)[2:-2]
+    np.testing.assert_allclose(numeric, elsewhere["point_velocity"].values[2:-2], rtol=0, atol=2e-3)
+    figure = pf.plots.point_motions(data, points=["link1.B1", effector])
+    labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert {"link1.B1", effector} <= set(labels)
+    speed = np.linalg.norm(elsewhere["point_velocity"].values, axis=1)
+    np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), speed, rtol=1e-12)
+    with pytest.raises(InputError, match=r"points: no such point in these results \(got 'link9\.B'\)"):
+        pf.plots.point_motions(data, points=["link9.B"])

@@ -25,6 +25,7 @@ from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.interrupts import uninterrupted
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
 from paraflex.results.drawing import Drawing, drawing
+from paraflex.results.links import stacked_motions
 from paraflex.results.outlines import outlines
 from paraflex.results.record import Record
 from paraflex.tracking import TrackingTask
@@ -405,7 +406,8 @@ def _record(
     assert effector is not None
     angle, rate, acceleration = np.stack([link.frame(samples) for link in links], axis=-1)
     chord, chord_rate, _ = np.stack([link.chord(samples) for link in links], axis=-1)
-    points = [link.motion(point, samples).position for link in links for point in link.points]
+    motions = [link.motion(point, samples) for link in links for point in link.points]
+    points = stacked_motions(motions, len(samples.t))
     kinetic = np.sum([link.kinetic_energy(samples) for link in links], axis=0)
     strain = np.sum([link.strain_energy(samples) for link in links], axis=0)
     strain += _spring_energy(linkage, mechanism, samples)
@@ -426,7 +428,9 @@ def _record(
         chord=chord,
         chord_rate=chord_rate,
         tip=np.stack([link.tip(samples) for link in links], axis=1),
-        points=np.stack(points, axis=1),
+        points=points.position,
+        point_velocity=points.velocity,
+        point_acceleration=points.acceleration,
         # Exudyn's multipliers are on the left of the equations, with the constraint p_b - p_a.
         joint_force=-samples.multipliers[:, model.rows],
         joint_moment=np.full((len(samples.t), len(mechanism.joints)), np.nan),

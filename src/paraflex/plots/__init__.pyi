@@ -14,7 +14,12 @@ from .driving import (
     tracking_distance as tracking_distance,
 )
 from .energy import energies as energies
-from .free_motion import coordinates as coordinates, motion_overview as motion_overview, point_paths as point_paths
+from .free_motion import (
+    coordinates as coordinates,
+    motion_overview as motion_overview,
+    point_motions as point_motions,
+    point_paths as point_paths,
+)
 from .methods import work_precision as work_precision
 from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached

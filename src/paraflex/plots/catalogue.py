@@ -93,6 +93,13 @@ _RUN = (
         variables=("frame_force",),
     ),
     CatalogueFigure("link_deflections", "time_series", "transverse displacement of the ends of all links", "mode"),
+    CatalogueFigure(
+        "point_motions",
+        "free_motion",
+        "distance from the start, speed and acceleration of named points",
+        "mode",
+        variables=("point_velocity", "point_acceleration"),
+    ),
     CatalogueFigure("link_phases", "phase", "angular velocity over angle of every body", "mode"),
 )
 _DESIGNS = (

@@ -1,6 +1,8 @@
-"""Figures of a run without a path: overview of angles, speeds and energies, coordinates, paths of points."""
+"""Figures of a run without a path, and of named points: angles, speeds and energies, coordinates, paths, motions."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -10,8 +12,8 @@ from paraflex.plots.energy import ENERGIES
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, plain, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
-from paraflex.plots.runs import MOST_LINES, draw_curves
-from paraflex.plots.selection import names_of
+from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time
+from paraflex.plots.selection import names_of, one_run, place_of
 from paraflex.plots.style import COLOURS, DASHES, keep_flat, look_of
 from paraflex.plots.workspace import finish_workspace, workspace_panel
 
@@ -78,7 +80,48 @@ def coordinates(data: xr.Dataset) -> Figure:
 def point_paths(data: xr.Dataset) -> Figure:
     """Paths of named points in the plane; if there are more than seven, those of the longest."""
     places = 1e3 * data["point_position"].transpose("time", "point", "axis").values
-    names = names_of(data, "point")
+    names, shown = names_of(data, "point"), moving_points(data)
+    figure, panel = workspace_panel()
+    for look, k in enumerate(shown):
+        panel.plot(*places[:, k].T, label=plain(names[k]), **look_of(look))
+        panel.plot(*places[0, k], marker="s", markersize=3.0, linestyle="none", color=look_of(look)["color"])
+    if not shown:
+        panel.plot(*places[0].T, "o", markersize=3.0, label="points, which do not move")
+    return finish_workspace(figure, panel)
+
+
+@drawn
+def point_motions(data: xr.Dataset, mode: str | None = None, points: Sequence[str] = ()) -> Figure:
+    """Distance from the start, speed and acceleration of named points in time, in magnitude.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    mode : str, optional
+        Of a run along a path.
+    points : sequence of str
+        "body.point" each; by default those that travel most, up to seven.
+    """
+    run, names = one_run(data, mode), names_of(data, "point")
+    shown = [place_of(point, names, "point", "points") for point in points] or moving_points(run)
+    place, velocity, acceleration = (
+        run[name].transpose("time", "point", "axis").values[:, shown]
+        for name in ("point_position", "point_velocity", "point_acceleration")
+    )
+    figure, axes = panels(3, 1)
+    curves = ((1e3 * (place - place[:1]), "distance"), (velocity, "speed"), (acceleration, "magnitude"))
+    for panel, (values, quantity) in zip(axes[:, 0], curves, strict=True):
+        sizes = np.linalg.norm(values, axis=2)
+        draw_curves(panel, run, {plain(names[k]): sizes[:, j] for j, k in enumerate(shown)})
+        keep_flat(panel, peak(sizes) or 1.0)
+        panel.set_ylabel(axis_label(quantity))
+    return finish_over_time(figure, axes, data, panel_height=34.0)
+
+
+def moving_points(run: xr.Dataset) -> list[int]:
+    """Named points that move, each place once; if there are more than seven, those of the longest way."""
+    places = run["point_position"].transpose("time", "point", "axis").values
+    names = names_of(run, "point")
     travel = np.nan_to_num(np.nanmax(places, axis=0) - np.nanmin(places, axis=0)).max(axis=1)
     # Points at one place share a line; those that a program made have names of their own.
     shown: list[int] = []
@@ -86,13 +129,7 @@ def point_paths(data: xr.Dataset) -> Figure:
         apart = all(peak(places[:, k] - places[:, other]) > _STILL_SHARE * travel.max() for other in shown)
         if travel[k] > _STILL_SHARE * travel.max() and apart and "._" not in names[k]:
             shown.append(int(k))
-    figure, panel = workspace_panel()
-    for look, k in enumerate(sorted(shown[:MOST_LINES])):
-        panel.plot(*places[:, k].T, label=plain(names[k]), **look_of(look))
-        panel.plot(*places[0, k], marker="s", markersize=3.0, linestyle="none", color=look_of(look)["color"])
-    if not shown:
-        panel.plot(*places[0].T, "o", markersize=3.0, label="points, which do not move")
-    return finish_workspace(figure, panel)
+    return sorted(shown[:MOST_LINES])
 
 
 def _kind(name: str) -> str:

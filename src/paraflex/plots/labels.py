@@ -44,6 +44,8 @@ QUANTITIES = {
     "slope": Quantity("slope", "", "rad"),
     "error": Quantity("error", "", "mm"),
     "distance": Quantity("distance", "", "mm"),
+    "speed": Quantity("speed", "", "m/s"),
+    "magnitude": Quantity("acceleration", "", "m/s²"),
     "torque": Quantity("torque", r"$\tau$", "N m"),
     "force": Quantity("force", "", "N"),
     "moment": Quantity("moment", "", "N m"),

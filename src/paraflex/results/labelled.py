@@ -97,6 +97,7 @@ UNITS = (
         "coordinate_value": ("generalised coordinate; flexible ones are mass-normalised modes", "m, rad, m kg^(1/2)"),
         "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
         "point_velocity": ("velocity of a named point", "m/s"),
+        "point_acceleration": ("acceleration of a named point", "m/s^2"),
         "applied_torque": ("given motor torque, over time where it changes", "N m"),
     }
     | VALIDITY_UNITS
@@ -149,6 +150,8 @@ def link_variables(links: Links, mechanism: Mechanism) -> Variables:
         "tip_slope": (("body",), links.tip[:, :, 2]),
         "deflection": (("body",), chord_deflections(mechanism, links.drawing.shape)),
         "point_position": (("point", "axis"), links.points),
+        "point_velocity": (("point", "axis"), links.point_velocity),
+        "point_acceleration": (("point", "axis"), links.point_acceleration),
         "joint_force": (("joint", "axis"), links.joint_force),
         "joint_moment": (("joint",), links.joint_moment),
         "multiplier": (("row",), links.multiplier),

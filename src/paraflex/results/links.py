@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -38,7 +38,7 @@ class Links:
     tip : (k, bodies, 3) array
         Axial, transverse displacement and slope of a beam's last end (a modal body's last point) from the tangent at
         its first end [m, m, rad].
-    points : (k, points, 2) array
+    points, point_velocity, point_acceleration : (k, points, 2) arrays
         Positions [m].
     joint_force : (k, joints, 2) array
         All that a joint's first body does to its second: at the joint's point of that, in the ground frame [N].
@@ -70,6 +70,8 @@ class Links:
     chord_rate: Array
     tip: Array
     points: Array
+    point_velocity: Array
+    point_acceleration: Array
     joint_force: Array
     joint_moment: Array
     multiplier: Array
@@ -115,7 +117,7 @@ def system_links(
     first = [system.body(names[0]).angle for names in cut.parts.values()]
     chords = [_chord(system, names, q, v) for names in cut.parts.values()]
     named = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
-    points = [point_motion(system, cut.there(ref), q, v, a).position for ref in named]
+    points = stacked_motions([point_motion(system, cut.there(ref), q, v, a) for ref in named], samples)
     speeds = [joint_coordinate(system, motor.joint, q, v).rate for motor in mechanism.motors]
     multipliers = solution.multipliers[:samples]
     joints = [joint_coordinate(system, joint.name, q, v) for joint in mechanism.joints]
@@ -128,7 +130,9 @@ def system_links(
         chord=np.stack([angle for angle, _ in chords], axis=1),
         chord_rate=np.stack([rate for _, rate in chords], axis=1),
         tip=np.stack([_tip(system, names, q) for names in cut.parts.values()], axis=1),
-        points=np.stack(points, axis=1) if points else np.zeros((samples, 0, 2)),
+        points=points.position,
+        point_velocity=points.velocity,
+        point_acceleration=points.acceleration,
         joint_force=loads.force,
         joint_moment=loads.moment,
         multiplier=_multipliers(system, cut.whole, multipliers),
@@ -148,6 +152,13 @@ def system_links(
 
 def _stacked(columns: list[Array], samples: int) -> Array:
     return np.stack(columns, axis=1) if columns else np.zeros((samples, 0))
+
+
+def stacked_motions(points: Sequence[PointMotion], samples: int) -> PointMotion:
+    """Motions of several points as three arrays (samples, points, 2)."""
+    if not points:
+        return PointMotion(*np.zeros((3, samples, 0, 2)))
+    return PointMotion(*(np.stack(parts, axis=1) for parts in zip(*points, strict=True)))
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,10 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.dynamics.points import point_motion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of
-from paraflex.mechanism import AngleLaw, PointRef
+from paraflex.mechanism import AngleLaw
 from paraflex.motion import MotionRun
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
@@ -64,17 +63,12 @@ def motion_dataset(
         units and signs in the attributes of every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
-    q, v, a = solution.q, solution.v, solution.a
+    q, v = solution.q, solution.v
     torques = run.applied
     links = system_links(system, solution, torques, len(q))
-    named = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
-    velocities = [point_motion(system, point, q, v, a).velocity for point in named]
     values: Variables = {
         "coordinate_value": (("coordinate",), q),
         "coordinate_rate": (("coordinate",), v),
-        "point_velocity": (
-            ("point", "axis"), np.stack(velocities, axis=1) if velocities else np.zeros((len(q), 0, 2)),
-        ),
         **link_variables(links, mechanism),
     }  # fmt: skip
     data: dict[str, Any] = {
