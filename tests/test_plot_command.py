@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from made_up import STUDY, made_up, write_study
 from paraflex import plots
 from paraflex.cli.app import app
 from paraflex.errors import InputError
+from paraflex.mechanism import Motor
 from paraflex.motion import simulate_motion
 from paraflex.plots.catalogue import CATALOGUE, homes
 from paraflex.plots.designs import undominated
@@ -103,7 +105,11 @@ def _runs(folder: Path) -> None:
     save_results(_two_models(data), folder / "verification" / "verify.nc")
     pendulum = pf.load("pendulum").mechanism
     (folder / "motion").mkdir()
-    save_results(motion_dataset(simulate_motion(pendulum, 0.1, samples=21)), folder / "motion" / "results.nc")
+    driven = replace(pendulum, motors=(Motor("drive", pendulum.joints[0].name),))
+    save_results(
+        motion_dataset(simulate_motion(driven, 0.1, samples=21)),
+        folder / "motion" / "results.nc",
+    )
 
 
 def _two_models(data: xr.Dataset) -> xr.Dataset:

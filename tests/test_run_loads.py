@@ -121,7 +121,7 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
 def test_results_of_earlier_versions_have_no_loads_and_are_drawn(data):
     new = {name for name in data.variables if "section" in str(name) or "drive" in str(name) or "frame" in str(name)}
     new |= {name for name in data.variables if "stress" in str(name) or str(name).startswith(("joint_c", "joint_s"))}
-    old = data.drop_vars(new | {"safety_factor", "motor_energy"})
+    old = data.drop_vars(new | {"safety_factor", "motor_energy", "input_power"})
     assert load_figures(old) == {}
     assert [title for title, _ in motion_page(old).tables] == ["Run"]
     assert json.loads(json.dumps(motion_summary(old)))["loads"] == {}

@@ -83,7 +83,7 @@ _RUN = (
         "stress",
         "torque, speed and power of motors and prescribed motions",
         "mode",
-        variables=("motor_power",),
+        variables=("input_power",),
     ),
     CatalogueFigure(
         "frame_loads",

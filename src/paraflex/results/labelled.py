@@ -48,6 +48,7 @@ UNITS = (
         "drive_speed": ("rate of a prescribed motion's joint", "rad/s"),
         "drive_power": ("power of a prescribed motion", "W"),
         "drive_energy": ("integral of the magnitude of a prescribed motion's power, from the samples", "J"),
+        "input_power": ("power of all motors and prescribed motions together", "W"),
         "frame_force": ("force of the mechanism on the ground: shaking force", "N"),
         "frame_moment": ("moment of the mechanism on the ground about its origin: shaking moment", "N m"),
         "angle": ("link angle", "rad"),
@@ -186,6 +187,8 @@ def with_totals(data: xr.Dataset) -> xr.Dataset:
             power = data[torque] * data[f"{name}_speed"]
             data[f"{name}_power"] = power.transpose(..., "time", name)
             data[f"{name}_energy"] = abs(power).fillna(0.0).integrate("time")
+            if data.sizes[name]:
+                data["input_power"] = power.sum(name, skipna=False) + data.get("input_power", 0.0)
     return data.assign(largest_stresses(data)) if MOMENT in data else data
 
 
