@@ -26,8 +26,16 @@ from paraflex.errors import InputError
 from paraflex.files import library_file, library_names, load
 from paraflex.files.model import StudyDefaults
 from paraflex.findings import Level
-from paraflex.mechanism import ActuationMode, Assembly, Mechanism, Motor, PrescribedAngle, RigidBody, loops
-from paraflex.mechanism.joints import SampledAngle
+from paraflex.mechanism import (
+    ActuationMode,
+    Assembly,
+    Mechanism,
+    Motor,
+    PrescribedAngle,
+    RigidBody,
+    SampledAngle,
+    loops,
+)
 from shell import paraflex
 from test_consistency import joint, many, parallelogram
 

@@ -51,7 +51,6 @@ QUANTITIES = {
     "moment": Quantity("moment", "", "N m"),
     "power": Quantity("power", "", "W"),
     "travel": Quantity("travel", "", "m"),
-    "speed": Quantity("speed", "", "m/s"),
     "stress": Quantity("stress", "", "MPa"),
     "place": Quantity("distance from the first end", "", "m"),
     "energy": Quantity("energy", "", "J"),
