@@ -136,6 +136,11 @@ _stress = _stress_where(lambda sections: np.ones(len(sections.bodies)))
 _use = _stress_where(lambda sections: sections.strength)
 
 
+def _safety_factor(run: Any, nominal: Any) -> Any:
+    used = _use(run, nominal)
+    return 1.0 / used if used else np.nan
+
+
 def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = False) -> Metric:
     """A number of the solution of the same name."""
     formula = _as_it_is(lambda x: getattr(x.run.solution, name))
@@ -187,7 +192,7 @@ _ALL = (
     Metric("stress_max", "largest magnitude of the stress in any beam, bending and axial; sections need outer_fibre",
            "Pa", _stress, "largest stress"),
     Metric("safety_factor_min", "least strength over stress of any beam; materials need strength", "1",
-           lambda run, nominal: 1.0 / _use(run, nominal), "least safety factor"),
+           _safety_factor, "least safety factor"),
     Metric("section_moment_max", "largest magnitude of the bending moment in any beam", "N m",
            _section_moment, "largest bending moment"),
     Metric("total_mass", "mass of all bodies", "kg",
