@@ -199,7 +199,7 @@ FIELDS = [
     ("[study]", "[start.deflection]\nleft = { B = [0, nan] }\n[study]", "start.deflection.left.B.1: should", "axial"),
     ("[study]", "[start.deflection]\nleft = { B = { slop = 1 } }\n[study]", "start.deflection.left.B.slop", '"slope"?'),
     ("[study]", "[start.deflection]\nleft = { B = 3 }\n[study]", "start.deflection.left.B: should be", "axial"),
-    ("[study]", "[start.rates]\nright = { x = 1 }\n[study]", "start.rates.right.y: is missing", "rate in m/s"),
+    ("[study]", "[start.rates]\nright = { x = 1 }\n[study]", "start.rates.right.y: is missing", "in m/s"),
     ("[study]", "[study]\norientation = 0.1", "study.orientation: the angle is no task coordinate (got", '"angle"'),
     # Paths
     ("end = [0.03, 0.32]", "end = [0.0, 0.3]", "path.line.corners: two neighbouring corners coincide", "drop one"),

@@ -158,8 +158,7 @@ def test_charts_below_the_screen_wait_until_they_are_seen(opened):
     before = page.evaluate("charts.all.filter((chart) => chart.drawn).length")
     assert 0 < before < described
     curves(page, "strain")
-    assert page.evaluate("charts.all.filter((chart) => chart.drawn).length") > before
-    assert page.evaluate("charts.all.at(-1).drawn")
+    assert before < page.evaluate("charts.all.filter((chart) => chart.drawn).length") < described
 
 
 def test_play_moves_the_mechanism_and_pause_stops_it(opened):

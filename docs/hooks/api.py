@@ -16,6 +16,7 @@ PACKAGES = (
     "library",
     "files",
     "checks",
+    "checks.drawing",
     "findings",
     "mechanism",
     "kinematics",

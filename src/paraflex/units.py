@@ -94,7 +94,7 @@ _FACTOR = re.compile(rf"({_OPERATOR}|^){_factor('(')}")
 _BEHIND_NUMBER = re.compile(rf"{_NUMBER}\s*([^\W\d]\w*)")
 
 
-class Quantity(NamedTuple):
+class NumberWithUnit(NamedTuple):
     """A number with a unit in a text: where it begins and ends, its value in SI units, and its unit as written."""
 
     start: int
@@ -113,10 +113,11 @@ def unit_named(text: str) -> Unit:
     return unit
 
 
-def quantities_in(text: str) -> list[Quantity]:
+def quantities_in(text: str) -> list[NumberWithUnit]:
     """Numbers with units in a text, in their order."""
     return [
-        Quantity(*found.span(), unit_named(found[2]).in_si(found[1]), found[2]) for found in _QUANTITY.finditer(text)
+        NumberWithUnit(*found.span(), unit_named(found[2]).in_si(found[1]), found[2])
+        for found in _QUANTITY.finditer(text)
     ]
 
 

@@ -103,7 +103,7 @@ def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
         if not (with_units or quantities_in(text)):
             continue
         found = field_at(schema, data, place)
-        if _is_number(found.annotation):
+        if takes_number(found.annotation):
             units = units_at(schema, data, place)
             check_unit(text, parameters, units, ".".join(map(str, place)), found.description)
 
@@ -160,9 +160,9 @@ def _texts(data: Any, place: Place) -> Iterator[tuple[Place, str]]:
             yield from _texts(value, (*place, key))
 
 
-def _is_number(annotation: Any) -> bool:
+def takes_number(annotation: Any) -> bool:
     """Whether what is annotated may be a number with an expression for it, or a function of time."""
-    return annotation in (float, Any) or any(map(_is_number, typing.get_args(annotation)))
+    return annotation in (float, Any) or any(map(takes_number, typing.get_args(annotation)))
 
 
 def _units_in(description: str, row: Sequence[Any] | None, key: str | int) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from paraflex.errors import InputError, suggestion
 from paraflex.files.expressions import ExpressionError, evaluate, evaluate_parameters
-from paraflex.files.fields import Place, field_at, has_tables, is_table
+from paraflex.files.fields import Place, field_at, has_tables, is_table, takes_number
 from paraflex.files.schema import ModelTable
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
@@ -103,7 +103,7 @@ def _may_have(data: Mapping[str, Any], place: Place, part: str) -> bool:
     annotation = field_at(ModelTable, data, place).annotation if place else ModelTable
     if is_table(annotation):
         return part in annotation.model_fields or annotation.model_config.get("extra") == "allow"
-    return place[0] != "parameters" and not has_tables(annotation)
+    return place[0] != "parameters" and (takes_number(annotation) or not has_tables(annotation))
 
 
 def _known_below(data: Mapping[str, Any], place: Place) -> list[str]:
