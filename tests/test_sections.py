@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ import pytest
 import paraflex as pf
 from paraflex.designs.sweep import load_sweep
 from paraflex.files import load_data, model_from
+from paraflex.files.schema import SectionTable
 from paraflex.mechanism import Rectangle, Round, Section, Tube
+from paraflex.mechanism.sections import SHAPES
 
 
 def integrals(chord, half):
@@ -144,3 +147,8 @@ def test_diameters_are_varied_and_differentiated(tmp_path, monkeypatch):
     (tmp_path / "values.toml").write_text(STUDY + 'values = ["12 deg", 0.011]\n')
     with pytest.raises(pf.InputError, match=r"vary.diameter.values: a quantity in rad where one in m"):
         load_sweep("values.toml")
+
+
+def test_the_schema_has_all_shapes():
+    named, _ = get_args(SectionTable.model_fields["shape"].annotation)
+    assert get_args(named) == tuple(SHAPES)

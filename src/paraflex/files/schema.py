@@ -33,7 +33,6 @@ from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import joint_pair
-from paraflex.mechanism.sections import SHAPES
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -223,7 +222,7 @@ def _joint_table() -> Any:
 class SectionTable(_Table):
     """A cross-section, by its shape or by its properties: what one shape needs others do not have."""
 
-    shape: Literal[tuple(SHAPES)] | None = Field(  # type: ignore[valid-type]
+    shape: Literal["rectangle", "round", "tube"] | None = Field(
         default=None, description='"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
     )
     width: Number | None = Field(default=None, description="the width out of the plane of motion in m")

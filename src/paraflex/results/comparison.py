@@ -24,11 +24,20 @@ from paraflex.results.storage import open_results
 # Variables whose motions are compared, by the kind of results.
 _ENERGIES = ("strain_energy", "kinetic_energy")
 _MOTIONS: Mapping[str, tuple[str, ...]] = {
-    "tracking": ("end_effector", "torque", "angle", "deflection", *_ENERGIES),
-    "motion": ("point_position", "angle", "deflection", "joint_force", *_ENERGIES),
+    "tracking": ("end_effector", "torque", "angle", "deflection", "stress", *_ENERGIES),
+    "motion": (
+        "point_position",
+        "point_velocity",
+        "angle",
+        "deflection",
+        "stress",
+        "joint_force",
+        "drive_torque",
+        *_ENERGIES,
+    ),
 }
 # Dimensions whose members are compared one by one; components along "axis" make one distance.
-_PARTS = ("motor", "body", "point", "joint")
+_PARTS = ("motor", "drive", "body", "point", "joint")
 _VERSIONS = ("mechanism", "paraflex_version", "numba_version", "numpy_version")
 # Numbers of the integration, besides the metrics that are.
 _OF_SOLVER = ("wall_time", "factorisations", "constraint_velocity_max")
@@ -329,7 +338,9 @@ def _motions(kind: str, mode: str, first: xr.Dataset, second: xr.Dataset) -> Ite
         for part in [""] if dim is None else [str(each) for each in first[dim].values]:
             if dim is None or part in second[dim].values:
                 pair = [run if dim is None else run.sel({dim: part}) for run in (first, second)]
-                yield _motion(mode, name, part, *pair)
+                # A rigid body has no stress.
+                if any(np.isfinite(run[name].values).any() for run in pair):
+                    yield _motion(mode, name, part, *pair)
 
 
 def _motion(mode: str, name: str, part: str, first: xr.Dataset, second: xr.Dataset) -> MotionPair:
@@ -362,7 +373,8 @@ def _settings(first: xr.Dataset, second: xr.Dataset) -> dict[str, tuple[Any, Any
     both = [_flat(json.loads(data.attrs.get("parameters", "{}"))) for data in (first, second)]
     for flat, data in zip(both, (first, second), strict=True):
         flat |= {name: data.attrs[name] for name in _VERSIONS if name in data.attrs}
-    names = dict.fromkeys([*both[0], *both[1]])
+    # What --set said stands in the model.
+    names = dict.fromkeys(name for flat in both for name in flat if not name.startswith("run.set."))
     return {name: (both[0].get(name), both[1].get(name)) for name in names if both[0].get(name) != both[1].get(name)}
 
 
