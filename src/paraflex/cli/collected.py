@@ -12,6 +12,7 @@ from paraflex.errors import ParaflexWarning
 from paraflex.findings import Finding, Verdict
 
 _found: list[Finding] = []
+_elsewhere: list[Finding] = []
 _others: list[str] = []
 _printed: set[str] = set()
 
@@ -20,6 +21,7 @@ _printed: set[str] = set()
 def collecting() -> Iterator[None]:
     """Keep warnings of ours until the command ends; those of others go where they went."""
     _found.clear()
+    _elsewhere.clear()
     _others.clear()
     _printed.clear()
     with warnings.catch_warnings():
@@ -46,12 +48,23 @@ def collected(more: Iterable[Finding] = ()) -> Verdict:
     return Verdict([*_found, *more])
 
 
+@contextmanager
+def apart() -> Iterator[None]:
+    """What is warned of meanwhile belongs to one of several results: `collected` gives it to no other."""
+    before = len(_found)
+    try:
+        yield
+    finally:
+        _elsewhere.extend(_found[before:])
+        del _found[before:]
+
+
 def printed(findings: Iterable[Finding]) -> None:
     """Note that these need not be printed when the command ends."""
     _printed.update(map(str, findings))
 
 
 def _print_rest() -> None:
-    for text in dict.fromkeys([*map(str, Verdict(_found)), *_others]):
+    for text in dict.fromkeys([*map(str, Verdict([*_found, *_elsewhere])), *_others]):
         if text not in _printed:
             typer.echo(f"warning: {text}", err=True)

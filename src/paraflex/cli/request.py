@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 
@@ -50,6 +50,17 @@ def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
         return load_path(name), name
     name = model.path_name(name)
     return model.paths[name], name
+
+
+def find_paths(model: Model, names: Sequence[str]) -> dict[str, EndEffectorPath]:
+    """Paths of the model or of files by name: those asked for, else those of the study, else its one or the first."""
+    found = {}
+    for name in names or model.study.paths or (None,):
+        path, called = find_path(model, name)
+        if called in found:
+            raise InputError("is named twice", field="--path", value=called, remedy="name each path once")
+        found[called] = path
+    return found
 
 
 def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:

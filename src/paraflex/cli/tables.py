@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -37,42 +37,67 @@ def plain_console(*, stderr: bool = False) -> Console:
     return _PlainConsole(highlight=False, markup=False, stderr=stderr)
 
 
-def warn_of(console: Console, findings: Iterable[Finding]) -> None:
-    """A line for each finding."""
+def warn_of(console: Console, findings: Iterable[Finding], whose: str = "") -> None:
+    """A line for each finding; `whose` begins it."""
     from paraflex.results.doubts import doubt_lines  # with xarray, which descriptions of mechanisms do without
 
     findings = list(findings)
     for line in doubt_lines(findings):
-        console.print(line, soft_wrap=True)
+        console.print(f"{whose}{line}", soft_wrap=True)
     printed(findings)
 
 
-def print_study(console: Console, summary: dict[str, Any], task: TrackingTask, model: str) -> None:
-    """What every mode came to in a model: tables, and a line for each mode that an event stopped."""
-    console.print(_study_table(summary, task, model))
-    if any(mode.get("tracking_rms_after") is not None for mode in summary["modes"].values()):
-        console.print(_after_table(summary, task))
-    for name, mode in summary["modes"].items():
+def print_studies(console: Console, summaries: Mapping[str, Any], task: TrackingTask, model: str) -> None:
+    """What every mode came to in a model along each path: tables, and a line for each run that an event stopped.
+
+    Parameters
+    ----------
+    console : Console
+    summaries : mapping of str to dict
+        By path; the name of a single one may be empty.
+    task : TrackingTask
+        Of any of them.
+    model : str
+    """
+    console.print(_study_table(summaries, task, model))
+    if any(mode.get("tracking_rms_after") is not None for _, mode in _runs(summaries)):
+        console.print(_after_table(summaries, task))
+    for names, mode in _runs(summaries):
         if mode["status"] == "stopped":
-            console.print(f'mode "{name}": {mode["message"]}', soft_wrap=True)
+            *path, name = names
+            whose = "".join(f'path "{one}", ' for one in path)
+            console.print(f'{whose}mode "{name}": {mode["message"]}', soft_wrap=True)
 
 
-def _study_table(summary: dict[str, Any], task: TrackingTask, model: str) -> Table:
-    """Tracking error and peak torques of every mode, and what the solver did."""
+def _runs(summaries: Mapping[str, Any]) -> Iterator[tuple[list[str], dict[str, Any]]]:
+    """Every run of some paths: words of the path, where it has a name, and of the mode, then its numbers."""
+    for path, summary in summaries.items():
+        for name, mode in summary["modes"].items():
+            yield [path, name] if path else [name], mode
+
+
+def _texts(summaries: Mapping[str, Any]) -> list[str]:
+    return ["path", "mode"] if any(summaries) else ["mode"]
+
+
+def _study_table(summaries: Mapping[str, Any], task: TrackingTask, model: str) -> Table:
+    """Tracking error and peak torques of every run, and what the solver did."""
     from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 
-    span = ErrorSpan(summary["error"])
+    first = next(iter(summaries.values()))
+    span = ErrorSpan(first["error"])
     motors = [motor.name for motor in task.mechanism.motors]
     heads = [f"{name}\n[{unit}]" for name, unit in zip(motors, task.mechanism.motor_units(), strict=True)]
     quantity = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
-    title = f"{summary['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {quantity}"
-    table = plain_table("mode", numbers=("error\n[m]", *heads, "steps\n", "wall\n[s]"), title=title)
-    for name, mode in summary["modes"].items():
+    title = f"{first['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {quantity}"
+    numbers = ("error\n[m]", *heads, "steps\n", "wall\n[s]")
+    table = plain_table(*_texts(summaries), numbers=numbers, title=title)
+    for names, mode in _runs(summaries):
         if "steps" not in mode:
-            table.add_row(name, "failed", *["" for _ in motors], "", "")
+            table.add_row(*names, "failed", *["" for _ in motors], "", "")
             continue
         table.add_row(
-            name,
+            *names,
             number(mode[HEADLINE[span]], ".4e") if mode["status"] == "complete" else mode["status"],
             *(number(mode["peak_torque"][motor], ".2f") for motor in motors),
             str(mode["steps"]),
@@ -81,18 +106,18 @@ def _study_table(summary: dict[str, Any], task: TrackingTask, model: str) -> Tab
     return table
 
 
-def _after_table(summary: dict[str, Any], task: TrackingTask) -> Table:
+def _after_table(summaries: Mapping[str, Any], task: TrackingTask) -> Table:
     """Errors during the motion and after it, what goes on then, and what brakes took."""
     held = task.holds
     motors = "held by brakes" if held else "free"
-    if summary["parameters"]["run"].get("ked"):
+    if next(iter(summaries.values()))["parameters"]["run"].get("ked"):
         motors = "held all the time"
     keys = {"motion\n[m]": "tracking_rms_motion", "after\n[m]": "tracking_rms_after", "drift\n[m/s]": "drift_speed",
             "vibration\n[m]": "residual_vibration"} | ({"brakes\n[J]": "brake_energy"} if held else {})  # fmt: skip
-    ran = {name: mode for name, mode in summary["modes"].items() if "steps" in mode}
-    rows = ([name, *(number(mode[key], ".2e") for key in keys.values())] for name, mode in ran.items())
+    ran = ((names, mode) for names, mode in _runs(summaries) if "steps" in mode)
+    rows = ([*names, *(number(mode[key], ".2e") for key in keys.values())] for names, mode in ran)
     title = f"Tracking error during the motion and after it, the motors {motors}"
-    return plain_table("mode", numbers=keys, rows=rows, title=title)
+    return plain_table(*_texts(summaries), numbers=keys, rows=rows, title=title)
 
 
 def plain_table(
@@ -136,15 +161,15 @@ def loads(console: Console, figures: Mapping[str, Any]) -> None:
         console.print(line, soft_wrap=True)
 
 
-def failures(console: Console, result: StudyResult) -> None:
+def failures(console: Console, result: StudyResult, whose: str = "") -> None:
     """One line for each mode that did not run to its end."""
-    for reason in result.failed.values():
-        console.print(f"error: {reason}", soft_wrap=True)
+    reasons = list(result.failed.values())
     if result.data is not None:
-        for mode in result.data["mode"].values:
-            run = result.data.sel(mode=mode)
-            if run["status"].item() not in DONE_STATUSES:
-                console.print(f'error: mode "{mode}": {run["message"].item()}', soft_wrap=True)
+        runs = [result.data.sel(mode=mode) for mode in result.data["mode"].values]
+        ended = [run for run in runs if run["status"].item() not in DONE_STATUSES]
+        reasons += [f'mode "{run["mode"].item()}": {run["message"].item()}' for run in ended]
+    for reason in reasons:
+        console.print(f"error: {whose}{reason}", soft_wrap=True)
 
 
 def number(value: float | None, form: str) -> str:

@@ -66,7 +66,7 @@ class Model(CheckedFields):
         study = self.study
         rows = [
             ("paths", list(self.paths)),
-            ("study: path", study.path),
+            ("study: path", study.path or list(study.paths)),
             ("study: modes", list(study.modes)),
             ("study: duration [s]", study.duration),
         ]
@@ -86,7 +86,7 @@ class Model(CheckedFields):
     @checked_arguments()
     def path_name(self, name: str | None = None) -> str:
         """The name of a path: that given, the study's, or that of the first path; see `path`."""
-        wanted = name or self.study.path or next(iter(self.paths), None)
+        wanted = name or self.study.first_path or next(iter(self.paths), None)
         if wanted is None:
             raise InputError(
                 "the model has no path", field="path", remedy="add a [path.NAME] table", source=self.source
@@ -112,12 +112,12 @@ class Model(CheckedFields):
     def duration(self, path: Path | str, chosen: float | None = None) -> float:
         """How long a run along a path takes, dwell included [s].
 
-        As chosen; else the study's duration along its own path. Another path has another length, and the study's share
-        of dwell.
+        As chosen; else the study's duration along its own path, the first where it has several. Another path has
+        another length, and the study's share of dwell.
         """
         if chosen is not None:
             return chosen
-        followed, own = self.path(path) if isinstance(path, str) else path, self.paths.get(self.study.path or "")
+        followed, own = self.path(path) if isinstance(path, str) else path, self.paths.get(self.study.first_path or "")
         if self.study.duration is None or own is None:
             return followed.duration
         return self.study.duration if followed is own else followed.duration * self.study.duration / own.duration
@@ -351,6 +351,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     mechanism = read_mechanism(table)
     paths = read_paths(table.path)
     said = dict(table.study) | {
+        "paths": tuple(table.study.paths),
         "modes": tuple(table.study.modes),
         "orientation": table.study.orientation or 0.0,
         "torques": read_torques(table),

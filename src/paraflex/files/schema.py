@@ -568,6 +568,9 @@ class StudyDefaultsTable(_Table):
     """What `paraflex run` does unless asked otherwise."""
 
     path: Text | None = Field(default=None, description="the name of a [path.NAME] table")
+    paths: list[Text] = Field(
+        default=[], description="in its place several names, all of which `paraflex run` runs, and others the first"
+    )
     modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
     duration: Number | None = Field(default=None, description="the duration in s, dwell included")
     samples: Count = Field(default=701, description="the number of samples kept")

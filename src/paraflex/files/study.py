@@ -22,6 +22,8 @@ class StudyDefaults:
     ----------
     path : str or None
         The name of one of the model's paths.
+    paths : tuple of str
+        In its place names of several, all of which `paraflex run` runs; what takes one path takes the first.
     modes : tuple of str
     duration : float or None
         [s]; the path's own where None.
@@ -45,6 +47,7 @@ class StudyDefaults:
     """
 
     path: str | None = None
+    paths: tuple[str, ...] = ()
     modes: tuple[str, ...] = ()
     duration: float | None = None
     samples: int = 701
@@ -56,6 +59,11 @@ class StudyDefaults:
     step: float | None = None
     after: str = "free"
     error: str = "motion"
+
+    @property
+    def first_path(self) -> str | None:
+        """The name of its path, or of the first of several; None where it names none."""
+        return self.path or next(iter(self.paths), None)
 
     def filled(self, **chosen: Any) -> StudyDefaults:
         """The study with what a caller chooses of it; what is None stays as the study says."""
@@ -85,6 +93,12 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
     """Check that a study names what the mechanism and its paths have, and that its numbers can be."""
     if study.path is not None:
         known(study.path, paths, "study.path", "path")
+        if study.paths:
+            raise InputError("stands beside path", field="study.paths", remedy="leave one of them out")
+    for name in study.paths:
+        known(name, paths, "study.paths", "path")
+        if study.paths.count(name) > 1:
+            raise InputError("is named twice", field="study.paths", value=name, remedy="name each path once")
     for mode in study.modes:
         try:
             parse_mode(mechanism, mode)

@@ -27,7 +27,15 @@ class RunRequest:
     """What `paraflex run` is asked for; None takes the model's or the program's default."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
-    path: PathOption = None
+    paths: Annotated[
+        list[str],
+        Option(
+            "--path",
+            metavar="NAME|FILE",
+            help="A path of the model or a TOML file with one; repeatable: each is run in all modes, into a folder of "
+            "its name in --out. Default: the study's.",
+        ),
+    ] = field(default_factory=list)
     modes: Annotated[
         list[str],
         Option(

@@ -56,7 +56,7 @@ _STUDIES = (SweepRequest, SearchRequest, IndicesRequest)
 # In the order of `paraflex --help`.
 COMMANDS = (
     ListedCommand("run", RunRequest, "run.run_command", """
-        Simulate a path in several actuation modes, or a model without a path on its own.
+        Simulate paths in several actuation modes, or a model without a path on its own.
 
         Writes report.html, summary.json, results.nc and figures/."""),
     ListedCommand("verify", VerifyRequest, "verify.verify_command", """

@@ -1,0 +1,209 @@
+"""`paraflex run` along paths: each in every mode asked for, each with a folder of its own."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rich.console import Console
+from rich.progress import TimeElapsedColumn
+
+from paraflex.campaign import OnProgress, Progress
+from paraflex.checks import check_planned
+from paraflex.cli.bars import bars
+from paraflex.cli.collected import apart, collected
+from paraflex.cli.commands.runs import RunRequest
+from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.integration import check_stops
+from paraflex.cli.request import at_fault, plan_study
+from paraflex.cli.tables import failures, loads, plain_console, print_studies, validity, warn_of
+from paraflex.cli.writing import write_drawn_run, write_numbers
+from paraflex.compilation import compile_kernels
+from paraflex.elastodynamics import simulate_ked
+from paraflex.errors import InputError
+from paraflex.files import Model
+from paraflex.folders import ResultsFolder
+from paraflex.integrators import IntegrationOptions
+from paraflex.kinematics import Path
+from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
+from paraflex.results.doubts import keep_findings, verdict_of
+from paraflex.studies import Simulator, StudyResult, TrackingStudy
+from paraflex.tracking import TrackingRun, TrackingTask, simulate
+
+
+@dataclass(frozen=True)
+class _Along:
+    """What is to be run along a path, and where its results go; `whose` begins its lines where it is not alone."""
+
+    path: str
+    study: TrackingStudy
+    folder: ResultsFolder
+    whose: str = ""
+
+
+def run_along(
+    request: RunRequest,
+    model: Model,
+    mechanism: Mechanism,
+    paths: Mapping[str, tuple[Path, ResultsFolder]],
+    modes: list[ActuationMode],
+    options: IntegrationOptions,
+    how: dict[str, Any],
+) -> int:
+    """Run along paths and write results into the folders held for them; the exit code.
+
+    How the runs are integrated is kept with the results.
+    """
+    console = plain_console(stderr=True)
+    if request.segments is None:
+        check_stops(mechanism, options, request.stop_at)
+    stiff = request.rigid or request.ked or request.segments is not None
+    compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
+    began = time.perf_counter()
+    planned = []
+    # A path that cannot be followed is refused before the first is run.
+    for name, (path, folder) in paths.items():
+        task = plan_study(model, mechanism, path, name, request.plan, request.after)
+        if request.segments is not None:
+            task = task.in_segments(proportional_segments(mechanism, request.segments))
+            check_stops(task.mechanism, options, request.stop_at)
+        parameters = _parameters(model, name, modes, task, how, request)
+        doubts = check_planned(model, task, name, modes, request.plan.assembly)
+        method, error = _method(request, options), model.study.error
+        study = TrackingStudy(task, modes, options, parameters, method, error, warning=False, findings=doubts)
+        planned.append(_Along(name, study, folder, f'path "{name}": ' if len(paths) > 1 else ""))
+    return _run(request, model, planned, _model_name(request, mechanism), began)
+
+
+def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity: str, began: float) -> int:
+    """Run along one path after the other; what there is of the first ones stays, and is shown, if a later one fails."""
+    console, alone, done = plain_console(stderr=True), len(planned) == 1, {}
+
+    def show(out: Console) -> None:
+        _show(out, {"" if alone else path: result for path, result in done.items()}, planned[0].study.task, fidelity)
+
+    try:
+        for along in planned:
+            with apart():
+                done[along.path] = result = _simulated(console, model, along)
+                if result.data is not None:
+                    if alone:
+                        tell(result.to_dict(), show, as_json=request.json)
+                    else:
+                        warn_of(plain_console(stderr=request.json), verdict_of(result.data), along.whose)
+                    _draw(console, request, along, result, began)
+            if result.interrupted:
+                break
+            began = time.perf_counter()
+    finally:
+        if done and not alone:
+            numbers = {"paths": {path: result.to_dict() for path, result in done.items()}}
+            tell(numbers, show, as_json=request.json, doubts=())
+    well = len(done) == len(planned) and all(result.complete for result in done.values())
+    return exit_code(well, interrupted=any(result.interrupted for result in done.values()))
+
+
+def _show(out: Console, results: Mapping[str, StudyResult], task: TrackingTask, fidelity: str) -> None:
+    """Tables of the paths along which something ran, and lines on all of these runs; a single path has no name."""
+    ran = {path: result.to_dict() for path, result in results.items() if result.data is not None}
+    if not ran:
+        return
+    print_studies(out, ran, task, fidelity)
+    modes = {
+        f"{mode}, path {path}" if path else mode: one
+        for path, summary in ran.items()
+        for mode, one in summary["modes"].items()
+    }
+    validity(out, {name: mode.get("validity") for name, mode in modes.items()})
+    loads(out, {name: mode.get("loads", {}) for name, mode in modes.items()})
+
+
+def _simulated(console: Console, model: Model, along: _Along) -> StudyResult:
+    """Results of all modes, which are written; of none where none could start."""
+    try:
+        with _progress(console, along) as report:
+            result = along.study.run(on_progress=report)
+    except InputError as error:
+        warn_of(console, collected(along.study.findings), along.whose)
+        raise at_fault(error, model) from None
+    if result.data is None:
+        warn_of(console, collected(along.study.findings), along.whose)
+        failures(console, result, along.whose)
+        return result
+    keep_findings(result.data, collected(verdict_of(result.data)))
+    write_numbers(result.data, result.to_dict(), along.folder)
+    return result
+
+
+def _draw(console: Console, request: RunRequest, along: _Along, result: StudyResult, began: float) -> None:
+    """Add figures and report to the numbers, and say which modes failed."""
+    assert result.data is not None
+    try:
+        write_drawn_run(result.data, along.folder, request, began)
+    finally:
+        failures(console, result, along.whose)
+
+
+def _method(request: RunRequest, options: IntegrationOptions) -> Simulator | None:
+    """How each mode is run where it is not by the study's own way."""
+    if request.ked:
+        return simulate_ked
+    if not request.balanced:
+        return None
+
+    def from_equilibrium(task: TrackingTask, mode: str | ActuationMode, *, on_progress=None) -> TrackingRun:
+        return simulate(task.balanced(mode), mode, options=options, on_progress=on_progress, warning=False)
+
+    return from_equilibrium
+
+
+def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
+    if request.rigid:
+        return "rigid"
+    if request.ked:
+        return "kineto-elastodynamics"
+    return f"{mechanism.geometry.value} geometry" if request.segments is None else "finite segments"
+
+
+def _parameters(
+    model: Model, path: str, modes: list[ActuationMode], task: TrackingTask, how: dict, request: RunRequest
+) -> dict:
+    return {
+        "model": dict(model.parameters),
+        "run": {
+            "mechanism": model.source,
+            "set": dict(model.settings),
+            "path": path,
+            "modes": [mode.name for mode in modes],
+            "duration": float(task.motion.t[-1]),
+            "samples": int(task.motion.t.size),
+            "rigid": request.rigid,
+            "segments": request.segments,
+            "ked": request.ked,
+            "balanced": request.balanced,
+            "after": task.after.value,
+            "error": model.study.error,
+            "geometry": task.mechanism.geometry.value,
+        }
+        | asdict(request.frames)
+        | how,
+    }
+
+
+@contextmanager
+def _progress(console: Console, along: _Along) -> Iterator[OnProgress]:
+    """A bar of each mode."""
+    task = along.study.task
+    end = float(task.motion.t[-1])
+    with bars(console, "{task.completed:.3f}/{task.total:.3f} s", TimeElapsedColumn()) as progress:
+        names = [task.mode(mode).name for mode in along.study.modes]
+        of_mode = {name: progress.add_task(f"{along.whose}{name}", total=end, start=False) for name in names}
+
+        def report(at: Progress) -> None:
+            progress.start_task(of_mode[at.doing])
+            progress.update(of_mode[at.doing], completed=at.done)
+
+        yield report
