@@ -107,7 +107,7 @@ def _runs(folder: Path) -> None:
     (folder / "motion").mkdir()
     driven = replace(pendulum, motors=(Motor("drive", pendulum.joints[0].name),))
     save_results(
-        motion_dataset(simulate_motion(driven, 0.1, samples=21)),
+        motion_dataset(simulate_motion(driven, 0.1, samples=21, torques={"drive": 0.1})),
         folder / "motion" / "results.nc",
     )
 

@@ -11,14 +11,26 @@ import xarray as xr
 
 import paraflex as pf
 from paraflex.designs.measure import measure
-from paraflex.dynamics import momentum
+from paraflex.dynamics import build_system, consistent_state, momentum, static_equilibrium
 from paraflex.dynamics.state import State
-from paraflex.mechanism import LinearSpring, PointRef
+from paraflex.errors import InputError
+from paraflex.mechanism import (
+    Assembly,
+    ConstantSpeed,
+    LinearSpring,
+    Mechanism,
+    Motor,
+    PointRef,
+    PrescribedAngle,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+)
 from paraflex.motion import simulate_motion
 from paraflex.report import motion_page, tracking_page
 from paraflex.results import load_results, motion_dataset, motion_summary, save_results, summary, tracking_dataset
 from paraflex.results.export import result_tables
-from paraflex.results.loads import load_figures, stress_line
+from paraflex.results.loads import effort_lines, load_figures, stress_line
 from paraflex.tracking import plan_tracking
 
 OPTIONS = pf.IntegrationOptions(tolerance=1e-7)
@@ -55,6 +67,48 @@ def test_a_prescribed_motion_has_its_torque_speed_and_power(crank, data):
     assert done == pytest.approx(stored[-1] - stored[0] + damped, rel=5e-3)
 
 
+def test_every_effort_has_its_unit():
+    """A motor that turns and one that slides, and two prescribed motions so, in lines, summary and on the page."""
+    bodies = tuple(RigidBody(name, 1.0, 0.1, (0.0, 0.0), {"A": (0.0, 0.0)}) for name in ("a", "b", "c", "d"))
+    joints = (
+        *(RevoluteJoint(name, PointRef("ground", "O"), PointRef(name, "A")) for name in ("a", "c")),
+        *(PrismaticJoint(name, PointRef("ground", "O"), PointRef(name, "A")) for name in ("b", "d")),
+    )
+    mechanism = Mechanism(
+        name="four",
+        ground={"O": (0.0, 0.0)},
+        bodies=bodies,
+        joints=joints,
+        motors=(Motor("lift", "b"), Motor("turn", "a")),
+        prescribed=(
+            PrescribedAngle("push", "d", ConstantSpeed(0.0, 2.0)),
+            PrescribedAngle("spin", "c", ConstantSpeed(0.0, 3.0)),
+        ),
+        assemblies=(Assembly("start", dict.fromkeys("abcd", 0.0)),),
+    )
+    run = simulate_motion(mechanism, 0.1, samples=3, torques={"lift": 5.0, "turn": 0.2}, options=OPTIONS)
+    data = motion_dataset(run)
+    told = load_figures(data)
+    units = {
+        name: (one["torque_unit"], one["speed_unit"]) for name, one in {**told["motors"], **told["drives"]}.items()
+    }
+    turns, slides = ("N m", "rad/s"), ("N", "m/s")
+    assert units == {"lift": slides, "turn": turns, "push": slides, "spin": turns}
+    push, spin = effort_lines(told)
+    assert push.startswith("drive push: force up to ")
+    assert " N, speed up to 2 m/s, power up to " in push
+    assert spin.startswith("drive spin: torque up to ")
+    assert " N m, speed up to 3 rad/s, power up to " in spin
+    efforts = dict(motion_page(data).more)["Motors and prescribed motions"]
+    assert efforts.count("m/s") == efforts.count("rad/s") == 2
+    # Of results that do not tell which of the two it is, no unit is claimed.
+    for name in ("applied_torque", "torque", "drive_torque"):
+        if name in data:
+            del data[name].attrs["units_each"]
+    assert "torque or force up to" in effort_lines(load_figures(data))[0]
+    assert "N m or N" in dict(motion_page(data).more)["Motors and prescribed motions"]
+
+
 def slider_joint(data):
     return next(str(name) for name in data["joint"].values if data["joint_kind"].sel(joint=name) == "slider")
 
@@ -69,22 +123,50 @@ def test_the_travel_of_a_slider_is_the_place_of_its_point(data):
     assert data["joint_coordinate"].attrs["units"] == "rad, m"
 
 
-def test_what_shakes_the_ground_is_what_changes_the_momentum(crank):
+def shaking(run, k):
+    """Force and moment on the ground at a sample, and weight less rate of momentum, over the largest of the run."""
+    system, solution, data, h = run.system, run.solution, motion_dataset(run), 1e-6
+    q, v, a = solution.q[k], solution.v[k], solution.a[k]
+    ahead = momentum(system, State(0.0, q + h * v + 0.5 * h**2 * a, v + h * a))
+    behind = momentum(system, State(0.0, q - h * v + 0.5 * h**2 * a, v - h * a))
+    gained = [(after - before) / (2.0 * h) for after, before in zip(ahead, behind, strict=True)]
+    assert not any(system.mechanism.gravity)
+    for name, rate in zip(("frame_force", "frame_moment"), gained, strict=True):
+        most = np.abs(data[name]).max().item()
+        yield data[name][k].values / most, -rate / most
+
+
+@pytest.mark.parametrize("k", [70, 230, 400])
+def test_what_shakes_the_ground_is_what_changes_the_momentum(crank, k):
     """Springs to the ground among it: without them the sum would be wrong by their pull of up to 70 N."""
-    system, solution = crank.system, crank.solution
-    h = 1e-7
-    data = motion_dataset(crank)
-    for k in (70, 230):
-        q, v, a = solution.q[k], solution.v[k], solution.a[k]
-        ahead = momentum(system, State(0.0, q + h * v + 0.5 * h**2 * a, v + h * a))
-        behind = momentum(system, State(0.0, q - h * v + 0.5 * h**2 * a, v - h * a))
-        force, moment = (ahead[0] - behind[0]) / (2 * h), (ahead[1] - behind[1]) / (2 * h)
-        weight = np.array(system.mechanism.gravity) * system.total_mass
-        assert not weight.any()
-        # Accelerations and multipliers between steps are interpolated, each for itself.
-        for name, change in (("frame_force", force), ("frame_moment", moment)):
-            most = np.abs(data[name]).max().item()
-            np.testing.assert_allclose(data[name][k], -change, rtol=0, atol=3e-3 * most)
+    system = crank.system
+    at_ends = pf.IntegrationOptions(step=5e-5, tolerance=1e-9)
+    for found, by_momentum in shaking(simulate_motion(system.mechanism, 0.02, samples=401, options=at_ends), k):
+        np.testing.assert_allclose(found, by_momentum, rtol=0, atol=1e-6)
+    # Between steps accelerations and multipliers are interpolated, each for itself: an error of the tolerance.
+    close = pf.IntegrationOptions(tolerance=1e-9)
+    for found, by_momentum in shaking(simulate_motion(system.mechanism, 0.02, samples=401, options=close), k):
+        np.testing.assert_allclose(found, by_momentum, rtol=0, atol=3e-5)
+
+
+def test_the_ground_carries_the_weight_of_what_rests():
+    """A bar on a pin and a spring to the ground, in equilibrium: force and moment of all weights about the origin."""
+    bar = RigidBody("bar", 2.0, 0.1, (0.4, 0.0), {"A": (0.0, 0.0), "B": (1.0, 0.0)})
+    mechanism = Mechanism(
+        name="hung",
+        ground={"O": (0.3, 0.1), "C": (1.2, 0.9)},
+        bodies=(bar,),
+        joints=(RevoluteJoint("pin", PointRef("ground", "O"), PointRef("bar", "A")),),
+        linear_springs=(LinearSpring("coil", PointRef("ground", "C"), PointRef("bar", "B"), 200.0, 0.5, 3.0),),
+        assemblies=(Assembly("start", {"bar": 0.1}),),
+        gravity=(0.0, -9.81),
+    )
+    system = build_system(mechanism)
+    rest = static_equilibrium(system, consistent_state(system, None))
+    data = motion_dataset(simulate_motion(mechanism, 1e-3, samples=2, start=rest, options=OPTIONS))
+    centre = 0.3 + 0.4 * np.cos(rest.q[system.body("bar").angle])
+    np.testing.assert_allclose(data["frame_force"], [[0.0, -2.0 * 9.81]] * 2, rtol=0, atol=1e-9 * 2.0 * 9.81)
+    np.testing.assert_allclose(data["frame_moment"], -2.0 * 9.81 * centre, rtol=1e-9)
 
 
 def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_path):
@@ -107,9 +189,9 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
     assert told["beams"]["rod"]["safety_factor"] < 1.0
     assert "stress-over-strength" in {one.code for one in crank.doubts}
     page = motion_page(data)
-    titles = [title for title, _ in page.tables]
-    assert titles == ["Run", "Stresses of beams", "Motors and prescribed motions", "Joints and ground"]
-    assert "over strength" in page.tables[1][1]
+    tables = dict(page.more)
+    assert list(tables)[:3] == ["Stresses of beams", "Motors and prescribed motions", "Joints and ground"]
+    assert "over strength" in tables["Stresses of beams"]
     assert any("stress-over-strength" in note for note in page.notes)
     tables = result_tables(data, shapes=True)
     assert "joint_speed_" + slider_joint(data) in tables["time_series"]
@@ -123,7 +205,7 @@ def test_results_of_earlier_versions_have_no_loads_and_are_drawn(data):
     new |= {name for name in data.variables if "stress" in str(name) or str(name).startswith(("joint_c", "joint_s"))}
     old = data.drop_vars(new | {"safety_factor", "motor_energy", "input_power"})
     assert load_figures(old) == {}
-    assert [title for title, _ in motion_page(old).tables] == ["Run"]
+    assert [title for title, _ in motion_page(old).more] == ["Integration"]
     assert json.loads(json.dumps(motion_summary(old)))["loads"] == {}
 
 
@@ -142,7 +224,7 @@ def test_metrics_are_the_largest_of_the_dataset(run):
     assert found["motor_energy"] == pytest.approx(data["motor_energy"].sum().item(), rel=1e-6)
     assert np.isnan(found["safety_factor_min"])
     assert summary(data)["modes"]["++"]["loads"]["beams"]
-    assert any(title == "Stresses of beams" for title, _ in tracking_page(data).tables)
+    assert any(title == "Stresses of beams" for title, _ in tracking_page(data).more)
 
 
 STUDY = """
@@ -164,7 +246,8 @@ fields = ["section.bar.thickness"]
 def test_the_stress_has_exact_derivatives(tmp_path):
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
     found = pf.sensitivities(tmp_path / "study.toml")
-    thickness = pf.load("five_bar").mechanism.bodies[0].section.sides[1]
+    assert found.to_dict()["units"] == {"stress_max": "Pa", "section_moment_max": "N m"}
+    thickness = pf.load("five_bar").mechanism.bodies[0].section.shape.thickness
     step = 1e-6
     near = STUDY + f"values = [{thickness - step}, {thickness + step}]\n"
     (tmp_path / "near.toml").write_text(near, encoding="utf-8")
@@ -172,3 +255,44 @@ def test_the_stress_has_exact_derivatives(tmp_path):
     for k, metric in enumerate(found.metrics):
         low, high = table[metric].values.ravel()
         assert np.asarray(found.derivatives).ravel()[k] == pytest.approx((high - low) / (2 * step), rel=2e-4)
+
+
+SEARCH = (
+    STUDY.replace('metrics = ["stress_max", "section_moment_max"]', "")
+    + """
+low = "4 mm"
+high = "6 mm"
+
+[objective]
+minimise = { total_mass = 1.0 }
+
+[[objective.at_most]]
+metric = "stress_max"
+value = "%s MPa"
+
+[search]
+evaluations = 40
+"""
+)
+
+
+def test_a_search_holds_a_limit_of_the_stress(tmp_path):
+    """The lightest bars are the thinnest whose stress is allowed: neither end of the range, as the limit decides."""
+
+    def stress(thickness):
+        (tmp_path / "one.toml").write_text(STUDY + f"values = [{thickness}]\n", encoding="utf-8")
+        return pf.sweep(tmp_path / "one.toml", tmp_path / f"at_{thickness}", workers=1).data["stress_max"].item()
+
+    thin, thick = stress(0.004), stress(0.006)
+    assert thin > 1.1 * thick
+    allowed = 0.5 * (thin + thick)
+    (tmp_path / "search.toml").write_text(SEARCH % repr(1e-6 * allowed), encoding="utf-8")
+    found = pf.optimise(tmp_path / "search.toml", tmp_path / "found", workers=1)
+    assert found.holds_limits
+    assert stress(found.values["thickness"]) == pytest.approx(allowed, rel=1e-3)
+
+
+def test_a_limit_of_the_stress_is_no_force(tmp_path):
+    (tmp_path / "search.toml").write_text((SEARCH % 50.0).replace("MPa", "kN"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"objective.at_most.0.value: a quantity in .* where one in Pa is asked for"):
+        pf.load_optimisation(tmp_path / "search.toml")

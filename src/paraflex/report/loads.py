@@ -78,12 +78,21 @@ def _factor(one: Mapping[str, float | None]) -> str:
     return NO_VALUE if factor is None else f"{number(factor)}\nover strength" if factor < 1.0 else number(factor)
 
 
-def _efforts(efforts: Mapping[str, Mapping[str, float | None]]) -> str:
-    heads = [("motor", ""), ("torque", "[N m, N]"), ("speed", "[rad/s, m/s]"), ("power", "[W]"), ("energy", "[J]")]
+def _efforts(efforts: Mapping[str, Mapping[str, Any]]) -> str:
+    """Units stand in the head where all rows have the same, else in the rows."""
+    kinds = {(one["torque_unit"], one["speed_unit"]) for one in efforts.values()}
+    same = len(kinds) == 1 and None not in min(kinds)
+    units = [f"[{unit}]" for unit in kinds.pop()] if same else ["", ""]
+    heads = [("motor", ""), ("torque" if units[0] == "[N m]" else "force" if same else "torque, force", units[0]),
+             ("speed", units[1]), ("power", "[W]"), ("energy", "[J]")]  # fmt: skip
     rows = [
-        (text_symbol(name), [number(one[key]) for key in ("torque_max", "speed_max", "power_max", "energy")])
+        (text_symbol(name), [
+            *(number(one[f"{key}_max"]) + ("" if same else f"\n{one[f'{key}_unit'] or more}")
+              for key, more in (("torque", "N m or N"), ("speed", "rad/s or m/s"))),
+            number(one["power_max"]), number(one["energy"]),
+        ])
         for name, one in efforts.items()
-    ]
+    ]  # fmt: skip
     note = "Largest magnitudes; energy: integral of the power's magnitude."
     return table(heads, rows, caption="Largest efforts of motors and prescribed motions", note=note)
 

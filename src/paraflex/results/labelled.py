@@ -235,13 +235,16 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
 
 
 def _name_efforts(data: xr.Dataset, units: Iterable[str], speed: str, names: Iterable[str]) -> None:
-    """Units of torques or forces and of the speeds of their joints."""
-    units = sorted(set(units), reverse=True) or ["N m"]
+    """Units of torques or forces and of the speeds of their joints; `units_each` of motors of both kinds, in order."""
+    each = list(units)
+    units = sorted(set(each), reverse=True) or ["N m"]
     speeds = {"N m": "rad/s", "N": "m/s"}
     if speed in data:
         data[speed].attrs["units"] = ", ".join(speeds[unit] for unit in units)
     for name in (each for each in names if each in data):
         data[name].attrs["units"] = ", ".join(units)
+        if len(units) > 1:
+            data[name].attrs["units_each"] = ", ".join(each)
         if units == ["N"]:
             data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")
 

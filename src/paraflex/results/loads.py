@@ -11,6 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 Figures = dict[str, float | None]
+# Of the rate of a joint that a torque or a force drives.
+_RATES = {"N m": "rad/s", "N": "m/s"}
 
 
 def load_figures(run: xr.Dataset) -> dict[str, Any]:
@@ -21,8 +23,9 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
     dict
         `beams.<body>` with stress_max, place, time, bending_stress_max, axial_stress_max [Pa, m, s] and safety_factor;
         `joints.<joint>` with least, most [rad, m], speed_max, force_max [N] and moment_max [N m]; `motors.<motor>` and
-        `drives.<prescribed motion>` with torque_max, speed_max, power_max and energy; `frame` with force_max and
-        moment_max of the mechanism on the ground.
+        `drives.<prescribed motion>` with torque_max, its unit and that of speed_max (None of both kinds in results of
+        earlier versions), speed_max, power_max [W] and energy [J]; `frame` with force_max and moment_max of the
+        mechanism on the ground.
     """
     out: dict[str, Any] = {}
     if "stress_max" in run:
@@ -40,17 +43,28 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
         if torque in run and f"{dim}_energy" in run:
             out[group] = {
                 str(name): {
+                    "torque_unit": unit,
+                    "speed_unit": None if unit is None else _RATES[unit],
                     "torque_max": largest(run[torque].sel({dim: name}).values),
                     "speed_max": largest(run[f"{dim}_speed"].sel({dim: name}).values),
                     "power_max": largest(run[f"{dim}_power"].sel({dim: name}).values),
                     "energy": _finite(run[f"{dim}_energy"].sel({dim: name}).item()),
                 }
-                for name in run[dim].values
+                for name, unit in zip(run[dim].values, _units(run[torque], run.sizes[dim]), strict=True)
             }
     if "frame_force" in run:
         size = np.linalg.norm(run["frame_force"].transpose(..., "axis").values, axis=-1)
         out["frame"] = {"force_max": largest(size), "moment_max": largest(run["frame_moment"].values)}
     return out
+
+
+def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
+    """Unit of each torque or force; None where it is not known which of the two it is."""
+    unit = str(efforts.attrs.get("units", ""))
+    if unit in _RATES:
+        return [unit] * number
+    each = str(efforts.attrs.get("units_each", "")).split(", ")
+    return list(each) if len(each) == number and set(each) <= set(_RATES) else [None] * number
 
 
 _OF_BEAMS = {
@@ -105,11 +119,19 @@ def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
     """A sentence for each prescribed motion of a run: its largest torque, speed and power."""
     whose = f"mode {mode}: " if mode else ""
     return [
-        f"{whose}drive {name}: torque or force up to {one['torque_max']:.4g}, speed up to {one['speed_max']:.4g}, "
-        f"power up to {one['power_max']:.4g} W"
+        f"{whose}drive {name}: {_EFFORTS[one['torque_unit']]} up to "
+        f"{_with_unit(one['torque_max'], one['torque_unit'])}, "
+        f"speed up to {_with_unit(one['speed_max'], one['speed_unit'])}, power up to {one['power_max']:.4g} W"
         for name, one in figures.get("drives", {}).items()
-        if None not in one.values()
+        if None not in (one["torque_max"], one["speed_max"], one["power_max"])
     ]
+
+
+_EFFORTS = {"N m": "torque", "N": "force", None: "torque or force"}
+
+
+def _with_unit(value: float, unit: str | None) -> str:
+    return f"{value:.4g} {unit or ''}".rstrip()
 
 
 def largest(values: NDArray[np.float64]) -> float | None:

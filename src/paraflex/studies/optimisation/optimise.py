@@ -12,6 +12,9 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.errors import InputError
+from paraflex.files.fields import check_unit
+from paraflex.files.schema import NumberOfText
+from paraflex.results.metrics import METRICS
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
 from paraflex.studies.optimisation.objective import Objective
@@ -152,7 +155,14 @@ def _objective(table: ObjectiveTable) -> Objective:
             raise InputError(
                 "must be positive", field=f"objective.minimise.{column}", value=weight, remedy="leave the metric out"
             )
-    limits = tuple((each.metric, each.value) for each in table.at_most)
+    for k, each in enumerate(table.at_most):
+        if isinstance(each.value, NumberOfText):
+            unit = METRICS[each.metric.partition(".")[0]].unit
+            units = () if unit == "1" else (unit,)
+            check_unit(
+                each.value.text, {}, units, f"objective.at_most.{k}.value", "the limit in the unit of its metric"
+            )
+    limits = tuple((each.metric, float(each.value)) for each in table.at_most)
     return Objective(dict(table.minimise), table.over, table.relative, limits)
 
 

@@ -25,7 +25,7 @@ class AtMostTable(Table):
     """A metric with a limit."""
 
     metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
-    value: Number = Field(description="its limit, in the metric's unit")
+    value: NumberOfFields = Field(description="its limit, in the unit of the metric")
 
 
 class ObjectiveTable(Table):
