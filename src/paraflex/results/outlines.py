@@ -160,9 +160,9 @@ def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
     """Stations (k, s, 2) of the undeformed body between the places that hold it [m].
 
     Between two the undeformed body, turned and scaled so that both are where they are; beyond them turned as between.
-    Through three or more in line a natural cubic spline, without a kink at a joint in mid-span; drawings use it where the
-    rigid mechanism does not close. A body held at places that are not in line is fitted to them as a whole, what is left
-    shared out by distance; one held at a single place is turned as the material is there.
+    Through three or more in line a natural cubic spline, without a kink at a joint in mid-span; drawings use it
+    where the rigid mechanism does not close. A body held at places that are not in line is fitted to them as a whole,
+    what is left shared out by distance; one held at a single place is turned as the material is there.
 
     Parameters
     ----------
