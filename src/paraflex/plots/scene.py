@@ -19,6 +19,8 @@ from paraflex.plots.selection import names_of, select_run
 
 Array = NDArray[np.float64]
 
+# Variables of joints, and the same where bodies are as in shape_base.
+JOINT_BASES = {"joint_position": "joint_base", "joint_direction": "joint_direction_base"}
 # Points of a circle.
 _CIRCLE = 61
 # Length and width of what slides, as parts of the picture's larger side.
@@ -200,8 +202,8 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     at = _Sampler(time, times)
     owners = run["station_body"].values
     bodies = {str(name): owners == name for name in dict.fromkeys(owners.tolist())}
-    places, directions = run["joint_position"].values.astype(float), run["joint_direction"].values.astype(float)
-    joints = _joints(run, drawn, at)
+    places, directions = (_magnified_joints(run, name, magnify) for name in ("joint_position", "joint_direction"))
+    joints = _joints(run, drawn, places, directions, at)
     springs, followed = _springs(run, drawn), followed_station(run)
     seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
     seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
@@ -224,7 +226,16 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     )
 
 
-def _joints(run: xr.Dataset, drawn: Array, at: Callable[[Array], Array]) -> tuple[DrawnJoint, ...]:
+def _magnified_joints(run: xr.Dataset, name: str, magnify: float) -> Array:
+    """Places or directions of joints, which move with the bodies from their base; in older results they do not."""
+    values = run[name].values.astype(float)
+    base = JOINT_BASES[name]
+    return values + (magnify - 1.0) * (values - run[base].values.astype(float)) if base in run else values
+
+
+def _joints(
+    run: xr.Dataset, drawn: Array, places: Array, directions: Array, at: Callable[[Array], Array]
+) -> tuple[DrawnJoint, ...]:
     """Joints of a run; results of earlier versions do not say which have motors, and rails on moving bodies."""
     names, count = run["joint"].values, run.sizes["joint"]
     driven = run["joint_driven"].values if "joint_driven" in run else np.zeros(count, dtype=bool)
@@ -232,8 +243,8 @@ def _joints(run: xr.Dataset, drawn: Array, at: Callable[[Array], Array]) -> tupl
     return tuple(
         DrawnJoint(
             str(names[i]), str(run["joint_kind"].values[i]), bool(run["joint_grounded"].values[i]),
-            at(run["joint_position"].values[:, i].astype(float)), at(run["joint_direction"].values[:, i].astype(float)),
-            bool(driven[i]), at(drawn[:, int(rails[i])]) if rails[i] >= 0 else None,
+            at(places[:, i]), at(directions[:, i]), bool(driven[i]),
+            at(drawn[:, int(rails[i])]) if rails[i] >= 0 else None,
         )
         for i in range(count)
     )  # fmt: skip

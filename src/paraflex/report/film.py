@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
-from paraflex.plots.scene import Limits, Scene, common_limits, default_magnification, figure_of, is_plate, scene
+from paraflex.plots.scene import (
+    JOINT_BASES,
+    Limits,
+    Scene,
+    common_limits,
+    default_magnification,
+    figure_of,
+    is_plate,
+    scene,
+)
 from paraflex.report.packing import packed
 
 Array = NDArray[np.float64]
@@ -28,7 +37,7 @@ NO_SHAPES = (
 
 @dataclass(frozen=True)
 class Animation:
-    """Frames of all runs; drawn magnified by m, a body is at `base + m (shape - base)`.
+    """Frames of all runs; drawn magnified by m, a body is at `base + m (shape - base)`, and so is a symbol.
 
     Attributes
     ----------
@@ -40,6 +49,8 @@ class Animation:
         Name, first station and the one after the last.
     scenes : sequence of Scene or None
         Of each run, with its true deflections; none of a run without a sample.
+    stiff : sequence of Scene or None
+        The same without deflections, of runs whose joints are elsewhere then.
     path : (samples, 2) or (runs, samples, 2) array, optional
         Where the end-effector should go [m], in all runs or in each.
     magnify : float
@@ -51,6 +62,7 @@ class Animation:
     base: Array
     bodies: Sequence[tuple[str, int, int]]
     scenes: Sequence[Scene | None]
+    stiff: Sequence[Scene | None]
     path: Array | None = None
     magnify: float = 1.0
 
@@ -73,6 +85,9 @@ class Animation:
             "magnify": self.magnify,
             "marks": [one and [_marks(still_marks(one, limits), 1), _marks(moving_marks(one, limits), self.time.size)]
                       for one in self.scenes],
+            # How far the moving symbols are from where they were if nothing bent.
+            "swing": [None if one is None or stiff is None else _swing(one, stiff, limits)
+                      for one, stiff in zip(self.scenes, self.stiff, strict=True)],
             "tips": [one and one.followed for one in self.scenes],
             "path": None if self.path is None else packed(self.path.reshape(-1, *self.path.shape[-2:])),
             "view": [limits.left, limits.bottom, limits.right, limits.top],
@@ -87,6 +102,12 @@ def _marks(marks: list[Mark], frames: int) -> dict[str, Any]:
     return {"pieces": pieces, "places": packed(places[None])}
 
 
+def _swing(one: Scene, stiff: Scene, limits: Limits) -> dict[str, Any]:
+    """Places of the moving symbols less those without deflections."""
+    pairs = zip(moving_marks(one, limits), moving_marks(stiff, limits), strict=True)
+    return packed(np.concatenate([bent.places - still.places for bent, still in pairs], axis=1)[None])
+
+
 def animation(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Animation | None:
     """The animation of a dataset with runs along these dimensions; None if it has no shapes."""
     if any(name not in data for name in _SHAPES):
@@ -98,16 +119,17 @@ def animation(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Animation | 
         path = path[:, frames_of(path.shape[1], 2 * MOST_FRAMES)]
         path = path[0] if all(np.array_equal(path[0], each) for each in path) else path
     names = [str(name) for name in data["station_body"].values]
+    runs = [
+        few.isel(dict(zip(dims, chosen, strict=True))) for chosen in product(*(range(data.sizes[dim]) for dim in dims))
+    ]
     starts = [k for k, name in enumerate(names) if k == 0 or name != names[k - 1]]
     return Animation(
         time=few["time"].values,
         shape=_runs(few["shape"], dims),
         base=_runs(few["shape_base"], dims),
         bodies=[(names[a], a, b) for a, b in zip(starts, [*starts[1:], len(names)], strict=True)],
-        scenes=[
-            _scene(few.isel(dict(zip(dims, chosen, strict=True))))
-            for chosen in product(*(range(data.sizes[dim]) for dim in dims))
-        ],
+        scenes=[_scene(run) for run in runs],
+        stiff=[_scene(run, 0.0) if _swings(run) else None for run in runs],
         path=path,
         magnify=default_magnification([few]),
     )
@@ -125,8 +147,14 @@ def _runs(values: xr.DataArray, dims: Sequence[str]) -> Array:
     return array.reshape(-1, *array.shape[len(dims) :])
 
 
-def _scene(run: xr.Dataset) -> Scene | None:
+def _swings(run: xr.Dataset) -> bool:
+    """Whether joints are elsewhere where nothing bends."""
+    return any(base in run and bool((run[name] != run[base]).where(run[name].notnull(), False).any())
+               for name, base in JOINT_BASES.items())  # fmt: skip
+
+
+def _scene(run: xr.Dataset, magnify: float = 1.0) -> Scene | None:
     try:
-        return scene(run, run["time"].values)
+        return scene(run, run["time"].values, magnify)
     except InputError:
         return None

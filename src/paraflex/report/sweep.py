@@ -36,8 +36,8 @@ _NO_RUN = "None of the best designs was simulated again, so there is no animatio
 _MOST_COLUMNS = 12
 _SHOWN_VARIABLES = (
     "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
-    "joint_position", "joint_direction", "spring_position", "point_station", "spring_station", "joint_rail",
-    "gear_radius",
+    "joint_position", "joint_base", "joint_direction", "joint_direction_base", "spring_position", "point_station",
+    "spring_station", "joint_rail", "gear_radius",
 )  # fmt: skip
 _STATIONS = ("point_station", "spring_station", "joint_rail")
 _DIFFERING = (*_STATIONS, "gear_radius")

@@ -14,7 +14,8 @@ from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
 from paraflex.mechanism.poses import local_points
-from paraflex.results.outlines import Hold, Outline, outline_motion, outlines, stiff_shape, turned
+from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
+from paraflex.results.stiff import Frames, rigid_frames
 
 Array = NDArray[np.float64]
 
@@ -28,16 +29,18 @@ _NEAREST, _FARTHEST = 0.5, 2.0
 class Drawing:
     """Geometry of a mechanism at k samples, in the ground frame.
 
-    Magnified by a factor m, stations are at `base + m (shape - base)`: joints keep together whatever m is.
+    Magnified by a factor m, stations are at `base + m (shape - base)`, and so are joints: they keep together whatever
+    m is, as both the bodies and their base satisfy the joints.
 
     Attributes
     ----------
     shape, base : (k, stations, 2) arrays
-        Bodies as they are, body after body, and drawn stiff between the joints that hold them [m].
-    joints : (k, joints, 2) array
-        Each on its second body [m].
-    directions : (k, joints) array
-        Of the axes of joints that slide, NaN of others [rad].
+        Bodies as they are, body after body, and drawn stiff: where a beam is held at three or more places in line, in
+        the nearest pose of the rigid mechanism, else between the joints that hold them [m].
+    joints, joint_bases : (k, joints, 2) arrays
+        Each on its second body, and on that in the base [m].
+    directions, direction_bases : (k, joints) arrays
+        Of the axes of joints that slide, NaN of others, and in the base [rad].
     springs : (k, springs, 2, 2) array
         Both ends of the springs between points [m].
     """
@@ -45,7 +48,9 @@ class Drawing:
     shape: Array
     base: Array
     joints: Array
+    joint_bases: Array
     directions: Array
+    direction_bases: Array
     springs: Array
 
 
@@ -76,25 +81,29 @@ def drawing(
             return np.broadcast_to(np.array(mechanism.ground[ref.point], dtype=float), (samples, 2))
         return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
 
-    joined: dict[str, list[tuple[Joint, PointRef]]] = {name: [] for name in drawn}
-    for joint in mechanism.joints:
-        for ref in (joint.a, joint.b):
-            if not ref.on_ground:
-                joined[ref.body].append((joint, ref))
-    bases = {
-        name: _base(mechanism.body(name), one, joined[name], shapes[name], place, angle, frame)
-        for name, one in drawn.items()
-    }
-    directions = np.full((samples, len(mechanism.joints)), np.nan)
-    for i, joint in enumerate(mechanism.joints):
-        if joint.slides:
-            directions[:, i] = _direction(joint, angle, frame)
+    joined = _joined(mechanism)
+    joints = _second([place(joint.b) for joint in mechanism.joints], samples)
+    directions = _directions(mechanism, samples, angle, frame)
     springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
+    posed = None
+    if any(_bends_between_holds(mechanism.body(name), one, joined[name]) for name, one in drawn.items()):
+        driven = _driven(mechanism, directions, place, angle)
+        posed = rigid_frames(mechanism, [*drawn.values()], shapes, lambda name: frame(name)[1], driven)
+    if posed is None:
+        bases = {
+            name: _base(mechanism.body(name), one, joined[name], shapes[name], place, angle, frame)
+            for name, one in drawn.items()
+        }
+        joint_bases, direction_bases = joints, directions
+    else:
+        bases, joint_bases, direction_bases = _rigid_bases(mechanism, drawn, posed, samples)
     return Drawing(
         shape=np.concatenate([shapes[name] for name in drawn], axis=1),
         base=np.concatenate([bases[name] for name in drawn], axis=1),
-        joints=_second([place(joint.b) for joint in mechanism.joints], samples),
+        joints=joints,
+        joint_bases=joint_bases,
         directions=directions,
+        direction_bases=direction_bases,
         springs=np.moveaxis(np.array(springs), 2, 0) if springs else np.zeros((samples, 0, 2, 2)),
     )
 
@@ -150,7 +159,9 @@ def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
         "shape": (("station", "axis"), one.shape),
         "shape_base": (("station", "axis"), one.base),
         "joint_position": (("joint", "axis"), one.joints),
+        "joint_base": (("joint", "axis"), one.joint_bases),
         "joint_direction": (("joint",), one.directions),
+        "joint_direction_base": (("joint",), one.direction_bases),
         **springs,
     }
 
@@ -241,6 +252,56 @@ def _touches(rail: Joint, side: float, arm: Array, radius: float) -> bool:
     return bool(_NEAREST * radius <= distance <= _FARTHEST * radius)
 
 
+def _joined(mechanism: Mechanism) -> dict[str, list[tuple[Joint, PointRef]]]:
+    """Joints of each body, each with its point there."""
+    joined: dict[str, list[tuple[Joint, PointRef]]] = {body.name: [] for body in mechanism.bodies}
+    for joint in mechanism.joints:
+        for ref in (joint.a, joint.b):
+            if not ref.on_ground:
+                joined[ref.body].append((joint, ref))
+    return joined
+
+
+def _rigid_bases(
+    mechanism: Mechanism, drawn: Mapping[str, Outline], posed: Frames, samples: int
+) -> tuple[dict[str, Array], Array, Array]:
+    """Stations of all bodies, joints and directions of their axes of the rigid mechanism."""
+    bases = {name: turned(*posed[name], one.places) for name, one in drawn.items()}
+    ends = [
+        np.broadcast_to(np.array(mechanism.ground[end.point], dtype=float), (samples, 2))
+        if end.on_ground
+        else bases[end.body][:, drawn[end.body].points[end.point]]
+        for end in (joint.b for joint in mechanism.joints)
+    ]
+    directions = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
+    return bases, _second(ends, samples), directions
+
+
+def _bends_between_holds(body: Body, one: Outline, joined: list[tuple[Joint, PointRef]]) -> bool:
+    """Whether joints hold a flexible body at three or more places in line."""
+    if isinstance(body, RigidBody) or not body.flexible:
+        return False
+    moving = [joint for joint, ref in joined if joint.follows_beam and ref is joint.a]
+    held = {one.points[ref.point] for joint, ref in joined if not (joint.follows_beam and ref is joint.a)}
+    return len(held) + len(moving) > 2 and in_line(one)
+
+
+def _driven(
+    mechanism: Mechanism, directions: Array, place: Callable[[PointRef], Array], angle: Callable[[PointRef], Array]
+) -> dict[str, Array]:
+    """Coordinates (k,) of the joints with motors or prescribed motions [rad, m]."""
+    names = {one.joint for one in (*mechanism.motors, *mechanism.prescribed)}
+    out = {}
+    for joint, direction in zip(mechanism.joints, directions.T, strict=True):
+        if joint.name in names and joint.slides:
+            step = place(joint.b) - place(joint.a)
+            out[joint.name] = np.cos(direction) * step[:, 0] + np.sin(direction) * step[:, 1]
+        elif joint.name in names:
+            sides = [0.0 if ref.on_ground else angle(ref) for ref in (joint.a, joint.b)]
+            out[joint.name] = sides[1] - sides[0]
+    return out
+
+
 def _base(
     body: Body,
     one: Outline,
@@ -275,6 +336,20 @@ def _contact(place: Array, origin: Array, angle: Array) -> Hold:
     """Place of a point that slides along a beam, on the undeformed beam."""
     local = _complex(place - origin) * np.exp(-1j * angle)
     return Hold(local.real.astype(complex), _complex(place))
+
+
+def _directions(
+    mechanism: Mechanism,
+    samples: int,
+    angle: Callable[[PointRef], Array],
+    frame: Callable[[str], tuple[Array, Array]],
+) -> Array:
+    """Of the axes of joints that slide (k, joints), NaN of others [rad]."""
+    out = np.full((samples, len(mechanism.joints)), np.nan)
+    for i, joint in enumerate(mechanism.joints):
+        if joint.slides:
+            out[:, i] = _direction(joint, angle, frame)
+    return out
 
 
 def _direction(

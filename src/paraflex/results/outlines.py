@@ -160,9 +160,9 @@ def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
     """Stations (k, s, 2) of the undeformed body between the places that hold it [m].
 
     Between two the undeformed body, turned and scaled so that both are where they are; beyond them turned as between.
-    Through three or more in line a natural cubic spline, so that deflections drawn magnified from it have no kink at a
-    joint in mid-span. A body held at places that are not in line is fitted to them as a whole, what is left shared out
-    by distance; one held at a single place is turned as the material is there.
+    Through three or more in line a natural cubic spline, without a kink at a joint in mid-span; drawings use it
+    where the rigid mechanism does not close. A body held at places that are not in line is fitted to them as a whole,
+    what is left shared out by distance; one held at a single place is turned as the material is there.
 
     Parameters
     ----------
@@ -266,6 +266,11 @@ def _fitted(
     weights = np.where(nearest > 0.0, nearest / np.where(distance > 0.0, distance, 1.0), distance == 0.0)
     weights = weights / weights.sum(axis=2, keepdims=True)
     return centre + ratio * (z - middle) + np.einsum("ksh,kh->ks", weights, missed)
+
+
+def in_line(drawn: Outline) -> bool:
+    """Whether the stations of a body are on a line."""
+    return _axis(drawn.places[:, 0] + 1j * drawn.places[:, 1], drawn.size) is not None
 
 
 def _axis(z: NDArray[np.complex128], size: float) -> complex | None:

@@ -172,6 +172,8 @@ const player = (() => {
     if (farthest >= 0) {
       const base = at(arrays.base, state.run, before, share), bend = at(arrays.bend, state.run, before, share);
       const [still, moving] = film.marks[state.run], [ground, points] = arrays.marks[state.run].map((one) => at(one, 0, before, share));
+      const swing = arrays.swing[state.run] && at(arrays.swing[state.run], 0, before, share);
+      if (swing) for (let k = 0; k < points.length; k++) points[k] += (state.magnify - 1) * swing[k];
       const drawn = base.map((value, k) => value + state.magnify * bend[k]), tip = film.tips[state.run];
       pen.lineCap = pen.lineJoin = "round";
       drawMarks(still, ground);
@@ -272,8 +274,9 @@ const player = (() => {
     const names = ["base", "bend", "path"];
     const read = await Promise.all(names.map((name) => (film[name] ? report.unpacked(film[name]) : null)));
     const marks = await Promise.all(film.marks.map((sets) => Promise.all((sets || []).map((set) => report.unpacked(set.places)))));
+    const swing = await Promise.all(film.swing.map((one) => (one ? report.unpacked(one) : null)));
     // At once and last: from here on the page may paint.
-    arrays = { ...Object.fromEntries(names.map((name, k) => [name, read[k]])), marks };
+    arrays = { ...Object.fromEntries(names.map((name, k) => [name, read[k]])), marks, swing };
     showMagnification();
     recolour();
   }
