@@ -48,7 +48,9 @@ const player = (() => {
   function fit() {
     const ratio = devicePixelRatio || 1;
     const tall = (film.view[3] - film.view[1]) / (film.view[2] - film.view[0]);
-    canvas.style.height = `${Math.round(Math.min(Math.max(tall * canvas.clientWidth + 60, 240), 620))}px`;
+    // No taller than what is left of the window below it, so that all of it is seen at once.
+    const room = Math.min(Math.max(innerHeight - canvas.getBoundingClientRect().top - scrollY - 24, 320), 620);
+    canvas.style.height = `${Math.round(Math.min(Math.max(tall * canvas.clientWidth + 60, 240), room))}px`;
     width = canvas.clientWidth; height = canvas.clientHeight;
     canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
