@@ -35,8 +35,8 @@ class Drawing:
     Attributes
     ----------
     shape, base : (k, stations, 2) arrays
-        Bodies as they are, body after body, and drawn stiff: where a beam is held at three or more places in line, in
-        the nearest pose of the rigid mechanism, else between the joints that hold them [m].
+        Bodies as they are, body after body, and drawn stiff: where something slides along a beam held at three or more
+        places in line, in the nearest pose of the rigid mechanism, else between the joints that hold them [m].
     joints, joint_bases : (k, joints, 2) arrays
         Each on its second body, and on that in the base [m].
     directions, direction_bases : (k, joints) arrays
@@ -278,12 +278,12 @@ def _rigid_bases(
 
 
 def _bends_between_holds(body: Body, one: Outline, joined: list[tuple[Joint, PointRef]]) -> bool:
-    """Whether joints hold a flexible body at three or more places in line."""
+    """Whether joints hold a flexible beam at three or more places in line, one of which slides along it."""
     if isinstance(body, RigidBody) or not body.flexible:
         return False
     moving = [joint for joint, ref in joined if joint.follows_beam and ref is joint.a]
     held = {one.points[ref.point] for joint, ref in joined if not (joint.follows_beam and ref is joint.a)}
-    return len(held) + len(moving) > 2 and in_line(one)
+    return bool(moving) and len(held) + len(moving) > 2 and in_line(one)
 
 
 def _driven(

@@ -1,7 +1,8 @@
 """The pose of a mechanism's bodies, all rigid, that is nearest to a bent one: what magnified drawings bend from.
 
-A beam held at three or more places in line bends between them whatever joins them, so its base has to be straight,
-and the bodies that hold it have to move with it.
+A beam held at three or more places in line bends between them as a curve through these places, so its base has to be
+straight, and the bodies that hold it have to move with it. The end-effector then strays from its place by its elastic
+deviation, magnified; so this is only for beams that something slides along, whose curve changes with the place.
 """
 
 from __future__ import annotations
