@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 
 from paraflex import plots
 from paraflex.errors import InputError, OutputError
-from paraflex.plots.labels import display_unit, mode_label, symbol, three_digits
+from paraflex.plots.labels import display_unit, plain, symbol, three_digits
 from paraflex.plots.selection import default_mode
 
 FULL, PARTIAL = "++", "+-"
@@ -462,5 +462,5 @@ def test_names_as_symbols() -> None:
         "crank_2b",
         r"cost\$",
     ]
-    assert [mode_label(name) for name in ("+-", "both", "one-by-one")] == ["+-", "both", "one-by-one"]
+    assert [plain(name) for name in ("+-", "both", "one-by-one")] == ["+-", "both", "one-by-one"]
     assert [three_digits(value) for value in (48.0, 0.37712, 120.4, 0.0)] == ["48.0", "0.377", "120", "0"]

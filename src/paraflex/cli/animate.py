@@ -13,6 +13,7 @@ from rich.progress import TaskProgressColumn, TimeRemainingColumn
 from paraflex.cli import COMPLETE, signals
 from paraflex.cli.bars import bars, begun_late
 from paraflex.cli.commands.results import AnimateRequest
+from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.results import open_results
@@ -53,17 +54,6 @@ def animate_command(request: AnimateRequest) -> int:
             soft_wrap=True,
         )
     return COMPLETE
-
-
-def refuse_existing(output: Path, force: bool) -> None:
-    """Check that there is no file of that name, nor anything in a folder of it, or that it may be written over."""
-    if force or not output.exists() or (output.is_dir() and not any(output.iterdir())):
-        return
-    raise InputError(
-        "exists already" if output.is_file() else "the folder holds files already",
-        field=str(output),
-        remedy="name another, or write over it with --force",
-    )
 
 
 def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film]) -> Film:

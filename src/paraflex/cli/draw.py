@@ -16,8 +16,8 @@ from rich.table import Table
 
 from paraflex.checks.drawing import pose_of
 from paraflex.cli import COMPLETE
-from paraflex.cli.animate import refuse_existing
 from paraflex.cli.commands.models import DrawRequest
+from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.request import asked_model
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError

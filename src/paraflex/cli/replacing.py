@@ -51,6 +51,17 @@ def hold_results(out: str | Path, kind: str, *, force: bool, field: str = "--out
         yield folder
 
 
+def refuse_existing(output: Path, force: bool) -> None:
+    """Check that there is no file of that name, nor anything in a folder of it, or that it may be written over."""
+    if force or not output.exists() or (output.is_dir() and not any(output.iterdir())):
+        return
+    raise InputError(
+        "exists already" if output.is_file() else "the folder holds files already",
+        field=str(output),
+        remedy="name another, or write over it with --force",
+    )
+
+
 def say_replaced(folder: Path) -> None:
     """Say on stderr which results of a folder a command is about to replace, and which files it leaves."""
     kind, foreign = kind_of_folder(folder), foreign_files(folder)

@@ -169,7 +169,12 @@ def joint_gaps(system: System, phi: Array) -> dict[str, float]:
 
 def gap_unit(system: System, phi: Array) -> str:
     """The unit of the largest number among constraint rows (m,)."""
-    return "rad" if system.rows[int(np.argmax(np.abs(phi)))].endswith(" angle") else "m"
+    return row_unit(system.rows[int(np.argmax(np.abs(phi)))])
+
+
+def row_unit(row: str) -> str:
+    """The unit of a constraint row's residual, by the row's name."""
+    return "rad" if row.endswith(" angle") else "m"
 
 
 def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array, left: Array) -> None:

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, mode_label, peak, symbol
+from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, plain, symbol
 from paraflex.plots.layout import is_narrow, panels
 from paraflex.plots.runs import draw_actual, draw_curves, finish_over_time
 from paraflex.plots.scales import mark_powers
@@ -112,7 +112,7 @@ def model_distances(data: xr.Dataset) -> Figure:
                 shown = np.where(distance > _SMALLEST_DISTANCE, distance, np.nan)
                 draw_actual(panel, run, time, 1e3 * shown, label=printed(name), **look)
         for panel, title in zip(column, ("from the desired place", f"from {printed(reference)}"), strict=True):
-            panel.set_title(f"{mode_label(mode)}: distance {title}")
+            panel.set_title(f"{plain(mode)}: distance {title}")
             if any(peak(np.asarray(line.get_ydata(), dtype=float)) > 0.0 for line in panel.lines):
                 mark_powers(panel)
     for panel in axes[:, 0]:

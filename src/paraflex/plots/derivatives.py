@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import metric_name, mode_label
+from paraflex.plots.labels import metric_name, plain
 from paraflex.plots.layout import MM, is_narrow, lay_out, panels
 from paraflex.plots.style import COLOURS, STYLE, ZERO
 
@@ -45,7 +45,7 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
     panel.set_yticks([])
     # Half of the width is the names of the metrics.
     panel.set_xlabel("elasticity [% / %]" if is_narrow() else "change of the metric by change of the parameter [% / %]")
-    panel.set_title(f"{figures['mechanism']}, {shown['path']}, {mode_label(shown['mode'])}", loc="left")
+    panel.set_title(f"{figures['mechanism']}, {shown['path']}, {plain(shown['mode'])}", loc="left")
     lay_out(figure, axes, panel_height=pitch * len(metrics))
     _name_groups(panel, dict(zip(map(metric_name, metrics), places, strict=True)))
     return figure

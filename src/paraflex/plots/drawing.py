@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import mode_label, three_digits
+from paraflex.plots.labels import plain, three_digits
 from paraflex.plots.layout import page_width
 from paraflex.plots.marks import LOOKS, by_look, moving_marks, still_marks
 from paraflex.plots.scene import (
@@ -207,7 +207,7 @@ def mechanism_drawing(
     sketch = Sketch(axes, shown, limits, look, width=0.5)
     sketch.show(len(shown.time) - 1)
     draw_scale_bar(figure, sketch.limits, look, (0.98, 1.5 / height), 6.5)
-    title = [shown.mechanism, *([f"mode {mode_label(shown.mode)}"] if shown.mode else [])]
+    title = [shown.mechanism, *([f"mode {plain(shown.mode)}"] if shown.mode else [])]
     figure.text(0.02, 0.985, ", ".join(title), va="top", color=look.ink, fontsize=7.0)
     figure.text(
         0.98, 0.985, f"t = {three_digits(time)} s, {caption(shown)}", va="top", ha="right", color=look.ink, fontsize=7.0

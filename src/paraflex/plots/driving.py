@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label
+from paraflex.plots.labels import axis_label, display_unit, effort_label, plain
 from paraflex.plots.layout import ONE_COLUMN, lay_out, panels
 from paraflex.plots.runs import draw_curves, finish_over_time
 from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
@@ -43,7 +43,7 @@ def _of_all_modes(data: xr.Dataset, values: NDArray[np.float64], quantity: str) 
     """A quantity (modes, samples) of all modes in one panel, on a logarithmic axis."""
     figure, axes = panels(1, 1)
     for k, name in enumerate(names_of(data, "mode")):
-        draw_curves(axes[0, 0], select_run(data, name), {f"mode {mode_label(name)}": values[k]}, first=k)
+        draw_curves(axes[0, 0], select_run(data, name), {f"mode {plain(name)}": values[k]}, first=k)
     axes[0, 0].set_ylabel(axis_label(quantity))
     if np.isfinite(values).any():
         mark_powers(axes[0, 0])
@@ -57,7 +57,7 @@ def mode_comparison(data: xr.Dataset) -> Figure:
     peaks = data["peak_torque"].max("motor").values
     label = effort_label(data["torque"].attrs.get("units", "N m"))
     figure, axes = panels(1, 3)
-    names = [mode_label(name) for name in names_of(data, "mode")]
+    names = [plain(name) for name in names_of(data, "mode")]
     for panel, values, title, colour in (
         (axes[0, 0], rms.values, f"RMS error {'of the motion' if of_motion else 'of the whole run'}", BLUE),
         (axes[0, 1], data["residual_vibration"].values, "residual vibration", GREEN),
@@ -92,7 +92,7 @@ def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
         raise InputError("no condition numbers: the mechanism has no path", field="modes", remedy="name one: --path")
     figure, axes = panels(1, 1, width=ONE_COLUMN)
     panel = axes[0, 0]
-    names = [mode_label(str(row["mode"])) for row in known]
+    names = [plain(str(row["mode"])) for row in known]
     for drives, colour, label in ((True, BLUE, "drives the path"), (False, "0.75", "does not")):
         values = [row["condition_max"] if row.get("drives_path", True) == drives else np.nan for row in known]
         if np.isfinite(values).any():

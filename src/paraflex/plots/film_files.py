@@ -23,7 +23,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.interrupts import starting_processes
 from paraflex.plots.drawing import caption
 from paraflex.plots.film_pictures import Film, clock, frames, stage
-from paraflex.plots.labels import mode_label
+from paraflex.plots.labels import plain
 from paraflex.plots.scene import at_times
 from paraflex.plots.style import journal_style
 from paraflex.plots.svg import Pen, animated, moving_elements
@@ -91,7 +91,7 @@ def _animated_svg(film: Film) -> str:
         corner = box.x0 * width - scale * sketch.limits.left, (1.0 - box.y1) * height + scale * sketch.limits.top
         pen = Pen(corner, scale, min(box.width * width, box.height * height) / 480.0, film.look, seconds)
         moving += moving_elements(at_times(shown, keys), sketch.limits, pen)
-    named = ", ".join(mode_label(shown.mode) for shown in film.scenes if shown.mode)
+    named = ", ".join(plain(shown.mode) for shown in film.scenes if shown.mode)
     title = f"{film.scenes[0].mechanism}{', mode ' + named if named else ''}: {caption(film.scenes[0])}"
     # SMIL cannot count: a line fills as time passes.
     line = (

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.plots.drawing import Sketch, bare, caption, draw_scale_bar, name_links
-from paraflex.plots.labels import mode_label
+from paraflex.plots.labels import plain
 from paraflex.plots.scene import Scene, common_limits
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import Theme
@@ -90,7 +90,7 @@ def stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
         sketches.append(Sketch(bare(axes, limits), shown, limits, look))
         middle = (k + 0.5) / count
         if count > 1 or shown.mode:
-            label = f"mode {mode_label(shown.mode)}"
+            label = f"mode {plain(shown.mode)}"
             figure.text(middle, 0.925, label, color=look.ink, fontsize=10.5, ha="center", va="center")
         texts.append(figure.text(middle, 0.885, "", color=look.trail, fontsize=9.0, ha="center", va="center"))
     first = film.scenes[0]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from paraflex.plots.energy import ENERGIES
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, peak, plain, symbol
+from paraflex.plots.labels import ROUNDING, axis_label, peak, plain, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time
 from paraflex.plots.selection import names_of, one_run, place_of
@@ -19,8 +19,6 @@ from paraflex.plots.workspace import finish_workspace, workspace_panel
 
 # A point that moves less than this fraction of the largest motion is at rest.
 _STILL_SHARE = 1e-3
-# Coordinates that change by less rest, but for rounding.
-_NOTHING = 1e-12
 # Meaning of modal coordinates by the last part of their names.
 _KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1e3)}
 
@@ -56,7 +54,7 @@ def coordinates(data: xr.Dataset) -> Figure:
     values = data["coordinate_value"].transpose("time", "coordinate").values
     travel = np.nan_to_num(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))
     groups = {
-        kind: [k for k, name in enumerate(names) if _kind(name) == kind and travel[k] > _NOTHING] for kind in _KINDS
+        kind: [k for k, name in enumerate(names) if _kind(name) == kind and travel[k] > ROUNDING] for kind in _KINDS
     }
     groups = {kind: members for kind, members in groups.items() if members} or {"phi": list(range(len(names)))[:1]}
     bodies = names_of(data, "body")

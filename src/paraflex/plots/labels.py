@@ -20,7 +20,7 @@ _GREEK = {
 
 
 # A value in a figure below this, in whatever unit, is rounding.
-_NOTHING = 1e-12
+ROUNDING = 1e-12
 
 
 class Quantity(NamedTuple):
@@ -122,7 +122,7 @@ def peak(values: ArrayLike) -> float:
 
 def three_digits(value: float) -> str:
     """A value to three significant digits: 48.0, 0.377, 120; 0, also of rounding errors."""
-    return f"{value:#.3g}".rstrip(".") if not abs(value) < _NOTHING else "0"
+    return f"{value:#.3g}".rstrip(".") if not abs(value) < ROUNDING else "0"
 
 
 def power_of_ten(value: float) -> str:
@@ -173,11 +173,6 @@ def _parted(name: str) -> tuple[str, str]:
 def plain(name: str) -> str:
     """A name that Matplotlib does not read as mathematics."""
     return name.replace("$", r"\$")
-
-
-def mode_label(name: str) -> str:
-    """A mode's name as everywhere else, signs as signs; Matplotlib does not read it as mathematics."""
-    return plain(name)
 
 
 def is_signs(name: str) -> bool:

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.mechanism.quantities import known
-from paraflex.plots.labels import axis_label
+from paraflex.plots.labels import ROUNDING, axis_label
 from paraflex.plots.style import STYLE
 
 ONE_COLUMN, TWO_COLUMNS = 84.0, 174.0  # Widths of a journal's columns [mm].
@@ -39,8 +39,6 @@ _TIME_NUMBERS = 4.3
 _AXIS_LABEL = 3.8
 _RIGHT = 3.6  # half of a number such as 0.030
 
-# Data within this, in the unit of their axis, are zero but for rounding.
-_ROUNDING = 1e-12
 # Widths of the letters of numbers [em] in DejaVu Sans, and its size on the axes [mm].
 _DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838}
 _EM = STYLE["ytick.labelsize"] / 72.0 * 25.4
@@ -140,7 +138,7 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
     axes = arranged(axes)
     for panel in axes.flat:
         low, high = panel.yaxis.get_data_interval()
-        if panel.get_autoscaley_on() and panel.get_yscale() == "linear" and max(abs(low), abs(high)) <= _ROUNDING:
+        if panel.get_autoscaley_on() and panel.get_yscale() == "linear" and max(abs(low), abs(high)) <= ROUNDING:
             panel.set_ylim(-1.04, 1.04)
     width = figure.get_figwidth() / MM
     shared, own = _entries(figure)

@@ -126,10 +126,8 @@ def _draw_path(axes: Axes, posed: Posed, look: Theme) -> list[Array]:
     if path is None:
         return []
     axes.plot(*path[0], **_START, markeredgecolor=look.desired, zorder=3.6)
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    for share in (0.2, 0.5, 0.8) if travelled[-1] > 0.0 else ():
-        ends = [np.interp((share + d) * travelled[-1], travelled, path[:, k]) for d in (-0.01, 0.01) for k in (0, 1)]
-        _arrow(axes, (ends[0], ends[1]), (ends[2], ends[3]), look.desired, 8.0)
+    for share in (0.2, 0.5, 0.8) if np.ptp(path, axis=0).any() else ():
+        _arrow(axes, _along(path, share - 0.01), _along(path, share + 0.01), look.desired, 8.0)
     return [path]
 
 
@@ -187,9 +185,7 @@ def _draw_gaps(axes: Axes, posed: Posed) -> None:
             if joint.slides:
                 along = np.array([np.cos(direction), np.sin(direction)])
                 ends[0] += along * np.dot(ends[1] - ends[0], along)
-            axes.plot(
-                *ends.T, color=_OPEN, linewidth=1.3, linestyle=(0, (3, 2)), marker="x", markersize=5.0, zorder=4.5
-            )
+            axes.plot(*ends.T, **_GAP, zorder=4.5)
 
 
 def _body_names(shown: Scene, look: Theme) -> list[Name]:

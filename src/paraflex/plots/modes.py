@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, display_unit, effort_label, mode_label, peak, symbol, three_digits
+from paraflex.plots.labels import ROUNDING, axis_label, display_unit, effort_label, peak, plain, symbol, three_digits
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, panels
 from paraflex.plots.runs import draw_actual, finish_over_time
 from paraflex.plots.selection import names_of, samples, select_run
@@ -20,8 +20,6 @@ from paraflex.results.following import headline, ranked_by_motion
 
 # Of a mode and the names of its passive motors, as many as fit above a panel.
 _TITLE_LETTERS = 22
-# A torque below this is rounding [N m, N].
-_NOTHING = 1e-12
 
 
 @drawn
@@ -41,14 +39,14 @@ def motor_torques(data: xr.Dataset) -> Figure:
             passive = []
             for k, motor in enumerate(motors):
                 torque = run["torque"].sel(motor=motor).values
-                if peak(torque) <= max(1e-9 * largest, _NOTHING):
+                if peak(torque) <= max(1e-9 * largest, ROUNDING):
                     passive.append(str(motor))
                     torque = np.full_like(torque, np.nan)  # Keeps its place in the legend.
                 panel.plot(time, torque, label=symbol(str(motor)), **look_of(k))
             panel.axhline(0.0, **ZERO)
-            half = 1.08 * scale if scale > max(1e-9 * largest, _NOTHING) else 1.0
+            half = 1.08 * scale if scale > max(1e-9 * largest, ROUNDING) else 1.0
             panel.set_ylim(-half, half)
-            panel.set_title(mode_label(name), loc="left")
+            panel.set_title(plain(name), loc="left")
             if passive:
                 short = len(name) + len(", ".join(passive)) <= _TITLE_LETTERS
                 listed = ", ".join(map(symbol, passive)) if short else f"{len(passive)} motors"
@@ -72,7 +70,7 @@ def tracking_errors(data: xr.Dataset) -> Figure:
             draw_actual(panel, run, time, unit.factor * errors[:, k], label=f"error in ${axis}$", **look)
         panel.axhline(0.0, **ZERO)
         keep_flat(panel, unit.factor * peak(errors))
-        panel.set_title(f"{mode_label(name)}: {_outcome(run)}")
+        panel.set_title(f"{plain(name)}: {_outcome(run)}")
         panel.set_ylabel(axis_label("error", unit=unit.name))
     return finish_over_time(figure, axes, data, panel_height=38.0)
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import metric_name, mode_label
+from paraflex.plots.labels import metric_name, plain
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panels
 from paraflex.plots.scales import LIST_LINE, list_lines
 from paraflex.plots.style import BLUE, VERMILLION, ZERO
@@ -128,10 +128,10 @@ def _target_name(target: Mapping[str, Any], targets: list) -> str:
     """Distinctive name of a target: its mode, and path and metric if they differ."""
     differing = [key for key in ("metric", "path") if len({each[key] for each in targets}) > 1]
     names = [metric_name(target[key]) if key == "metric" else target[key] for key in differing]
-    return " ".join([mode_label(target["mode"]), *names])
+    return " ".join([plain(target["mode"]), *names])
 
 
 def _panel_name(name: tuple[str, ...], names: list[tuple[str, ...]]) -> str:
     metric, path, mode = name
     paths = {each[1] for each in names}
-    return ", ".join([metric_name(metric), *([path] if len(paths) > 1 else []), mode_label(mode)])
+    return ", ".join([metric_name(metric), *([path] if len(paths) > 1 else []), plain(mode)])

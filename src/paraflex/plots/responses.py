@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable, in_conflict, undominated
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import mode_label, peak, plain, power_of_ten
+from paraflex.plots.labels import peak, plain, power_of_ten
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
 from paraflex.plots.style import look_of
 
@@ -90,7 +90,7 @@ def _series_name(pair: tuple[str, str], table: DesignTable) -> str:
     """Distinctive name of the runs of a path and mode."""
     path, mode = pair
     several = len(set(table.path.tolist())) > 1
-    return (f"{plain(path)}, " if several else "") + f"mode {mode_label(mode)}"
+    return (f"{plain(path)}, " if several else "") + f"mode {plain(mode)}"
 
 
 @drawn

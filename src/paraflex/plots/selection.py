@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from paraflex.errors import InputError
-from paraflex.plots.labels import is_signs, mode_label
+from paraflex.plots.labels import is_signs, plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,7 +68,7 @@ def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
 
 def run_label(run: xr.Dataset) -> str:
     """Label of a run's mode in legends."""
-    return f"mode {mode_label(str(run['mode'].item()))}"
+    return f"mode {plain(str(run['mode'].item()))}"
 
 
 def samples(run: xr.Dataset) -> int:

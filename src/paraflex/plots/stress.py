@@ -98,9 +98,9 @@ def drive_efforts(data: xr.Dataset, mode: str | None = None) -> Figure:
                 efforts["torque"][label], efforts["speed"][label] = force, one[f"{dim}_speed"].values
                 efforts["power"][label] = one[f"{dim}_power"].values
     figure, axes = panels(3, 1)
-    labels = (effort_label(", ".join(sorted(units, reverse=True))), "speed", axis_label("power"))
-    speed = {"N m": axis_label("angular_velocity"), "N": axis_label("speed")}
-    labels = (labels[0], speed.get("".join(units), "speed [rad/s, m/s]"), labels[2])
+    rates = {"N m": axis_label("angular_velocity"), "N": axis_label("speed")}
+    rate = rates.get("".join(units), "speed [rad/s, m/s]")
+    labels = (effort_label(", ".join(sorted(units, reverse=True))), rate, axis_label("power"))
     for panel, curves, label in zip(axes[:, 0], efforts.values(), labels, strict=True):
         _about_zero(panel, run, curves, label)
     return finish_over_time(figure, axes, data, panel_height=34.0)

@@ -118,9 +118,8 @@ def system_links(
     chords = [_chord(system, names, q, v) for names in cut.parts.values()]
     named = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
     points = stacked_motions([point_motion(system, cut.there(ref), q, v, a) for ref in named], samples)
-    speeds = [joint_coordinate(system, motor.joint, q, v).rate for motor in mechanism.motors]
     multipliers = solution.multipliers[:samples]
-    joints = [joint_coordinate(system, joint.name, q, v) for joint in mechanism.joints]
+    coordinates = {joint.name: joint_coordinate(system, joint.name, q, v) for joint in mechanism.joints}
     loads = joint_loads(system, [joint.name for joint in mechanism.joints], q, multipliers, torques[:samples])
     drawn = _drawing(cut, q)
     return Links(
@@ -136,15 +135,15 @@ def system_links(
         joint_force=loads.force,
         joint_moment=loads.moment,
         multiplier=_multipliers(system, cut.whole, multipliers),
-        motor_speed=_stacked(speeds, samples),
+        motor_speed=_stacked([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
         kinetic_energy=solution.kinetic_energy[:samples],
         strain_energy=solution.strain_energy[:samples],
         work=solution.work[:samples],
         drawing=drawn,
-        joint_coordinate=_stacked([each.value for each in joints], samples),
-        joint_speed=_stacked([each.rate for each in joints], samples),
+        joint_coordinate=_stacked([each.value for each in coordinates.values()], samples),
+        joint_speed=_stacked([each.rate for each in coordinates.values()], samples),
         drive_torque=drive_torques(system, multipliers),
-        drive_speed=_stacked([joint_coordinate(system, one.joint, q, v).rate for one in mechanism.prescribed], samples),
+        drive_speed=_stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
         frame_load=frame_load(system, drawn.joints, loads, q, v),
         sections=section_result(system, q, v, a),
     )

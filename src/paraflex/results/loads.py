@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+
+from paraflex.results.numbers import finite_or_none, largest
 
 Figures = dict[str, float | None]
 # Of the rate of a joint that a torque or a force drives.
@@ -31,7 +31,7 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
     if "stress_max" in run:
         bent = set(map(str, run["section_body"].values))
         out["beams"] = {
-            body: {key: _finite(run[name].values[b]) for key, name in _OF_BEAMS.items()}
+            body: {key: finite_or_none(run[name].values[b]) for key, name in _OF_BEAMS.items()}
             for b, body in enumerate(map(str, run["body"].values))
             if body in bent or np.isfinite(run["stress_max"].values[b])
         }
@@ -48,7 +48,7 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
                     "torque_max": largest(run[torque].sel({dim: name}).values),
                     "speed_max": largest(run[f"{dim}_speed"].sel({dim: name}).values),
                     "power_max": largest(run[f"{dim}_power"].sel({dim: name}).values),
-                    "energy": _finite(run[f"{dim}_energy"].sel({dim: name}).item()),
+                    "energy": finite_or_none(run[f"{dim}_energy"].sel({dim: name}).item()),
                 }
                 for name, unit in zip(run[dim].values, _units(run[torque], run.sizes[dim]), strict=True)
             }
@@ -132,13 +132,3 @@ _EFFORTS = {"N m": "torque", "N": "force", None: "torque or force"}
 
 def _with_unit(value: float, unit: str | None) -> str:
     return f"{value:.4g} {unit or ''}".rstrip()
-
-
-def largest(values: NDArray[np.float64]) -> float | None:
-    """Largest finite magnitude; None if there is none."""
-    known = np.abs(values[np.isfinite(values)])
-    return float(known.max()) if known.size else None
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -28,8 +28,8 @@ from paraflex.results.labelled import (
 )
 from paraflex.results.links import system_links
 from paraflex.results.loads import load_figures
+from paraflex.results.numbers import finite_or_none
 from paraflex.results.record import RUN_FIGURES
-from paraflex.results.summary import finite_or_none
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 

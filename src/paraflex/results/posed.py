@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.dynamics import System, build_system, closure_of, start_state
-from paraflex.dynamics.projection import joint_gaps
+from paraflex.dynamics.projection import joint_gaps, row_unit
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import reference_pose
@@ -139,6 +139,6 @@ def _open(drawn: Posed, rigid: System, q: Array, problem: str) -> Posed:
     phi = rigid.constraints(moment_signals(rigid.mechanism, 0.0), 0.0, q)[0]
     # The row that is off most has the unit.
     rows = [rigid.rows[k] for k in np.argsort(np.abs(phi))]
-    units = {joint_of_row(row): "rad" if row.endswith(" angle") else "m" for row in rows}
+    units = {joint_of_row(row): row_unit(row) for row in rows}
     gaps = {name: f"{gap:.3g} {units[name]}" for name, gap in joint_gaps(rigid, phi).items() if gap > _CLOSED}
     return replace(drawn, gaps=gaps, problems=(problem,))

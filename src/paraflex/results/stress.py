@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.dynamics import System
 from paraflex.dynamics.sections import SectionLoads, Sections, sections_of
+from paraflex.results.numbers import largest
 
 Array = NDArray[np.float64]
 Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
@@ -118,18 +119,14 @@ def largest_stresses(data: xr.Dataset) -> xr.Dataset:
         for run in np.ndindex(*shape):
             bending, axial, where = found.bending[run][:, own], found.axial[run][:, own], (*run, b)
             whole = all_stresses[run][:, own]
-            out["bending_stress_max"][where] = _largest(bending)
-            out["axial_stress_max"][where] = _largest(axial)
+            # None, where nothing is known, becomes NaN.
+            out["bending_stress_max"][where] = largest(bending)
+            out["axial_stress_max"][where] = largest(axial)
             if not np.isfinite(whole).any():
                 continue
             k, station = np.unravel_index(np.nanargmax(whole), whole.shape)
             out["stress_max"][where] = whole[k, station]
             out["stress_time"][where], out["stress_place"][where] = time[k], place[own[station]]
-            used = _largest(whole / strength[own])
-            out["safety_factor"][where] = 1.0 / used if used > 0.0 else np.nan
+            used = largest(whole / strength[own])
+            out["safety_factor"][where] = 1.0 / used if used else np.nan
     return xr.Dataset({name: ((*outer, "body"), values) for name, values in out.items()})
-
-
-def _largest(values: Array) -> float:
-    finite = np.abs(values[np.isfinite(values)])
-    return float(finite.max()) if finite.size else np.nan

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Any
 
 import xarray as xr
@@ -14,6 +13,7 @@ from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.metrics import METRICS
+from paraflex.results.numbers import finite_or_none
 from paraflex.results.traces import data_traces
 from paraflex.results.validity import validity_summary
 
@@ -82,8 +82,3 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }
-
-
-def finite_or_none(value: float) -> float | None:
-    """A number for JSON: None if it is not finite."""
-    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,19 @@
+"""Plain numbers of arrays, for JSON, tables and sentences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def finite_or_none(value: float) -> float | None:
+    """A number for JSON: None if it is not finite."""
+    return float(value) if math.isfinite(value) else None
+
+
+def largest(values: NDArray[np.float64]) -> float | None:
+    """Largest finite magnitude; None if there is none."""
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.max()) if known.size else None
