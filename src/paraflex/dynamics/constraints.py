@@ -104,14 +104,14 @@ def _coordinate(joint: Joint, weight: float = 1.0) -> Term:
     return Term(joint.name, ANGLE, joint.a, joint.b, weight)
 
 
-def _what(joint: Joint) -> str:
+def coordinate_kind(joint: Joint) -> str:
     """Kind of a joint's coordinate."""
     return "travel" if joint.slides else "angle"
 
 
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    return Constraint(name, (_coordinate(joint),), (f"{name} {_what(joint)}",), **keywords)
+    return Constraint(name, (_coordinate(joint),), (f"{name} {coordinate_kind(joint)}",), **keywords)
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
@@ -132,7 +132,7 @@ def _relation_constraint(mechanism: Mechanism, one: Relation) -> Constraint:
     first, second = (mechanism.joint(name) for name in one.joints)
     assert one.phase is not None
     terms = (_coordinate(second), _coordinate(first, -one.transmission))
-    return Constraint(one.name, terms, (f"{one.name} {_what(second)}",), rest=one.phase)
+    return Constraint(one.name, terms, (f"{one.name} {coordinate_kind(second)}",), rest=one.phase)
 
 
 def constraint_count(mechanism: Mechanism) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy
@@ -95,7 +95,7 @@ def natural_frequencies(
         How many of the lowest; all by default, or ten where there are more than 600 coordinates.
     """
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
-    lam, acceleration = _forces_at_rest(system, state, M, _with_joints(system, J, state.q, [*held, *torque_at]))
+    lam, _, acceleration = forces_at_rest(system, state, [*held, *torque_at], (M, J))
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
     C, typical = _with_joints(system, J, state.q, held), _typical_square(elastic, other, M)
     K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
@@ -116,14 +116,39 @@ def _with_joints(system: System, jacobian: Sparse, q: Array, joints: Sequence[st
     return scipy.sparse.csr_matrix(scipy.sparse.vstack([jacobian, *rows]))
 
 
-def _forces_at_rest(system: System, state: State, M: Sparse, C: Sparse) -> tuple[Array, float]:
-    """Multipliers (m,) of joints and springs at rest with motors holding; the remaining acceleration."""
+class RestForces(NamedTuple):
+    """Forces that hold a mechanism at a pose.
+
+    Attributes
+    ----------
+    multipliers : (m,) array
+        Of joints and springs.
+    efforts : (joints,) array
+        Torques and forces of motors at joints.
+    acceleration : float
+        See `Vibration`.
+    """
+
+    multipliers: Array
+    efforts: Array
+    acceleration: float
+
+
+def forces_at_rest(
+    system: System, state: State, joints: Sequence[str], matrices: tuple[Sparse, Sparse] | None = None
+) -> RestForces:
+    """Constraint forces at a pose at rest, motors at some joints holding it.
+
+    `matrices` are the mass and the constraint Jacobian there, if they are known.
+    """
+    M, J = matrices or (sparse_mass(system, state.q), sparse_jacobian(system, state.q))
     forces, lam = RestingForces(system, state.time), np.zeros(system.m)
     springs = forces.springs
     lam[springs] = forces(state.q, lam)[1] / system.packed.rows["compliance"][springs]
     f = forces(state.q, lam)[0] + stiffness_diagonal(system) * state.q
-    a, mu = Saddle(M, C).solve(-f)
-    return lam + mu[: system.m], float(np.sqrt(max(a @ (M @ a), 0.0) / system.total_mass))
+    a, mu = Saddle(M, _with_joints(system, J, state.q, joints)).solve(-f)
+    acceleration = float(np.sqrt(max(a @ (M @ a), 0.0) / system.total_mass))
+    return RestForces(lam + mu[: system.m], -mu[system.m :], acceleration)
 
 
 def _typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
@@ -147,11 +172,23 @@ def _all(K: Sparse, M: Sparse, C: Sparse, elastic: Array, typical: float) -> tup
     basis = scale[:, None] * scipy.linalg.null_space(rows, rcond=_DEPENDENT)
     if basis.shape[1] == 0:
         return np.zeros(0), np.zeros((scale.size, 0))
-    mass, stiffness = basis.T @ (M @ basis), basis.T @ (K @ basis)
+    squares, shapes = undamped_modes(basis.T @ (M @ basis), basis.T @ (K @ basis), typical)
+    return squares, basis @ shapes
+
+
+def undamped_modes(mass: Array, stiffness: Array, typical: float) -> tuple[Array, Array]:
+    """Squares of natural frequencies (f,), ascending, and shapes (f, f) of unit mass, of symmetric matrices.
+
+    1 / (square + shift) is sought: low frequencies keep all their digits beside high ones. Those of less than a part
+    of the typical square are zero.
+    """
+    if not mass.size:
+        return np.zeros(0), np.zeros((0, 0))
     shift = _shift(mass, stiffness, typical)
     inverse, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass)
     inverse, vectors = inverse[::-1], vectors[:, ::-1]
-    return 1.0 / inverse - shift, basis @ (vectors / np.sqrt(inverse))
+    squares = 1.0 / inverse - shift
+    return np.where(np.abs(squares) < _FREE * typical, 0.0, squares), vectors / np.sqrt(inverse)
 
 
 def _shift(mass: Array, stiffness: Array, typical: float) -> float:

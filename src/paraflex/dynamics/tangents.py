@@ -1,0 +1,204 @@
+"""Tangent matrices of the equations of motion at a point of a motion, as sparse matrices, by exact derivatives.
+
+About (q, v, a, lambda) with given torques the equations change by
+
+    M da + D dv + K dq + Phi_q^T dlambda = S dtau,    Phi_q da + Phi''_v dv + Phi''_q dq = 0
+
+K has all that depends on the pose: stiffness of links, springs, weight, loads, inertia forces (their accelerations
+kept), constraint forces (multipliers kept) and motors along axes. Springs, dampers and friction at joints, whose
+torques are multipliers in the equations, are part of K and D; no term of Baumgarte's is in them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from paraflex.arrays import Array
+from paraflex.dynamics.sparse import greedy_colours, neighbours, tied_bodies
+from paraflex.dynamics.system import System
+from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING
+from paraflex.kernel.tangent import make_tangent, note_slopes
+from paraflex.kernel.tangent_columns import ACCELERATION, COORDINATE, VELOCITY, tangent_columns
+
+Numbers = NDArray[np.int64]
+# Weights of Phi'', Phi' and Phi of rows that are Phi'.
+_RATES = (0.0, 1.0, 0.0)
+
+
+class MotionPoint(NamedTuple):
+    """A point of a motion: what the equations are linearised about.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    q, v, a : (n,) arrays
+    multipliers : (m,) array
+    torques : (acting,) array
+        Of motors, then loads in time: see `dynamics.inputs`.
+    """
+
+    time: float
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    torques: Array
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves."""
+        return not (np.any(self.v) or np.any(self.a))
+
+
+class Tangents(NamedTuple):
+    """Tangent matrices at a point of a motion.
+
+    Attributes
+    ----------
+    mass, damping, stiffness : (n, n) sparse arrays
+        M, D and K, springs, dampers and friction at joints included.
+    rows : (c,) array of int
+        Which rows of the system are constraints.
+    jacobian : (c, n) sparse array
+        Phi_q of these.
+    rate : (c, n) sparse array
+        Derivative of Phi' by the coordinates; by the velocities it is Phi_q.
+    second_place, second_rate : (c, n) sparse arrays
+        Derivatives of Phi'' by the coordinates and by the velocities.
+    compliant : (m - c,) array of int
+        The rows of springs, dampers and friction at joints.
+    compliant_place, compliant_rate : (m - c, n) sparse arrays
+        Derivatives of their multipliers by the coordinates and the velocities.
+    """
+
+    mass: csr_matrix
+    damping: csr_matrix
+    stiffness: csr_matrix
+    rows: Numbers
+    jacobian: csr_matrix
+    rate: csr_matrix
+    second_place: csr_matrix
+    second_rate: csr_matrix
+    compliant: Numbers
+    compliant_place: csr_matrix
+    compliant_rate: csr_matrix
+
+
+class _Places(NamedTuple):
+    """Where entries of a sparse matrix come from: its rows and columns, and the computed column of each."""
+
+    row: Numbers
+    column: Numbers
+    source: Numbers
+
+    def matrix(self, values: Array, rows: int, columns: int) -> csr_matrix:
+        """The matrix (rows, columns) of computed columns (sources, rows)."""
+        entries = values[self.source, self.row]
+        return csr_matrix((entries, (self.row, self.column)), shape=(rows, columns))
+
+
+@dataclass(frozen=True)
+class Tangency:
+    """The pattern of a system's tangent matrices, and the matrices at points of its motions.
+
+    Bodies that share neither row nor spring with a common body are moved at once, so that the cost grows with the
+    number of bodies, not with its square.
+    """
+
+    system: System
+
+    @cached_property
+    def _tied(self) -> list[set[int]]:
+        """Each body and all on which it acts."""
+        springs = self.system.mechanism.linear_springs
+        index = self.system.index
+        stretched = [[index[ref.body] for ref in (one.a, one.b) if not ref.on_ground] for one in springs]
+        return neighbours(self.system, stretched)
+
+    @cached_property
+    def _colours(self) -> Numbers:
+        tied = self._tied
+        return greedy_colours([set().union(*(tied[other] for other in others)) for others in tied])
+
+    @cached_property
+    def _sources(self) -> tuple[int, list[Numbers]]:
+        """Number of computed columns, and for each body those of its coordinates."""
+        size = np.array([3 + body.nf for body in self.system.bodies])
+        first, starts = 0, []
+        for colour in range(int(self._colours.max()) + 1):
+            starts.append(first)
+            first += int(size[self._colours == colour].max())
+        return first, [starts[colour] + np.arange(n) for colour, n in zip(self._colours, size, strict=True)]
+
+    @cached_property
+    def _force_places(self) -> _Places:
+        bodies = self.system.bodies
+        own = [np.arange(body.all.start, body.all.stop) for body in bodies]
+        met = [np.concatenate([own[other] for other in sorted(others)]) for others in self._tied]
+        return self._places(met)
+
+    @cached_property
+    def _row_places(self) -> _Places:
+        touched: list[list[int]] = [[] for _ in self.system.bodies]
+        for row, body in zip(*(part.tolist() for part in tied_bodies(self.system)), strict=True):
+            touched[body].append(row)
+        return self._places([np.array(rows, dtype=int) for rows in touched])
+
+    def _places(self, met: list[Numbers]) -> _Places:
+        """Places of entries, where the coordinates of each body meet given rows."""
+        parts = []
+        for body, source, rows in zip(self.system.bodies, self._sources[1], met, strict=True):
+            columns = np.arange(body.all.start, body.all.stop)
+            parts.append((np.tile(rows, columns.size), np.repeat(columns, rows.size), np.repeat(source, rows.size)))
+        return _Places(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+    def at(self, point: MotionPoint) -> Tangents:
+        """The tangent matrices at a point of a motion."""
+        mass, jacobian = self._columns(point, INDEX_1, ACCELERATION)
+        damping, second_rate = self._columns(point, INDEX_1, VELOCITY)
+        stiffness, second_place = self._columns(point, INDEX_1, COORDINATE)
+        rate = self._columns(point, _RATES, COORDINATE)[1] if np.any(point.v) else 0.0 * second_place
+        kinds = self.system.packed.rows["kind"]
+        rows, compliant = np.nonzero(kinds == CONSTRAINT)[0], np.nonzero(kinds != CONSTRAINT)[0]
+        strength = scipy.sparse.diags(self._strengths(point)[compliant])
+        place, speed = strength @ second_place[compliant], strength @ second_rate[compliant]
+        # The directions in which their torques act: as angles and travels change.
+        springs = scipy.sparse.diags((kinds[compliant] == SPRING).astype(float))
+        turns = springs @ second_place[compliant]
+        turns = turns + (scipy.sparse.identity(compliant.size) - springs) @ second_rate[compliant]
+        return Tangents(
+            mass, csr_matrix(damping + turns.T @ speed), csr_matrix(stiffness + turns.T @ place), rows,
+            jacobian[rows], rate[rows], second_place[rows], second_rate[rows], compliant, place, speed,
+        )  # fmt: skip
+
+    def _columns(
+        self, point: MotionPoint, weights: tuple[float, float, float], part: int
+    ) -> tuple[csr_matrix, csr_matrix]:
+        """Derivatives of forces (n, n) and rows (m, n) by a part of the motion; friction as rates."""
+        system, direction = self.system, make_tangent(self.system.packed)
+        direction.friction[:] = 1.0
+        columns = self._sources[0]
+        forces, rows = np.zeros((columns, system.n)), np.zeros((columns, system.m))
+        compliance = np.array(system.packed.rows["compliance"], dtype=float)
+        tangent_columns(
+            system.packed, weights, part, self._colours, point.q, point.v, point.a, point.multipliers, point.torques,
+            compliance, direction, forces, rows,
+        )  # fmt: skip
+        n = system.n
+        return self._force_places.matrix(forces, n, n), self._row_places.matrix(rows, system.m, n)
+
+    def _strengths(self, point: MotionPoint) -> Array:
+        """Change of each multiplier (m,) of a spring, damper or friction with its angle or rate."""
+        rows, direction = self.system.packed.rows, make_tangent(self.system.packed)
+        ones, scratch = np.ones(self.system.m), np.zeros(self.system.m)
+        note_slopes(self.system.packed, point.q, point.v, scratch, ones, direction)
+        with np.errstate(divide="ignore"):
+            return np.where(rows["kind"] == FRICTION, direction.friction, 1.0 / rows["compliance"])

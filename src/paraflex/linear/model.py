@@ -1,0 +1,334 @@
+"""Linear models of mechanisms: poles, zeros, frequency responses, and the same for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.dynamics.linearise import undamped_modes
+from paraflex.dynamics.sensors import SensorRows
+from paraflex.errors import InputError
+from paraflex.linear.coordinates import Quantity
+from paraflex.linear.minimal import Minimal
+from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
+
+if TYPE_CHECKING:
+    import control
+    import xarray as xr
+
+Complex = NDArray[np.complex128]
+# Stiffness is symmetric at rest but for this part of it.
+_SYMMETRIC = 1e-7
+# Damping of a modal coordinate below this part of the largest is rounding.
+_ROUNDING = 1e-13
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """Small changes of a mechanism's motion: x' = A x + B u, y = C x + D u.
+
+    States are minimal coordinates and then their rates: angles and travels of the joints with motors, elastic
+    coordinates of bodies (of unit modal mass in their body), coordinates that are driven. No pole belongs to a
+    constraint. All are changes from the point of the motion the model is about.
+
+    Attributes
+    ----------
+    mechanism, mode : str
+    about : str
+        What the model is about: "a pose at rest", "static equilibrium", "a planned motion", "a run".
+    states, inputs, outputs : tuple of Quantity
+        Names and units.
+    minimal : Minimal
+        The equations that it was made from.
+    rows : SensorRows
+        How the outputs depend on the motion.
+    wanted : (inputs, outputs) tuple of arrays of int
+        Which inputs of `minimal` and which of `rows` these are.
+    """
+
+    mechanism: str
+    mode: str
+    about: str
+    states: tuple[Quantity, ...]
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    minimal: Minimal
+    rows: SensorRows
+    wanted: tuple[NDArray[np.int64], NDArray[np.int64]]
+
+    @property
+    def time(self) -> float:
+        """Time of the point of the motion [s]."""
+        return self.minimal.point.time
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it is about a pose at rest."""
+        return self.minimal.point.at_rest
+
+    @cached_property
+    def A(self) -> Array:  # noqa: N802
+        """State matrix (2f, 2f)."""
+        second, f = self.minimal.changes.second, len(self.states) // 2
+        return np.vstack([np.eye(f, 2 * f, f), second[:, : 2 * f]])
+
+    @cached_property
+    def B(self) -> Array:  # noqa: N802
+        """Input matrix (2f, inputs)."""
+        second = self.minimal.changes.second[:, len(self.states) :][:, self.wanted[0]]
+        return np.vstack([np.zeros_like(second), second])
+
+    @cached_property
+    def C(self) -> Array:  # noqa: N802
+        """Output matrix (outputs, 2f)."""
+        return self._outputs[0]
+
+    @cached_property
+    def D(self) -> Array:  # noqa: N802
+        """Feed-through (outputs, inputs): of accelerations, strains and forces."""
+        return self._outputs[1]
+
+    @cached_property
+    def _outputs(self) -> tuple[Array, Array]:
+        changes, n = self.minimal.changes, len(self.states)
+        rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+        whole = rows.a @ changes.a + rows.multipliers @ changes.multipliers
+        motors = self.minimal.motors
+        whole[:, n : n + motors.size] += rows.torques.toarray()[:, motors]
+        return whole[:, :n] + rows.q @ changes.q + rows.v @ changes.v, whole[:, n:][:, self.wanted[0]]
+
+    # --- Properties ---------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _reduced(self) -> tuple[Array, Array, Array]:
+        """Mass, damping and stiffness (f, f) in the minimal coordinates; of a motion without terms of its rates."""
+        Z, whole = self.minimal.directions, self.minimal.tangents.whole
+        return Z.T @ (whole.mass @ Z), Z.T @ (whole.damping @ Z), Z.T @ (whole.stiffness @ Z)
+
+    @cached_property
+    def _typical(self) -> float:
+        """Square of a low frequency [rad^2/s^2], by which frequencies are measured."""
+        omega = np.concatenate([body.modes.omega for body in self.minimal.system.bodies] or [np.zeros(0)])
+        if np.any(omega > 0.0):
+            return float(np.min(omega[omega > 0.0]) ** 2)
+        mass, _, stiffness = self._reduced
+        largest = float(np.max(np.abs(np.diag(stiffness)) / np.diag(mass), initial=0.0))
+        return largest if largest > 0.0 else 1.0
+
+    @cached_property
+    def _modes(self) -> tuple[Array, Array]:
+        """Squares of the undamped frequencies (f,), ascending, and shapes (f, f) of unit mass, in the coordinates y."""
+        mass, _, stiffness = self._reduced
+        return undamped_modes(mass, 0.5 * (stiffness + stiffness.T), self._typical)
+
+    @cached_property
+    def _is_vibrating(self) -> bool:
+        """Whether it is a mechanism at rest whose stiffness derives from a potential."""
+        stiffness = self._reduced[2]
+        size = np.linalg.norm(stiffness)
+        return self.at_rest and bool(np.linalg.norm(stiffness - stiffness.T) <= _SYMMETRIC * size)
+
+    @cached_property
+    def _modal_damping(self) -> Array:
+        """Damping (f, f) of the undamped modes."""
+        shapes = self._modes[1]
+        damping = shapes.T @ self._reduced[1] @ shapes
+        return np.where(np.abs(damping) > _ROUNDING * np.max(np.abs(damping), initial=0.0), damping, 0.0)
+
+    @cached_property
+    def _scaled(self) -> StateSpace:
+        """The model in modes of its mass and stiffness, whose displacements are multiplied by their frequencies."""
+        squares, shapes = self._modes
+        inverse, f = shapes.T @ self._reduced[0], shapes.shape[0]
+        omega = np.sqrt(np.maximum(squares, 0.0) + self._typical)
+        if self._is_vibrating:
+            A = np.block([[np.zeros((f, f)), np.diag(omega)], [-np.diag(squares / omega), -self._modal_damping]])
+        else:
+            place, rate = inverse @ self.A[f:, :f] @ shapes / omega, inverse @ self.A[f:, f:] @ shapes
+            A = np.block([[np.zeros((f, f)), np.diag(omega)], [place, rate]])
+        C = np.hstack([self.C[:, :f] @ shapes / omega, self.C[:, f:] @ shapes])
+        return StateSpace(A, np.vstack([self.B[:f], inverse @ self.B[f:]]), C, self.D)
+
+    @cached_property
+    def frequencies(self) -> Array:
+        """Undamped natural frequencies (f,), inputs zero [rad/s]; zero for motions that are free or grow."""
+        return np.sqrt(np.maximum(self._modes[0], 0.0))
+
+    @cached_property
+    def shapes(self) -> Array:
+        """Changes of all coordinates of the system (n, f) in the undamped modes, of unit modal mass."""
+        return self.minimal.directions @ self._modes[1]
+
+    @checked_arguments()
+    def held_frequencies(self, motors: Sequence[str] | None = None) -> Array:
+        """Undamped natural frequencies with motors held [rad/s].
+
+        Parameters
+        ----------
+        motors : sequence of str, optional
+            By default all that are inputs.
+
+        Raises
+        ------
+        InputError
+            A motor that the mechanism does not have, or whose joint is no state, as it follows from others.
+        """
+        held = [self._joint_state(name) for name in self._motors(motors)]
+        free = np.setdiff1d(np.arange(len(self.states) // 2), held)
+        mass, _, stiffness = (part[np.ix_(free, free)] for part in self._reduced)
+        squares = undamped_modes(mass, 0.5 * (stiffness + stiffness.T), self._typical)[0]
+        return np.sqrt(np.maximum(squares, 0.0))
+
+    def _motors(self, motors: Sequence[str] | None) -> list[str]:
+        mechanism = self.minimal.system.mechanism
+        if motors is None:
+            return [motor.name for motor in mechanism.motors if motor.name in {one.name for one in self.inputs}]
+        return list(motors)
+
+    def _joint_state(self, motor: str) -> int:
+        joints = {one.name: one.joint for one in self.minimal.system.mechanism.motors}
+        if motor not in joints:
+            raise InputError("is no motor", field="motors", value=motor, remedy="choose from " + ", ".join(joints))
+        names = [one.name for one in self.states]
+        if joints[motor] not in names:
+            raise InputError(
+                "moves only as other motors do", field="motors", value=motor, remedy="leave it out: it is held with them"
+            )
+        return names.index(joints[motor])
+
+    def poles(self) -> Complex:
+        """Poles (2f,), by magnitude [rad/s]."""
+        squares = self._modes[0]
+        if self._is_vibrating and not np.any(self._modal_damping):
+            root = np.sqrt(-squares.astype(complex))
+            return _by_size(np.concatenate([root, -root]))
+        return _by_size(np.asarray(scipy.linalg.eigvals(self._scaled.A), dtype=complex))
+
+    def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
+        """Transmission zeros between some inputs and some outputs, by default all, by magnitude [rad/s].
+
+        Of any number of each: more inputs than outputs, or fewer, mostly have none. At rest, and of outputs that are
+        places, angles, strains or derivatives of places, they are found from the second-order equations, else from
+        the state space, and up to a tenth of the fastest pole.
+        """
+        chosen = self.select(inputs, outputs)
+        shift = 0.7 * float(np.sqrt(self._typical))
+        displacements = chosen._displacements if self._is_vibrating else None
+        if displacements is None:
+            return zeros(chosen._scaled, shift)
+        squares, shapes = chosen._modes
+        return vibrating_zeros(Vibrating(squares, chosen._modal_damping, shapes.T @ chosen._force_rows, displacements @ shapes), shift)
+
+    @property
+    def _force_rows(self) -> Array:
+        """Forces of the inputs in the directions of the coordinates y (f, inputs)."""
+        return self._reduced[0] @ self.B[len(self.states) // 2 :]
+
+    @property
+    def _displacements(self) -> Array | None:
+        """What outputs (outputs, f) are of y, or derivatives of that; None where one is more than that."""
+        rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+        parts = [np.asarray((part @ self.minimal.directions)) for part in (rows.q, rows.v, rows.a)]
+        mixed = np.sum([np.any(part, axis=1) for part in parts], axis=0) != 1
+        if np.any(mixed) or rows.multipliers.nnz or rows.torques.nnz or self.minimal.driven:
+            return None
+        return np.sum(parts, axis=0)
+
+    @checked_arguments()
+    def frequency_response(self, frequencies: ArrayLike) -> Complex:
+        """Response C (s - A)^-1 B + D (k, outputs, inputs).
+
+        Parameters
+        ----------
+        frequencies : (k,) array
+            Angular frequencies omega, for s = i omega [rad/s]; complex numbers are taken as s.
+        """
+        given = np.atleast_1d(np.asarray(frequencies))
+        points = given if np.iscomplexobj(given) else 1j * given
+        A, B, C, D = self._scaled
+        upper, basis = scipy.linalg.schur(A, output="complex")
+        inputs, outputs, eye = basis.conj().T @ B, C @ basis, np.eye(len(A))
+        out = np.empty((points.size, *D.shape), dtype=complex)
+        for k, s in enumerate(points):
+            out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
+        return out
+
+    def steady_gain(self) -> Array:
+        """Response (outputs, inputs) to constant inputs, if nothing moves freely."""
+        return np.real(self.frequency_response(np.array([0j]))[0])
+
+    # --- The same in other forms --------------------------------------------------------------------------------------
+
+    @checked_arguments()
+    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
+        """The model with some inputs and outputs, in the order given; all by default."""
+        chosen = [_chosen(named, have, what) for named, have, what in
+                  ((inputs, self.inputs, "input"), (outputs, self.outputs, "output"))]  # fmt: skip
+        return replace(
+            self,
+            inputs=tuple(self.inputs[k] for k in chosen[0]),
+            outputs=tuple(self.outputs[k] for k in chosen[1]),
+            wanted=(self.wanted[0][chosen[0]], self.wanted[1][chosen[1]]),
+        )
+
+    def to_scipy(self) -> scipy.signal.StateSpace:
+        """The model as SciPy's."""
+        return scipy.signal.StateSpace(self.A, self.B, self.C, self.D)
+
+    def to_control(self) -> control.StateSpace:
+        """The model as python-control's; dots and spaces in names become underscores, as it takes none.
+
+        Raises
+        ------
+        InputError
+            python-control is not installed.
+        """
+        try:
+            import control
+        except ImportError:
+            raise InputError(
+                "python-control is not installed", field="to_control",
+                remedy='install it: pip install "paraflex[control]"',
+            ) from None  # fmt: skip
+        names = {key: [plain_name(one.name) for one in getattr(self, key)] for key in ("inputs", "outputs", "states")}
+        return control.ss(self.A, self.B, self.C, self.D, name=plain_name(self.mechanism), **names)
+
+    def to_xarray(self) -> xr.Dataset:
+        """A, B, C and D by names of states, inputs and outputs, with units."""
+        import xarray as xr
+
+        data = {"A": (("state", "state_of"), self.A), "B": (("state", "input"), self.B),
+                "C": (("output", "state_of"), self.C), "D": (("output", "input"), self.D)}  # fmt: skip
+        names = {key: [one.name for one in values] for key, values in
+                 (("state", self.states), ("state_of", self.states), ("input", self.inputs), ("output", self.outputs))}  # fmt: skip
+        units = {f"{key}_unit": (key, [one.unit for one in values]) for key, values in
+                 (("state", self.states), ("input", self.inputs), ("output", self.outputs))}  # fmt: skip
+        attrs: dict[str, Any] = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}
+        return xr.Dataset(data, coords=names | units, attrs=attrs)
+
+
+def plain_name(name: str) -> str:
+    """A name without dots and spaces, for programs that take none."""
+    return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
+
+
+def _by_size(values: Complex) -> Complex:
+    return values[np.argsort(np.abs(values), kind="stable")]
+
+
+def _chosen(names: Sequence[str] | None, have: tuple[Quantity, ...], what: str) -> NDArray[np.int64]:
+    known = [one.name for one in have]
+    if names is None:
+        return np.arange(len(known))
+    for name in names:
+        if name not in known:
+            raise InputError(f"is no {what}", field=f"{what}s", value=name, remedy="choose from " + ", ".join(known))
+    return np.array([known.index(name) for name in names], dtype=int)

@@ -1,0 +1,80 @@
+"""Points of motions that linear models are about: poses at rest, planned motions, runs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.dynamics import State, System, inputs_of, joint_coordinate
+from paraflex.dynamics.linearise import forces_at_rest
+from paraflex.dynamics.signals import acting_loads
+from paraflex.dynamics.sparse import sparse_jacobian
+from paraflex.dynamics.stiffness import RestingForces
+from paraflex.dynamics.tangents import MotionPoint
+from paraflex.kernel.packed import CONSTRAINT
+from paraflex.mechanism import ActuationMode
+from paraflex.motion import MotionRun
+from paraflex.tracking import TrackingRun, TrackingTask
+
+
+def resting_point(system: System, state: State, mode: ActuationMode) -> tuple[MotionPoint, float]:
+    """A pose at rest, held by the motors of a mode and by forces that do not change.
+
+    Returns
+    -------
+    MotionPoint
+    float
+        What the mechanism would start with without the latter [m/s^2]: see `Vibration.acceleration`.
+    """
+    active = [(k, motor.joint) for k, motor in enumerate(system.mechanism.motors) if motor.name in mode.motors]
+    joints = list(dict.fromkeys(joint for _, joint in active))
+    found = forces_at_rest(system, state, joints)
+    efforts = dict(zip(joints, found.efforts, strict=True))
+    torques = _acting(system, state.time, {k: efforts[joint] for k, joint in active})
+    still = np.zeros(system.n)
+    return MotionPoint(state.time, state.q, still, still, found.multipliers, torques), found.acceleration
+
+
+def planned_point(task: TrackingTask, mode: ActuationMode, sample: int) -> MotionPoint:
+    """A planned motion at a sample: links undeformed, with its velocities, accelerations and torques.
+
+    Constraint forces are those of the rigid motion. Links do not deflect along it, so that the equations of their
+    deflections have a residual there, which the linear model leaves out.
+    """
+    system, rigid = task.system, task.motion
+    q, v, a = np.zeros((3, system.n))
+    for body in system.bodies:
+        own = rigid.system.body(body.name).all
+        for whole, part in ((q, rigid.q), (v, rigid.v), (a, rigid.a)):
+            whole[body.offset : body.offset + 3] = part[sample, own]
+    time = float(rigid.t[sample])
+    efforts = task.torques(mode).evaluate(rigid.t[sample : sample + 1])[0]
+    forces = RestingForces(system, time)
+    forces.v, forces.a = v, a
+    lam = forces.compliant(q)
+    left = forces(q, lam)[0]
+    for motor, effort in zip(system.mechanism.motors, efforts, strict=True):
+        left = left - effort * joint_coordinate(system, motor.joint, q[None]).rows[0]
+    moving = np.concatenate([np.arange(body.offset, body.offset + 3) for body in system.bodies])
+    rows = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
+    jacobian = sparse_jacobian(system, q)[rows][:, moving].toarray()
+    lam[rows] = np.linalg.lstsq(jacobian.T, -left[moving], rcond=None)[0]
+    return MotionPoint(time, q, v, a, lam, _acting(system, time, dict(enumerate(efforts))))
+
+
+def run_point(run: TrackingRun | MotionRun, sample: int) -> MotionPoint:
+    """A run at a sample."""
+    system = run.system if isinstance(run, MotionRun) else run.task.system
+    solution, time = run.solution, float(run.solution.t[sample])
+    torques = _acting(system, time, dict(enumerate(run.applied[sample])))
+    return MotionPoint(
+        time, solution.q[sample], solution.v[sample], solution.a[sample], solution.multipliers[sample], torques
+    )
+
+
+def _acting(system: System, time: float, efforts: dict[int, float]) -> Array:
+    """What acts (acting,) at a time: efforts of motors by number, and loads."""
+    acting = acting_loads(system.mechanism, np.array([time]))[0] if inputs_of(system.mechanism).acting else np.zeros(0)
+    for k, effort in efforts.items():
+        acting[k] = effort
+    return acting
