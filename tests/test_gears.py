@@ -14,6 +14,7 @@ from paraflex.cli.inspect import describe
 from paraflex.cli.inspect_tables import print_facts
 from paraflex.dynamics import build_system, consistent_state, natural_frequencies, redundant_rows, static_equilibrium
 from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.joint_loads import joint_loads
 from paraflex.dynamics.soundness import mobility
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines.common import check_engine
@@ -46,7 +47,6 @@ from paraflex.report.film import animation
 from paraflex.report.sweep import side_by_side
 from paraflex.results import motion_dataset
 from paraflex.results.drawing import assembled_data
-from paraflex.results.joint_loads import joint_loads
 from paraflex.results.record import record
 
 ref = PointRef.parse

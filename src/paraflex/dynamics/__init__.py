@@ -28,6 +28,11 @@ from paraflex.dynamics.quasi_static import (
 )
 from paraflex.dynamics.rank import Dependence as Dependence, dependence as dependence, redundant_rows as redundant_rows
 from paraflex.dynamics.reduction import MissedTurn as MissedTurn, missed_turns as missed_turns
+from paraflex.dynamics.sensors import (
+    SensorRows as SensorRows,
+    sensor_readings as sensor_readings,
+    sensor_rows as sensor_rows,
+)
 from paraflex.dynamics.signals import (
     InputSignals as InputSignals,
     acting_loads as acting_loads,

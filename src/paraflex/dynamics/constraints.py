@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -138,6 +138,23 @@ def _relation_constraint(mechanism: Mechanism, one: Relation) -> Constraint:
 def constraint_count(mechanism: Mechanism) -> int:
     """Number of constraint rows of joints, prescribed motions and gears, redundant ones included."""
     return sum(len(one.labels) for one in _constraints(mechanism) if one.row == CONSTRAINT)
+
+
+class RowTerm(NamedTuple):
+    """A term of constraint rows, and the numbers of these rows."""
+
+    rows: list[int]
+    term: Term
+
+
+def terms_by_joint(constraints: Sequence[Constraint]) -> dict[str, list[RowTerm]]:
+    """Terms of constraints, which are in the order of their rows, by the joints that they are of."""
+    found, row = {}, 0
+    for constraint in constraints:
+        rows = list(range(row, row := row + len(constraint.labels)))
+        for term in constraint.terms:
+            found.setdefault(term.joint, []).append(RowTerm(rows, term))
+    return found
 
 
 def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:

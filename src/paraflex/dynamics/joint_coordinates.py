@@ -90,7 +90,7 @@ def marker_place(system: System, marker: Marker, q: Array) -> tuple[Array, Array
     R = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
     u = q[:, body.flexible]
     local = marker.x0 + u @ marker.N.T
-    shape = np.broadcast_to(marker.N, (q.shape[0], *marker.N.shape)).copy()
+    shape = np.broadcast_to(marker.N, (q.shape[0], *marker.N.shape)).astype(rows.dtype)
     if marker.bending is not None:
         bent = u @ marker.bending
         local[:, 0] -= 0.5 * np.sum(u * bent, axis=1)

@@ -76,7 +76,7 @@ def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
     causes += [
         (f"the {group.word} {one.name}", joint)
         for group, members in grouped(mechanism)
-        for one in members
+        for one in (() if group.measures else members)
         for _, name, _ in joints_named(one)
         if not (joint := mechanism.joint(name)).slides
     ]

@@ -34,6 +34,8 @@ _BEAM_PIECES, _ELEMENT_PIECES = 16, 4
 # Coordinates that hold less than this part of what a uniform tension stretches do not give the axial force.
 _STRETCHES = 0.95
 Shape = Callable[[Array, float, int], Array]
+# An element and places in it, as fractions of its length.
+_Places = tuple[int, Array]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
@@ -135,51 +137,84 @@ def sections_of(system: System) -> Sections | None:
     )  # fmt: skip
 
 
+class SectionAt(NamedTuple):
+    """One section of a flexible beam."""
+
+    section: Section
+    material: Material
+    part: _Beam
+
+    def loads(self, system: System, q: Array, v: Array, a: Array) -> SectionLoads:
+        """Section forces (k, 1) for coordinates (k, n) and their derivatives."""
+        return _loads(system, self.part, q, v, a)
+
+
+def section_at(system: System, name: str, x: float) -> SectionAt | None:
+    """The section of a beam at a distance from its first end, at a node that of the next element; None if rigid."""
+    described, body = system.mechanism.body(name), system.body(name)
+    assert isinstance(described, FlexibleBeam | AssumedModesBeam)
+    if not body.nf:
+        return None
+    if isinstance(described, AssumedModesBeam):
+        return SectionAt(described.section, described.material, _assumed(described, body, np.array([x])))
+    nodes = described.mesh.nodes
+    # A place at a node but for rounding is at the node.
+    e = int(np.clip(np.searchsorted(nodes, x + 1e-12 * nodes[-1], side="right") - 1, 0, nodes.size - 2))
+    z = min(max((x - nodes[e]) / (nodes[e + 1] - nodes[e]), 0.0), 1.0)
+    part, _, (section,), (material,) = _meshed(described, body, [(e, np.array([z]))])
+    return SectionAt(section, material, part)
+
+
 def _stations(
     described: FlexibleBeam | AssumedModesBeam, body: BodyCoordinates
 ) -> tuple[_Beam, Array, Sequence[Section], Sequence[Material]]:
     """Rows, places, sections and materials of a beam's stations."""
     if isinstance(described, FlexibleBeam):
-        return _meshed(described, body)
-    D, shapes, bent = body.integrals.D, described.shapes, len(described.transverse)
-    pieces = max(_BEAM_PIECES, _ELEMENT_PIECES * shapes.count)
+        mesh = described.mesh
+        pieces = max(_ELEMENT_PIECES, -(-_BEAM_PIECES // mesh.n_elements))
+        return _meshed(described, body, [(e, np.linspace(0.0, 1.0, pieces + 1)) for e in range(mesh.n_elements)])
+    pieces = max(_BEAM_PIECES, _ELEMENT_PIECES * described.shapes.count)
     x = np.linspace(0.0, 1.0, pieces + 1) * described.length
+    return _assumed(described, body, x), x, [described.section] * x.size, [described.material] * x.size
+
+
+def _assumed(described: AssumedModesBeam, body: BodyCoordinates, x: Array) -> _Beam:
+    """Rows of the sections of a bar of assumed modes at places x (s,)."""
+    D, shapes, bent = body.integrals.D, described.shapes, len(described.transverse)
     E = described.material.youngs_modulus
     moment = E * described.section.second_moment * shapes.transverse_rows(x, derivative=2) @ D[:bent]
     strain = shapes.axial_rows(x, derivative=1) @ D[bent:]
     ends = shapes.axial_rows(np.array([0.0, 1.0]) * described.length) @ D[bent:]
     stiffness = E * described.section.area
     force = stiffness * strain if _stretches(body, ends[1] - ends[0], described.length / stiffness) else None
-    return _Beam(body.name, moment, force), x, [described.section] * x.size, [described.material] * x.size
+    return _Beam(body.name, moment, force)
 
 
-def _meshed(beam: FlexibleBeam, body: BodyCoordinates) -> tuple[_Beam, Array, Sequence[Section], Sequence[Material]]:
-    """See `_stations`."""
+def _meshed(
+    beam: FlexibleBeam, body: BodyCoordinates, at: Sequence[_Places]
+) -> tuple[_Beam, Array, Sequence[Section], Sequence[Material]]:
+    """See `_stations`; of the sections at places in some elements."""
     mesh, D = beam.mesh, body.integrals.D
     section, material, spans = beam.section, beam.material, beam.spans
     sections = section if isinstance(section, tuple) else (section,) * mesh.n_spans
     materials = material if isinstance(material, tuple) else (material,) * mesh.n_spans
-    pieces = max(_ELEMENT_PIECES, -(-_BEAM_PIECES // mesh.n_elements))
-    z = np.linspace(0.0, 1.0, pieces + 1)
-    owners = np.repeat(mesh.spans, z.size)
+    owners = np.concatenate([np.full(z.size, mesh.spans[e]) for e, z in at])
     own, made = [sections[span] for span in owners], [materials[span] for span in owners]
     lengths = np.diff(mesh.nodes)
     first, last = (mesh.shape_at_node(node)[0][0] @ D for node in (0, mesh.n_elements))
     bend, stretch = (np.array([getattr(spans[span], name) for span in mesh.spans])
                      for name in ("bending_stiffness", "axial_stiffness"))  # fmt: skip
-    x = np.concatenate([mesh.nodes[e] + z * length for e, length in enumerate(lengths)])
+    x = np.concatenate([mesh.nodes[e] + z * lengths[e] for e, z in at])
 
     def rows(shape: Shape, derivative: int, stiffness: Array) -> Array:
-        each = [
-            stiffness[e] * mesh.scatter(e, shape(z * length, length, derivative)) for e, length in enumerate(lengths)
-        ]
+        each = [stiffness[e] * mesh.scatter(e, shape(z * lengths[e], lengths[e], derivative)) for e, z in at]
         return np.concatenate(each) @ D
 
     moment = rows(transverse_shape, 2, bend)
     if not _stretches(body, last - first, np.sum(lengths / stretch)):
         return _Beam(body.name, moment, None), x, own, made
     mass = np.array([spans[span].mass_per_length for span in owners])
-    return _Beam(body.name, moment, rows(axial_shape, 1, stretch), _change(beam, D, z, mass)), x, own, made
+    return _Beam(body.name, moment, rows(axial_shape, 1, stretch), _change(beam, D, at, mass)), x, own, made
 
 
 def _stretches(body: BodyCoordinates, lengthened: Array, flexibility: float) -> bool:
@@ -188,11 +223,12 @@ def _stretches(body: BodyCoordinates, lengthened: Array, flexibility: float) -> 
     return bool(part >= _STRETCHES * np.real(flexibility))
 
 
-def _change(beam: FlexibleBeam, D: Array, z: Array, mass: Array) -> _Change:
+def _change(beam: FlexibleBeam, D: Array, at: Sequence[_Places], mass: Array) -> _Change:
     """Integrals from each element's first node to its stations, less their means over it."""
     mesh = beam.mesh
     along, across, place, one = [], [], [], []
-    for e, length in enumerate(np.diff(mesh.nodes)):
+    for e, z in at:
+        length = mesh.nodes[e + 1] - mesh.nodes[e]
         # To the stations, then the mean over the element, 1/l int (l - x) dx.
         x = np.outer(z, 0.5 * (_POINTS + 1.0)) * length
         weights = np.outer(z, 0.5 * _WEIGHTS) * length

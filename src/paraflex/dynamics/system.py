@@ -9,7 +9,7 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
-from paraflex.dynamics.constraints import row_order
+from paraflex.dynamics.constraints import RowTerm, row_order, terms_by_joint
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
 from paraflex.dynamics.damping import damping_matrix
 from paraflex.dynamics.packing import pack_system
@@ -90,6 +90,11 @@ class System:
     def index(self) -> dict[str, int]:
         """Index of each body by name."""
         return {body.name: i for i, body in enumerate(self.bodies)}
+
+    @cached_property
+    def row_terms(self) -> dict[str, list[RowTerm]]:
+        """Terms of constraint rows by the joints that they are of."""
+        return terms_by_joint(row_order(self.mechanism, self.index))
 
     def body(self, name: str) -> BodyCoordinates:
         """Coordinates of a body by name."""

@@ -103,7 +103,7 @@ def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
         if not (with_units or quantities_in(text)):
             continue
         found = field_at(schema, data, place)
-        if takes_number(found.annotation):
+        if takes_number(found.annotation) and text not in _words_of(found.annotation):
             units = units_at(schema, data, place)
             check_unit(text, parameters, units, ".".join(map(str, place)), found.description)
 
@@ -158,6 +158,15 @@ def _texts(data: Any, place: Place) -> Iterator[tuple[Place, str]]:
     elif isinstance(data, (dict, list)):
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
             yield from _texts(value, (*place, key))
+
+
+def _words_of(annotation: Any) -> Iterator[Any]:
+    """Words that may stand where a number may."""
+    arguments = typing.get_args(annotation)
+    if typing.get_origin(annotation) is typing.Literal:
+        yield from arguments
+    for each in arguments:
+        yield from _words_of(each)
 
 
 def takes_number(annotation: Any) -> bool:

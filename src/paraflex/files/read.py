@@ -277,5 +277,5 @@ def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
 def _is_variant(part: Any) -> bool:
     """Whether a part of an error's location names a variant of a union and not a field of the file."""
     return isinstance(part, str) and (
-        part.endswith("Table") or "[" in part or part in ("int", "constrained-int", "str", "constrained-str")
+        part.endswith("Table") or "[" in part or part.removeprefix("constrained-") in ("int", "float", "str")
     )

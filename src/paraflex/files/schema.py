@@ -13,7 +13,7 @@ from functools import reduce
 from math import inf
 from operator import or_
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import (
     BaseModel,
@@ -28,7 +28,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from paraflex.files.expressions import ExpressionError, check_in_time, evaluate
+from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
 from paraflex.mechanism.loads import InTime
@@ -160,7 +160,32 @@ _WRITTEN: dict[Any, Any] = {
 }  # fmt: skip
 
 
+def _number_or_word(words: Sequence[str]) -> Any:
+    """A number or an expression, or one of some words; without words any name that is no parameter's."""
+
+    def read(value: Any, info: ValidationInfo) -> Any:
+        if not isinstance(value, str) or value in words:
+            return value
+        if value.isidentifier() and value not in {*_parameters(info), *CONSTANTS}:
+            if not words:
+                return value
+            raise _refused("neither such a word nor a number", 'an angle may have a unit, "30 deg"')
+        try:
+            return evaluate(value, _parameters(info))
+        except ExpressionError as error:
+            raise _refused(error.problem, error.remedy) from None
+
+    numbers: Any = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+    return Annotated[numbers | (Literal[tuple(words)] if words else Text),
+                     BeforeValidator(read, json_schema_input_type=float | str)]  # fmt: skip
+
+
 def _written(hint: Any) -> Any:
+    if get_origin(hint) is Literal:
+        return hint
+    if get_origin(hint) in (Union, UnionType) and float in (kinds := get_args(hint)) and NoneType not in kinds:
+        words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
+        return _number_or_word(words)
     if isinstance(hint, type) and issubclass(hint, Enum):
         return Literal[tuple(member.value for member in hint)]
     if get_origin(hint) is tuple and get_args(hint)[1:] == (...,):

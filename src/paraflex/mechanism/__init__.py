@@ -87,6 +87,19 @@ from paraflex.mechanism.segments import (
     is_hinge as is_hinge,
     proportional_segments as proportional_segments,
 )
+from paraflex.mechanism.sensors import (
+    SENSOR_KINDS as SENSOR_KINDS,
+    AccelerationSensor as AccelerationSensor,
+    DeflectionSensor as DeflectionSensor,
+    Encoder as Encoder,
+    JointForceSensor as JointForceSensor,
+    PointSensor as PointSensor,
+    PositionSensor as PositionSensor,
+    Sensor as Sensor,
+    StrainGauge as StrainGauge,
+    Tachometer as Tachometer,
+    VelocitySensor as VelocitySensor,
+)
 from paraflex.mechanism.start import (
     BodyValues as BodyValues,
     Deflection as Deflection,

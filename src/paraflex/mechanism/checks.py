@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
+from typing import Any
 
 from paraflex.errors import InputError, suggestion
-from paraflex.mechanism.bodies import FlexibleBeam
+from paraflex.mechanism.bodies import AssumedModesBeam, FlexibleBeam
 from paraflex.mechanism.body_checks import check_body
-from paraflex.mechanism.groups import grouped
-from paraflex.mechanism.joints import GROUND, PointRef, points_named
+from paraflex.mechanism.groups import Group, grouped, groups_of
+from paraflex.mechanism.joints import GROUND, Joint, PointRef, points_named
 from paraflex.mechanism.members import Members
 from paraflex.mechanism.poses import approximate_poses
 from paraflex.mechanism.quantities import check_numbers, finite, joints_named, known
+from paraflex.mechanism.sensors import JointForceSensor, PointSensor, Sensor, StrainGauge
 
 
 def check_mechanism(mechanism: Members) -> None:
@@ -33,6 +36,7 @@ def check_mechanism(mechanism: Members) -> None:
     check_connected(mechanism)
     check_task(mechanism)
     check_loads(mechanism)
+    check_sensors(mechanism)
 
 
 def check_names(mechanism: Members) -> None:
@@ -78,13 +82,17 @@ def check_members_at_joints(mechanism: Members) -> None:
     joints = {joint.name: joint for joint in mechanism.joints}
     for group, members in grouped(mechanism):
         for member in members:
-            for name, joint, does in joints_named(member):
-                known(joint, joints, field := f"{group.table}.{member.name}.{name}", "joint")
-                joints[joint].check_moves(field, does)
+            _check_joints_of(member, group, joints)
     motors = [motor.name for motor in mechanism.motors]
     for mode in mechanism.modes:
         for name in mode.motors:
             known(name, motors, f"mode.{mode.name}", "motor")
+
+
+def _check_joints_of(member: Any, group: Group, joints: Mapping[str, Joint]) -> None:
+    for name, joint, does in joints_named(member):
+        known(joint, joints, field := f"{group.table}.{member.name}.{name}", "joint")
+        joints[joint].check_moves(field, does)
 
 
 def check_relations(mechanism: Members) -> None:
@@ -141,15 +149,82 @@ def check_loads(mechanism: Members) -> None:
     finite(mechanism.gravity, "gravity")
     for group, members in grouped(mechanism):
         for member in members if group.kinds else ():
-            field, points = f"{group.table}.{member.name}", points_named(member)
-            if "a" in points:
-                remedy = "one end must be on another body or on the ground"
-                _two_bodies(mechanism, member.a, member.b, f"{field}.points", f"a {group.word}", remedy)
-            for name, point in points.items():
-                if name not in ("a", "b"):
-                    _known_point(mechanism, point, f"{field}.{name}")
-                    _on_body(point, f"{field}.{name}", "the ground does not move")
-            check_numbers(member, field)
+            _check_points_of(mechanism, group, member)
+
+
+def _check_points_of(mechanism: Members, group: Group, member: Any) -> None:
+    """Check the points and the numbers of a member."""
+    field, points = f"{group.table}.{member.name}", points_named(member)
+    if "a" in points:
+        remedy = "one end must be on another body or on the ground"
+        _two_bodies(mechanism, member.a, member.b, f"{field}.points", f"a {group.word}", remedy)
+    for name, point in points.items():
+        if name not in ("a", "b"):
+            _known_point(mechanism, point, f"{field}.{name}")
+            _on_body(point, f"{field}.{name}", "the ground does not move")
+    check_numbers(member, field)
+
+
+def check_sensor(mechanism: Members, sensor: Sensor) -> None:
+    """Check a sensor of any mechanism that its joints, points, body and place exist and can be measured at.
+
+    Raises
+    ------
+    InputError
+        One that does not exist, or not of the right kind.
+    """
+    group = groups_of(type(mechanism))["sensors"]
+    _check_joints_of(sensor, group, {joint.name: joint for joint in mechanism.joints})
+    _check_points_of(mechanism, group, sensor)
+    _check_measured(mechanism, sensor)
+
+
+def check_sensors(mechanism: Members) -> None:
+    """Check that sensors measure what there is: bodies, axes of joints, strain on beams."""
+    for sensor in mechanism.sensors:
+        _check_measured(mechanism, sensor)
+
+
+def _check_measured(mechanism: Members, sensor: Sensor) -> None:
+    field = f"sensor.{sensor.name}"
+    if isinstance(sensor, PointSensor):
+        known(sensor.body, mechanism.points, f"{field}.body", "body")
+    elif isinstance(sensor, JointForceSensor):
+        joint = mechanism.joint(sensor.joint)
+        if sensor.axis == "along" and not joint.slides:
+            raise InputError(
+                f"a {joint.kind} joint has no axis to measure along", field=f"{field}.axis", value=sensor.axis,
+                remedy='give "x", "y", "moment" or an angle in rad',
+            )  # fmt: skip
+    elif isinstance(sensor, StrainGauge):
+        _check_strain(mechanism, sensor, field)
+
+
+def _check_strain(mechanism: Members, sensor: StrainGauge, field: str) -> None:
+    """Check that a strain gauge is on a beam, and its distance from the neutral axis is known."""
+    known(sensor.body, mechanism.points, f"{field}.body", "body")
+    beam = None if sensor.body == GROUND else mechanism.body(sensor.body)
+    if not isinstance(beam, FlexibleBeam | AssumedModesBeam):
+        beams = [body.name for body in mechanism.bodies if isinstance(body, FlexibleBeam | AssumedModesBeam)]
+        raise InputError(
+            "strain is measured on beams", field=f"{field}.body", value=sensor.body,
+            remedy=suggestion(sensor.body, beams),
+        )  # fmt: skip
+    if isinstance(sensor.at, str):
+        known(sensor.at, beam.points, f"{field}.at", "point of the beam")
+    else:
+        finite(sensor.at, f"{field}.at")
+        if not 0.0 <= sensor.at <= beam.length:
+            raise InputError(
+                "the place lies beyond the beam's end", field=f"{field}.at", value=sensor.at,
+                remedy=f"choose it between 0 and the length {beam.length:g} m",
+            )  # fmt: skip
+    sections = beam.section if isinstance(beam.section, tuple) else (beam.section,)
+    if sensor.distance is None and any(section.outer_fibre is None for section in sections):
+        raise InputError(
+            "the outermost fibre of the section is not known", field=f"{field}.distance",
+            remedy="give the distance from the neutral axis in m, or the section's outer_fibre",
+        )  # fmt: skip
 
 
 def _two_bodies(mechanism: Members, a: PointRef, b: PointRef, field: str, what: str, remedy: str) -> None:

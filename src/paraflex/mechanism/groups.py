@@ -29,6 +29,8 @@ class Group:
         Whether Exudyn and MuJoCo can express them.
     resists : bool
         Whether they are forces of springs, dampers or friction. These do not constrain, and KED leaves them out.
+    measures : bool
+        Whether they are sensors, which do not act on the mechanism.
     """
 
     table: str
@@ -37,6 +39,7 @@ class Group:
     plural: str = ""
     engines: bool = False
     resists: bool = False
+    measures: bool = False
 
     @property
     def relates(self) -> bool:

@@ -2,8 +2,8 @@
 
 The two bodies of a joint have an order. Its coordinate is that of body b against body a, angles positive anticlockwise,
 and results tell what body a does to body b: the force at point b in the ground frame and the moment about point b,
-positive anticlockwise (`results.joint_loads`). A motor's positive torque or force acts on body b so that the coordinate
-grows.
+positive anticlockwise (`dynamics.joint_loads`). A motor's positive torque or force acts on body b so that the
+coordinate grows.
 """
 
 from __future__ import annotations
@@ -144,13 +144,15 @@ class Joint(CheckedFields, _Directions):
         JOINT_KINDS[kind] = cls
 
     def check_moves(self, field: str, does: JointThat = "moves") -> None:
-        """Check that the joint has a free angle or travel, or the one that is required.
+        """Check that the joint has a free angle or travel, or the one that is required, if any is.
 
         Raises
         ------
         InputError
             It has none, as a weld, or the other.
         """
+        if does == "exists":
+            return
         if not self.moves:
             problem = f"a {self.kind} does not {'move' if 'points' in self.holds else 'turn'}"
             raise InputError(problem, field=field, value=self.name, remedy="name another joint")

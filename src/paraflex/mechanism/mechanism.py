@@ -41,6 +41,9 @@ class Mechanism(Members, Shown):
     frictions : tuple of JointFriction
     linear_springs : tuple of LinearSpring
     loads : tuple of PointForce or AppliedTorque
+    sensors : tuple of Sensor
+        Of any kind: Encoder, Tachometer, PositionSensor, VelocitySensor, AccelerationSensor, StrainGauge,
+        JointForceSensor, DeflectionSensor. They do not act on it.
     gears : tuple of Gear
         Each with its phase.
     gravity : (x, y)

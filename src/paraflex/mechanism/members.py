@@ -23,7 +23,8 @@ from paraflex.mechanism.loads import (
     TorsionalDamper,
     TorsionalSpring,
 )
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import joints_named, known
+from paraflex.mechanism.sensors import SENSOR_KINDS, Sensor
 
 T = TypeVar("T")
 
@@ -135,6 +136,7 @@ class Members(CheckedFields):
     )
     gears: tuple[Gear, ...] = group("gear", "gear", Gear, engines=True)
     loads: tuple[Load, ...] = group("load", "load", PointForce, AppliedTorque)
+    sensors: tuple[Sensor, ...] = group("sensor", "sensor", *SENSOR_KINDS.values(), engines=True, measures=True)
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
@@ -207,6 +209,14 @@ class Members(CheckedFields):
     def motor_units(self) -> tuple[str, ...]:
         """Units of the motors' torques: N m, or N where the joint slides."""
         return tuple("N" if self.slides(motor.joint) else "N m" for motor in self.motors)
+
+    def sensor_units(self) -> tuple[str, ...]:
+        """Units of the sensors' readings."""
+        return tuple(self.sensor_unit(sensor) for sensor in self.sensors)
+
+    def sensor_unit(self, sensor: Sensor) -> str:
+        """Unit of a sensor's readings, which those at joints have of the joint's kind."""
+        return sensor.unit(any(self.slides(joint) for _, joint, _ in joints_named(sensor)))
 
     def assembly(self, name: str | None = None) -> Assembly:
         """The assembly of that name, or the first.

@@ -11,8 +11,8 @@ from typing import Any, Literal, cast
 from paraflex.errors import InputError, suggestion
 from paraflex.limits import of_size, possible
 
-# Motions of joints that members name: an angle, a travel, or either.
-JointThat = Literal["moves", "turns", "slides"]
+# Motions of joints that members name: an angle, a travel, or either; "exists" for a joint of any kind.
+JointThat = Literal["moves", "turns", "slides", "exists"]
 
 
 def known(name: str, names: Collection[str], field: str, kind: str) -> None:
@@ -56,7 +56,7 @@ def said(
     """Metadata of a member's field for model files, their schema and errors, with the unit behind "in".
 
     A number is checked, unless it is None, by `finite`, or with a unit to ask for by `positive`, `not_negative` or
-    `not_zero`; a name may be that of a joint that moves, turns or slides.
+    `not_zero`; a name may be that of a joint that moves, turns, slides, or of any kind.
     """
     checked = partial(check, unit=unit) if check is not None and unit else check
     return {"description": description, "check": checked, "joint": joint}

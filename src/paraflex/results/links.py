@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle
+from paraflex.dynamics.joint_loads import FrameLoad, drive_torques, frame_load, joint_loads
 from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, drawing, system_drawing
-from paraflex.results.joint_loads import FrameLoad, drive_torques, frame_load, joint_loads
 from paraflex.results.outlines import outline_motion, outlines, segment_motion
 from paraflex.results.stress import SectionResult, section_result
 

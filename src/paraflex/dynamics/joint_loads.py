@@ -11,17 +11,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.dynamics import System, axis_angle, inputs_of
-from paraflex.dynamics.constraints import Term, row_order
+from paraflex.arrays import Array
+from paraflex.dynamics.constraints import RowTerm, Term, row_order
 from paraflex.dynamics.coordinates import transverse_pieces
-from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.inputs import inputs_of
+from paraflex.dynamics.joint_coordinates import axis_angle, marker_place
 from paraflex.dynamics.points import point_motion
+from paraflex.dynamics.system import System
 from paraflex.kernel.packed import ANGLE, POINT
 from paraflex.mechanism import Joint
-
-Array = NDArray[np.float64]
 
 
 class JointLoads(NamedTuple):
@@ -39,6 +38,39 @@ class JointLoads(NamedTuple):
     moment: Array
 
 
+class JointParts(NamedTuple):
+    """What acts in a joint.
+
+    Attributes
+    ----------
+    terms : sequence of RowTerm
+        Of its constraints and of its springs, dampers, friction, gears and prescribed motion, with their multipliers'
+        numbers.
+    motors : sequence of int
+        Numbers of its motors.
+    """
+
+    terms: Sequence[RowTerm]
+    motors: Sequence[int]
+
+    def alone(self) -> JointParts:
+        """The parts where no other joint's multipliers and motors are given: these in the order of `rows`, `motors`."""
+        place = {row: i for i, row in enumerate(self.rows)}
+        terms = [RowTerm([place[row] for row in rows], term) for rows, term in self.terms]
+        return JointParts(terms, range(len(self.motors)))
+
+    @property
+    def rows(self) -> list[int]:
+        """Numbers of all its multipliers."""
+        return list(dict.fromkeys(row for rows, _ in self.terms for row in rows))
+
+
+def joint_parts(system: System, name: str) -> JointParts:
+    """What acts in a joint by its name."""
+    motors = [k for k, motor in enumerate(system.mechanism.motors) if motor.joint == name]
+    return JointParts(system.row_terms.get(name, ()), motors)
+
+
 def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> JointLoads:
     """Forces and moments in joints by name: of constraints, motors, springs, dampers, friction and gears.
 
@@ -54,31 +86,32 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
     torques : (k, motors) array
         Torque or force of every motor.
     """
-    mechanism, place = system.mechanism, {name: i for i, name in enumerate(names)}
     force, moment = np.zeros((len(q), len(names), 2)), np.zeros((len(q), len(names)))
-    row = 0
-    for constraint in row_order(mechanism, system.index):
-        lam = multipliers[:, row : row + len(constraint.labels)]
-        row += len(constraint.labels)
-        for term in constraint.terms:
-            i, load = place.get(term.joint), term.weight * lam
-            if i is None:
-                continue
-            if term.kind == POINT:
-                force[:, i] -= load
-            elif term.kind == ANGLE:
-                moment[:, i] -= load[:, 0]
-            else:
-                force[:, i] -= load * _direction(system, term, q)
-    for motor, torque in zip(mechanism.motors, torques.T, strict=True):
-        i, joint = place.get(motor.joint), mechanism.joint(motor.joint)
-        if i is None:
-            continue
-        if joint.slides:
-            force[:, i] += torque[:, None] * _unit(axis_angle(system, joint, q))
-        else:
-            moment[:, i] += torque
+    for i, name in enumerate(names):
+        force[:, i], moment[:, i] = load_in(system, name, joint_parts(system, name), q, multipliers, torques)
     return JointLoads(force, moment)
+
+
+def load_in(
+    system: System, name: str, parts: JointParts, q: Array, multipliers: Array, torques: Array
+) -> tuple[Array, Array]:
+    """Force (k, 2) and moment (k,) in one joint, as `joint_loads`; all may have complex steps."""
+    joint, kind = system.mechanism.joint(name), np.result_type(q, multipliers, torques)
+    force, moment = np.zeros((len(q), 2), kind), np.zeros(len(q), kind)
+    for rows, term in parts.terms:
+        load = term.weight * multipliers[:, rows]
+        if term.kind == POINT:
+            force -= load
+        elif term.kind == ANGLE:
+            moment -= load[:, 0]
+        else:
+            force -= load * _direction(system, term, q)
+    for torque in torques[:, list(parts.motors)].T:
+        if joint.slides:
+            force += torque[:, None] * _unit(axis_angle(system, joint, q))
+        else:
+            moment += torque
+    return force, moment
 
 
 def drive_torques(system: System, multipliers: Array) -> Array:
@@ -151,7 +184,7 @@ def _direction(system: System, term: Term, q: Array) -> Array:
     direction = _unit(along + term.direction - joint.direction)
     if term.carrier == "track":
         # Normal to the deformed beam at the place of the point.
-        direction -= _track_slope(system, joint, q)[:, None] * _unit(along)
+        direction = direction - _track_slope(system, joint, q)[:, None] * _unit(along)
     return direction
 
 
@@ -162,7 +195,7 @@ def _track_slope(system: System, joint: Joint, q: Array) -> Array:
     nodes, pieces = body.mesh.nodes, transverse_pieces(body)
     away = marker_place(system, system.marker(joint.b), q)[0] - q[:, body.position]
     x = np.sum(away * _unit(q[:, body.angle]), axis=1)
-    piece = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, len(pieces) - 1)
+    piece = np.clip(np.searchsorted(nodes, np.real(x), side="right") - 1, 0, len(pieces) - 1)
     z = x - nodes[piece]
     powers = np.arange(1, pieces.shape[1])
     shapes = np.einsum("kp,kpj->kj", powers * z[:, None] ** (powers - 1), pieces[piece][:, 1:])

@@ -1,0 +1,278 @@
+"""Readings of sensors for coordinates over time, and their exact derivatives at a state.
+
+Every sensor reads from the few bodies, constraint rows and motors that it depends on; its derivatives are found by
+complex steps in these alone. Squire, Trapp (1998), Using complex variables to estimate derivatives of real functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from paraflex.arrays import Array, Numbers
+from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate
+from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
+from paraflex.dynamics.points import marker_motion
+from paraflex.dynamics.sections import section_at
+from paraflex.dynamics.system import System
+from paraflex.mechanism import (
+    GROUND,
+    AssumedModesBeam,
+    DeflectionSensor,
+    Encoder,
+    FlexibleBeam,
+    JointForceSensor,
+    PointSensor,
+    PositionSensor,
+    Sensor,
+    StrainGauge,
+    Tachometer,
+    VelocitySensor,
+    joints_named,
+    points_named,
+)
+from paraflex.mechanism.checks import check_sensor
+from paraflex.mechanism.sensors import unit_vector
+
+_STEP = 1e-30
+
+
+class Measured(NamedTuple):
+    """What sensors read from: coordinates (k, n) and their derivatives, multipliers (k, m), torques (k, motors)."""
+
+    q: Numbers
+    v: Numbers
+    a: Numbers
+    multipliers: Numbers
+    torques: Numbers
+
+
+class SensorRows(NamedTuple):
+    """Derivatives of readings, sparse: (sensors, n) by q, v and a, (sensors, m), (sensors, motors)."""
+
+    q: scipy.sparse.csr_matrix
+    v: scipy.sparse.csr_matrix
+    a: scipy.sparse.csr_matrix
+    multipliers: scipy.sparse.csr_matrix
+    torques: scipy.sparse.csr_matrix
+
+
+class _Local(NamedTuple):
+    """A sensor with what it depends on.
+
+    Attributes
+    ----------
+    read : callable
+        From those of its own columns alone to readings (k,).
+    columns : Measured of (c,) arrays
+        Numbers of the coordinates, multipliers and motors that it depends on.
+    """
+
+    read: Callable[[Measured], Numbers]
+    columns: Measured
+
+    def taken(self, given: Measured) -> Measured:
+        """Its own columns of those of a system."""
+        return Measured(*(values[:, own] for values, own in zip(given, self.columns, strict=True)))
+
+
+def sensor_readings(
+    system: System,
+    q: Numbers,
+    v: Numbers,
+    a: Numbers,
+    multipliers: Numbers,
+    torques: Numbers,
+    sensors: Sequence[Sensor] | None = None,
+) -> Numbers:
+    """Readings (k, sensors), each in its unit (`Mechanism.sensor_unit`); complex where something given is.
+
+    Parameters
+    ----------
+    system : System
+    q, v, a : (k, n) arrays
+    multipliers : (k, m) array
+    torques : (k, motors) array
+        Torque or force of every motor.
+    sensors : sequence of Sensor, optional
+        By default those of the mechanism.
+
+    Raises
+    ------
+    InputError
+        A sensor of what the mechanism does not have.
+    """
+    given = Measured(q, v, a, multipliers, torques)
+    readings = [each.read(each.taken(given)) for each in _locals(system, sensors)]
+    return np.stack(readings, axis=1) if readings else np.zeros((len(q), 0))
+
+
+def sensor_rows(
+    system: System,
+    q: Array,
+    v: Array,
+    a: Array,
+    multipliers: Array,
+    torques: Array,
+    sensors: Sequence[Sensor] | None = None,
+) -> SensorRows:
+    """Derivatives of the readings at one state by all that they are read from, exact but for rounding.
+
+    Parameters
+    ----------
+    system, sensors
+        As for `sensor_readings`.
+    q, v, a : (n,) arrays
+    multipliers : (m,) array
+    torques : (motors,) array
+
+    Raises
+    ------
+    InputError
+        A sensor of what the mechanism does not have.
+    """
+    state = Measured(*(np.asarray(each)[None] for each in (q, v, a, multipliers, torques)))
+    found = _locals(system, sensors)
+    entries: list[list[tuple[Array, Array]]] = [[] for _ in state]
+    for each in found:
+        own = each.taken(state)
+        sizes = [values.shape[1] for values in own]
+        steps = np.split(1j * _STEP * np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
+        slopes = np.imag(each.read(Measured(*(values + step for values, step in zip(own, steps, strict=True))))) / _STEP
+        for kind, columns, values in zip(entries, each.columns, np.split(slopes, np.cumsum(sizes)[:-1]), strict=True):
+            kind.append((columns, values))
+    return SensorRows(*(_sparse(kind, values.shape[1]) for kind, values in zip(entries, state, strict=True)))
+
+
+def _sparse(rows: Sequence[tuple[Array, Array]], width: int) -> scipy.sparse.csr_matrix:
+    """A matrix of rows that are given by their columns and the values there."""
+    counts = [columns.size for columns, _ in rows]
+    columns = np.concatenate([np.zeros(0, int), *(columns for columns, _ in rows)])
+    values = np.concatenate([np.zeros(0), *(values for _, values in rows)])
+    where = (np.repeat(np.arange(len(rows)), counts), columns)
+    matrix = scipy.sparse.csr_matrix((values, where), (len(rows), width))
+    matrix.eliminate_zeros()
+    return matrix
+
+
+def _locals(system: System, sensors: Sequence[Sensor] | None) -> list[_Local]:
+    given = system.mechanism.sensors if sensors is None else sensors
+    for sensor in given if sensors is not None else ():
+        if sensor not in system.mechanism.sensors:
+            check_sensor(system.mechanism, sensor)
+    return [_local(system, sensor) for sensor in given]
+
+
+def _local(system: System, sensor: Sensor) -> _Local:
+    """A sensor in a system of the bodies alone that it depends on."""
+    names, parts = _bodies(system, sensor), JointParts((), ())
+    if isinstance(sensor, JointForceSensor):
+        parts = joint_parts(system, sensor.joint)
+    bodies, columns, offset = [], [np.zeros(0, int)], 0
+    for name in names:
+        body = system.body(name)
+        bodies.append(replace(body, offset=offset))
+        columns.append(np.arange(body.all.start, body.all.stop))
+        offset += columns[-1].size
+    read = _reader(replace(system, bodies=tuple(bodies)), sensor, parts.alone())
+    of_bodies = np.concatenate(columns)
+    rows, motors = (np.array(each, int) for each in (parts.rows, list(parts.motors)))
+    return _Local(read, Measured(of_bodies, of_bodies, of_bodies, rows, motors))
+
+
+def _bodies(system: System, sensor: Sensor) -> list[str]:
+    """Names of the bodies that a reading depends on, each once."""
+    joints = [system.mechanism.joint(name) for _, name, _ in joints_named(sensor)]
+    points = [*points_named(sensor).values(), *(point for joint in joints for point in (joint.a, joint.b))]
+    names = [*(point.body for point in points), getattr(sensor, "body", GROUND)]
+    return [name for name in dict.fromkeys(names) if name != GROUND]
+
+
+def _reader(system: System, sensor: Sensor, parts: JointParts) -> Callable[[Measured], Numbers]:
+    """What a sensor of a system does."""
+    if isinstance(sensor, Encoder):
+        return lambda at: joint_coordinate(system, sensor.joint, at.q, at.v).value
+    if isinstance(sensor, Tachometer):
+        return lambda at: joint_coordinate(system, sensor.joint, at.q, at.v).rate
+    if isinstance(sensor, PointSensor):
+        return _of_point(system, sensor)
+    if isinstance(sensor, StrainGauge):
+        return _of_strain(system, sensor)
+    if isinstance(sensor, JointForceSensor):
+        return lambda at: _of_load(system, sensor, parts, at)
+    if isinstance(sensor, DeflectionSensor):
+        return _of_deflection(system, sensor)
+    raise TypeError(sensor)
+
+
+def _of_point(system: System, sensor: PointSensor) -> Callable[[Measured], Numbers]:
+    """Component of a point's motion along an axis, which a body may carry."""
+    marker, (ex, ey) = system.marker(sensor.point), sensor.direction
+    frame = None if sensor.body == GROUND else system.body(sensor.body)
+
+    def read(at: Measured) -> Numbers:
+        motion = marker_motion(system, marker, at.q, at.v, at.a)
+        if isinstance(sensor, PositionSensor):
+            vector = motion.position if frame is None else motion.position - at.q[:, frame.position]
+        else:
+            vector = motion.velocity if isinstance(sensor, VelocitySensor) else motion.acceleration
+        if frame is None:
+            return ex * vector[:, 0] + ey * vector[:, 1]
+        c, s = np.cos(at.q[:, frame.angle]), np.sin(at.q[:, frame.angle])
+        return (c * ex - s * ey) * vector[:, 0] + (s * ex + c * ey) * vector[:, 1]
+
+    return read
+
+
+def _of_strain(system: System, sensor: StrainGauge) -> Callable[[Measured], Numbers]:
+    """Strain of a beam, N / E A - distance M / E I; without N where its coordinates do not stretch."""
+    described = system.mechanism.body(sensor.body)
+    assert isinstance(described, FlexibleBeam | AssumedModesBeam)
+    at_place = section_at(system, sensor.body, sensor.place(described.points))
+    if at_place is None:
+        return lambda at: np.zeros(len(at.q))
+    section, stiffness = at_place.section, at_place.material.youngs_modulus
+    distance = section.outer_fibre if sensor.distance is None else sensor.distance
+    assert distance is not None
+    bending, axial = distance / (stiffness * section.second_moment), 1.0 / (stiffness * section.area)
+
+    def read(at: Measured) -> Numbers:
+        loads = at_place.loads(system, at.q, at.v, at.a)
+        stretched = at_place.part.force is not None
+        return (axial * loads.force[:, 0] if stretched else 0.0) - bending * loads.moment[:, 0]
+
+    return read
+
+
+def _of_load(system: System, sensor: JointForceSensor, parts: JointParts, at: Measured) -> Numbers:
+    """Component of a joint's force, or its moment."""
+    force, moment = load_in(system, sensor.joint, parts, at.q, at.multipliers, at.torques)
+    if sensor.axis == "moment":
+        return moment
+    if sensor.axis == "along":
+        angle = axis_angle(system, system.mechanism.joint(sensor.joint), at.q)
+        return np.cos(angle) * force[:, 0] + np.sin(angle) * force[:, 1]
+    ex, ey = unit_vector(sensor.axis)
+    return ex * force[:, 0] + ey * force[:, 1]
+
+
+def _of_deflection(system: System, sensor: DeflectionSensor) -> Callable[[Measured], Numbers]:
+    """Displacement of a point in its body's frame, or the turn of the material there."""
+    marker = system.marker(sensor.point)
+    body = system.bodies[marker.body]
+    if sensor.axis == "angle":
+        return lambda at: at.q[:, body.flexible] @ marker.slope
+    row = 0 if sensor.axis == "x" else 1
+
+    def read(at: Measured) -> Numbers:
+        u = at.q[:, body.flexible]
+        moved = u @ marker.N[row]
+        if row or marker.bending is None:
+            return moved
+        return moved - 0.5 * np.sum(u * (u @ marker.bending), axis=1)
+
+    return read

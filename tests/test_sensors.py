@@ -1,0 +1,480 @@
+"""Sensors: readings against closed forms, exact derivatives against differences, checks, files."""
+
+import copy
+import dataclasses
+import math
+import tomllib
+
+import numpy as np
+import pytest
+
+import paraflex as pf
+from paraflex.dynamics import (
+    build_system,
+    consistent_state,
+    joint_coordinate,
+    sensor_readings,
+    sensor_rows,
+    static_equilibrium,
+)
+from paraflex.dynamics.joint_loads import joint_loads
+from paraflex.dynamics.points import point_motion
+from paraflex.files import model_from
+from paraflex.mechanism import SENSOR_KINDS
+from paraflex.motion import simulate_motion
+
+EVERYTHING = tomllib.loads("""
+name = "everything"
+gravity = [0.0, -9.81]
+
+[parameters]
+x = "0.1 m"
+reach = "120 mm"
+
+[section.bar]
+width = 0.02
+thickness = 0.005
+
+[section.thin]
+width = 0.02
+thickness = 0.003
+
+[material.aluminium]
+youngs_modulus = 70e9
+density = 2700
+
+[ground]
+O = [0.0, 0.0]
+R = [0.3, 0.7]
+
+[body.first]
+type = "beam"
+length = 0.5
+section = ["bar", "thin"]
+material = "aluminium"
+points = { O = 0.0, M = 0.2, P = 0.5 }
+elements = 2
+
+[body.second]
+type = "beam"
+length = 0.4
+section = "bar"
+material = "aluminium"
+points = { P = 0.0, E = 0.4 }
+reference = "cantilever"
+
+[body.block]
+type = "rigid"
+mass = 0.5
+inertia = 1e-3
+points = { C = [0.01, 0.02], D = [0.1, 0.0] }
+
+[body.collar]
+type = "rigid"
+mass = 0.2
+inertia = 1e-4
+points = { K = [0.0, 0.0] }
+
+[body.bar]
+type = "assumed-modes"
+length = 0.3
+section = "thin"
+material = "aluminium"
+transverse_polynomials = [[0, 0, 1], [0, 0, 0, 1]]
+axial_polynomials = [[0, 1]]
+points = { A = 0.0, T = 0.3 }
+
+[joint]
+A = ["ground.O", "first.O"]
+B = ["first.P", "second.P"]
+
+[joint.rail]
+type = "prismatic"
+points = ["second.E", "block.C"]
+direction = 0.3
+
+[joint.track]
+type = "sliding"
+points = ["first.O", "collar.K"]
+
+[joint.foot]
+type = "weld"
+points = ["block.D", "bar.A"]
+
+[joint.slot]
+type = "slot"
+points = ["ground.R", "bar.T"]
+
+[motor]
+drive = "A"
+push = "rail"
+elbow = "B"
+
+[spring.hinge]
+joint = "B"
+stiffness = 2.0
+
+[damper.rail]
+joint = "rail"
+coefficient = 1.0
+
+[friction.track]
+joint = "track"
+limit = 0.5
+speed = 0.01
+
+[gear.mesh]
+joints = ["A", "B"]
+ratio = -0.5
+
+[assembly.start]
+first = 0.3
+second = 0.8
+block = 1.0
+collar = 0.0
+bar = 1.0
+points = { "collar.K" = [0.2, 0.06] }
+
+[sensor]
+angle = { type = "encoder", joint = "B" }
+travel = { type = "encoder", joint = "rail" }
+slid = { type = "encoder", joint = "track" }
+rate = { type = "tachometer", joint = "A" }
+speed = { type = "tachometer", joint = "rail" }
+place = { type = "position", point = "second.E", axis = "x" }
+seen = { type = "position", point = "bar.T", axis = "y", body = "first" }
+velocity = { type = "velocity", point = "first.M", axis = "30 deg" }
+carried = { type = "velocity", point = "block.D", axis = 0.4, body = "second" }
+shaken = { type = "acceleration", point = "first.P", axis = "y", body = "first" }
+heavy = { type = "acceleration", point = "bar.T", axis = "x" }
+gauge = { type = "strain", body = "first", at = "reach" }
+step = { type = "strain", body = "first", at = "M", distance = "-1 mm" }
+root = { type = "strain", body = "bar", at = 0.0 }
+pull = { type = "joint_force", joint = "track", axis = "y" }
+pushed = { type = "joint_force", joint = "rail", axis = "along" }
+turned = { type = "joint_force", joint = "B", axis = "moment" }
+held = { type = "joint_force", joint = "slot", axis = 0.7 }
+welded = { type = "joint_force", joint = "foot", axis = "moment" }
+bent = { type = "deflection", point = "first.M", axis = "y" }
+short = { type = "deflection", point = "second.E", axis = "x" }
+slope = { type = "deflection", point = "second.E", axis = "angle" }
+stiff = { type = "deflection", point = "block.D", axis = "x" }
+""")
+
+
+def everything(geometry="second-order", **changed):
+    data = copy.deepcopy(EVERYTHING) | {"geometry": geometry}
+    for name, fields in changed.items():
+        data["sensor"][name] |= fields
+    return model_from(data, "everything.toml").mechanism
+
+
+def any_state(system, seed=1):
+    """Coordinates, derivatives, multipliers and torques, none of them zero: readings ask for no consistent state."""
+    random = np.random.default_rng(seed)
+    q, v, a = random.normal(size=(3, system.n))
+    for body in system.bodies:
+        # Of the size of real deflections: u ~ 1e-2 m.
+        q[body.flexible] *= 1e-3
+        q[body.position] *= 0.2
+    return q, v, a, 10.0 * random.normal(size=system.m), random.normal(size=len(system.mechanism.motors))
+
+
+@pytest.mark.parametrize("geometry", ["linear", "second-order"])
+def test_rows_are_the_derivatives_of_readings(geometry):
+    mechanism = everything(geometry)
+    assert {sensor.kind for sensor in mechanism.sensors} == set(SENSOR_KINDS)
+    system = build_system(mechanism)
+    state = any_state(system)
+    rows = sensor_rows(system, *state)
+    # Readings are at most quadratic in all but q.
+    steps = [1e-6, 0.1, 1.0, 1.0, 1.0]
+    for k, (name, matrix, step) in enumerate(zip(rows._fields, rows, steps, strict=True)):
+        assert matrix.shape == (len(mechanism.sensors), state[k].size)
+        differences = np.zeros(matrix.shape)
+        for j in range(state[k].size):
+            for sign in (1.0, -1.0):
+                moved = [each.copy() for each in state]
+                moved[k][j] += sign * step
+                differences[:, j] += sign * sensor_readings(system, *(each[None] for each in moved))[0] / (2.0 * step)
+        scale = 1.0 + np.max(np.abs(differences), axis=1, keepdims=True)
+        assert np.max(np.abs(matrix.toarray() - differences) / scale) < 2e-7, name
+    assert min(rows.multipliers.nnz, rows.torques.nnz, rows.a.nnz) > 0
+
+
+def test_rows_touch_only_what_a_sensor_depends_on():
+    system = build_system(everything())
+    rows = sensor_rows(system, *any_state(system))
+    names = [sensor.name for sensor in system.mechanism.sensors]
+    touched = {
+        name: {body.name for body in system.bodies if rows.q[[i], :][:, range(body.all.start, body.all.stop)].nnz}
+        for i, name in enumerate(names)
+    }
+    assert touched["angle"] == {"first", "second"}
+    assert touched["place"] == {"second"}
+    assert touched["seen"] == {"first", "bar"}
+    assert touched["gauge"] == {"first"}
+    assert touched["stiff"] == set()
+
+
+@pytest.mark.parametrize("geometry", ["linear", "second-order"])
+def test_readings_are_what_the_package_gives_elsewhere(geometry):
+    mechanism = everything(geometry)
+    system = build_system(mechanism)
+    q, v, a, multipliers, torques = (each[None] for each in any_state(system))
+    found = dict(zip([one.name for one in mechanism.sensors], sensor_readings(system, q, v, a, multipliers, torques)[0],
+                     strict=True))  # fmt: skip
+    assert found["travel"] == pytest.approx(joint_coordinate(system, "rail", q).value[0], rel=1e-12)
+    assert found["speed"] == pytest.approx(joint_coordinate(system, "rail", q, v).rate[0], rel=1e-12)
+    tip = point_motion(system, pf.PointRef("first", "P"), q, v, a)
+    phi = q[0, system.body("first").angle]
+    assert found["shaken"] == pytest.approx(tip.acceleration[0] @ [-math.sin(phi), math.cos(phi)], rel=1e-12)
+    loads = joint_loads(system, ["track", "rail", "B", "slot"], q, multipliers, torques)
+    assert found["pull"] == pytest.approx(loads.force[0, 0, 1], rel=1e-12)
+    assert found["turned"] == pytest.approx(loads.moment[0, 2], rel=1e-12)
+    assert found["held"] == pytest.approx(loads.force[0, 3] @ [math.cos(0.7), math.sin(0.7)], rel=1e-12)
+    E = point_motion(system, pf.PointRef("second", "E"), q, v, a).position[0]
+    second = system.body("second")
+    c, s = math.cos(q[0, second.angle]), math.sin(q[0, second.angle])
+    away = E - q[0, second.position]
+    assert found["short"] == pytest.approx(c * away[0] + s * away[1] - 0.4, abs=1e-15)
+    assert abs(found["short"]) > 1e-7
+
+
+PENDULUM = tomllib.loads("""
+name = "pendulum"
+gravity = [0.0, -9.81]
+
+[section.bar]
+width = 0.02
+thickness = 0.005
+
+[material.aluminium]
+youngs_modulus = 70e9
+density = 2700
+
+[ground]
+O = [0.0, 0.0]
+
+[body.rod]
+type = "beam"
+length = 0.5
+section = "bar"
+material = "aluminium"
+points = { O = 0.0, T = 0.5 }
+elements = 2
+
+[joint]
+O = ["ground.O", "rod.O"]
+
+[motor]
+drive = "O"
+
+[assembly.start]
+rod = 0.3
+
+[sensor]
+angle = { type = "encoder", joint = "O" }
+rate = { type = "tachometer", joint = "O" }
+along = { type = "acceleration", point = "rod.T", axis = "x", body = "rod" }
+across = { type = "acceleration", point = "rod.T", axis = "y", body = "rod" }
+height = { type = "position", point = "rod.T", axis = "y" }
+radius = { type = "position", point = "rod.T", axis = "x", body = "rod" }
+velocity = { type = "velocity", point = "rod.T", axis = "y", body = "rod" }
+tension = { type = "joint_force", joint = "O", axis = "x" }
+torque = { type = "joint_force", joint = "O", axis = "moment" }
+strain = { type = "strain", body = "rod", at = 0.2 }
+""")
+
+
+def readings_of(run):
+    """Readings of a run (time, sensors) by the names of sensors, without motors' torques."""
+    solution, mechanism = run.solution, run.system.mechanism
+    torques = np.zeros((len(solution.q), len(mechanism.motors)))
+    found = sensor_readings(run.system, solution.q, solution.v, solution.a, solution.multipliers, torques)
+    return {sensor.name: found[:, k] for k, sensor in enumerate(mechanism.sensors)}
+
+
+def test_a_rigid_pendulum():
+    """A uniform rod that swings: theta'' = -3 g cos(theta) / 2 l, energy, force of the bearing on the rod."""
+    mechanism = model_from(PENDULUM, "pendulum.toml").mechanism
+    options = pf.IntegrationOptions(tolerance=1e-12)
+    read = readings_of(simulate_motion(mechanism.rigid(), 0.4, samples=41, options=options))
+    g, length, theta = 9.81, 0.5, read["angle"]
+    assert theta[0] == pytest.approx(0.3, abs=1e-12)
+    assert np.ptp(theta) > 1.0
+    turning = -1.5 * g / length * np.cos(theta)
+    squared = 3.0 * g / length * (np.sin(0.3) - np.sin(theta))
+    # Accelerations come from the last stage of a step.
+    close = {"rel": 1e-6, "abs": 1e-5}
+    assert read["rate"] ** 2 == pytest.approx(squared, **close)
+    assert read["along"] == pytest.approx(-length * squared, **close)
+    assert read["across"] == pytest.approx(length * turning, **close)
+    assert read["height"] == pytest.approx(length * np.sin(theta), **close)
+    assert read["radius"] == pytest.approx(length, **close)
+    assert read["velocity"] == pytest.approx(length * read["rate"], **close)
+    mass = 2700 * 0.02 * 0.005 * length
+    centre = 0.5 * length * (-squared * np.cos(theta) - turning * np.sin(theta))
+    assert read["tension"] == pytest.approx(mass * centre, **close)
+    assert np.max(np.abs(read["torque"])) < 1e-9
+    assert np.all(read["strain"] == 0.0)
+
+
+def test_strain_of_a_spinning_rod():
+    """Of a rod that spins steadily N(x) = rho A w^2 (l^2 - x^2) / 2, which one element's stretch has in the mean."""
+    data = copy.deepcopy(PENDULUM) | {"gravity": [0.0, 0.0]}
+    data["body"]["rod"]["elements"] = 1
+    data["sensor"]["strain"] |= {"at": 0.0, "distance": 0.0}
+    system = build_system(model_from(data, "spun.toml").mechanism)
+    state = consistent_state(system, system.mechanism.assemblies[0])
+    body, w, length, density, modulus = system.body("rod"), 40.0, 0.5, 2700, 70e9
+    v, a = np.zeros(system.n), np.zeros(system.n)
+    v[body.angle] = w
+    # The mean stretch, rho w^2 l^2 / 3 E, by the shape of the undamped axial equilibrium.
+    q = state.q.copy()
+    loads = [weight * density * 1e-4 * w**2 * x * body.mesh.shape_at(x)[0][0] for x, weight in gauss(length)]
+    q[body.flexible] = np.sum(loads, axis=0) @ body.integrals.D / body.modes.omega**2
+    tip = system.marker(pf.PointRef("rod", "T")).N[0]
+    mean = density * w**2 * length**2 / (3.0 * modulus)
+    assert tip @ q[body.flexible] == pytest.approx(mean * length, rel=1e-9)
+    read = sensor_readings(system, *(x[None] for x in (q, v, a, np.zeros(system.m), np.zeros(1))))[0, -1]
+    # The stretch itself moves the mass outwards.
+    assert read == pytest.approx(density * w**2 * length**2 / (2.0 * modulus), rel=1e-5)
+
+
+def gauss(length):
+    x, weights = np.polynomial.legendre.leggauss(4)
+    return zip(0.5 * length * (x + 1.0), 0.5 * length * weights, strict=True)
+
+
+CANTILEVER = """
+name = "cantilever"
+
+[section.bar]
+width = 0.02
+thickness = 0.005
+
+[material.aluminium]
+youngs_modulus = 70e9
+density = 2700
+
+[ground]
+O = [0.0, 0.0]
+
+[body.beam]
+type = "beam"
+length = 0.4
+section = "bar"
+material = "aluminium"
+points = { O = 0.0, T = 0.4 }
+elements = 2
+
+[joint.clamp]
+type = "weld"
+points = ["ground.O", "beam.O"]
+
+[load.end]
+type = "force"
+point = "beam.T"
+force = [300.0, -1.5]
+
+[assembly.start]
+beam = 0.0
+
+[sensor]
+upper = { type = "strain", body = "beam", at = "150 mm" }
+lower = { type = "strain", body = "beam", at = "150 mm", distance = "-2.5 mm" }
+core = { type = "strain", body = "beam", at = "O", distance = 0.0 }
+sag = { type = "deflection", point = "beam.T", axis = "y" }
+slope = { type = "deflection", point = "beam.T", axis = "angle" }
+longer = { type = "deflection", point = "beam.T", axis = "x" }
+"""
+
+
+def test_a_cantilever_under_an_end_load():
+    """Statics: M(x) = F (l - x), N constant; the load's tension moves the linear model's equilibrium little."""
+    data = tomllib.loads(CANTILEVER) | {"geometry": "linear", "reference": "cantilever"}
+    mechanism = model_from(data, "cantilever.toml").mechanism
+    system = build_system(mechanism)
+    found = static_equilibrium(system, consistent_state(system, mechanism.assemblies[0]))
+    zero = np.zeros((1, system.n))
+    read = dict(zip([one.name for one in mechanism.sensors],
+                    sensor_readings(system, found.q[None], zero, zero, np.zeros((1, system.m)), np.zeros((1, 0)))[0],
+                    strict=True))  # fmt: skip
+    E, area, moment_of_area, length = 70e9, 1e-4, 0.02 * 0.005**3 / 12.0, 0.4
+    bending = 0.0025 * (-1.5 * 0.25) / (E * moment_of_area)
+    tension = 300.0 / (E * area)
+    assert read["upper"] == pytest.approx(tension - bending, rel=1e-9)
+    assert read["lower"] == pytest.approx(tension + bending, rel=1e-9)
+    assert read["upper"] > 0.0 > read["lower"]
+    assert read["core"] == pytest.approx(tension, rel=1e-9)
+    assert read["sag"] == pytest.approx(-1.5 * length**3 / (3.0 * E * moment_of_area), rel=1e-9)
+    assert read["slope"] == pytest.approx(-1.5 * length**2 / (2.0 * E * moment_of_area), rel=1e-9)
+    assert read["longer"] == pytest.approx(tension * length, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "fields", "says"),
+    [
+        ("angle", {"joint": "C"}, "sensor.angle.joint: unknown joint (got 'C'); choose from"),
+        ("angle", {"joint": "foot"}, "sensor.angle.joint: a weld does not move (got 'foot'); name another joint"),
+        ("place", {"point": "second.X"}, "sensor.place.point: unknown point (got 'second.X'); choose from P, E"),
+        ("place", {"point": "ground.O"}, "sensor.place.point: the ground does not move"),
+        ("place", {"axis": "z"}, "sensor.place.axis: neither such a word nor a number (got 'z'); give \"x\", \"y\" or"),
+        ("place", {"axis": "3 mm"}, "sensor.place.axis: a quantity in m where one in rad is asked for"),
+        ("seen", {"body": "frist"}, "sensor.seen.body: unknown body (got 'frist'); did you mean \"first\"?"),
+        ("gauge", {"at": 0.6}, "sensor.gauge.at: the place lies beyond the beam's end (got 0.6); choose it between 0"),
+        ("gauge", {"at": "Q"}, "sensor.gauge.at: unknown point of the beam (got 'Q'); choose from O, M, P"),
+        ("gauge", {"body": "block"}, "sensor.gauge.body: strain is measured on beams (got 'block'); choose from"),
+        ("pushed", {"joint": "B"}, "sensor.pushed.axis: a revolute joint has no axis to measure along (got 'along')"),
+        ("held", {"axis": "angle"}, "sensor.held.axis: neither such a word nor a number (got 'angle')"),
+        ("bent", {"axis": 0.3}, "sensor.bent.axis: should be 'x', 'y' or 'angle' (got 0.3)"),
+        ("angle", {"type": "encode"}, "sensor.angle.type: unknown type (got 'encode'); did you mean \"encoder\"?"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_measured_is_refused(name, fields, says):
+    with pytest.raises(pf.InputError) as error:
+        everything(**{name: fields})
+    assert says in str(error.value)
+
+
+def test_sensors_made_in_python_are_checked_too():
+    mechanism = everything()
+    beams = [body for body in mechanism.bodies if body.name == "second"]
+    bare = mechanism.with_bodies([dataclasses.replace(beams[0], section=pf.Section(1e-4, 2e-10))])
+    system = build_system(bare)
+    state = [each[None] for each in any_state(system)]
+    with pytest.raises(pf.InputError, match=r"sensor.s.distance: the outermost fibre of the section is not known"):
+        sensor_readings(system, *state, sensors=[pf.StrainGauge("s", "second", 0.1)])
+    with pytest.raises(pf.InputError, match=r"sensor.e.joint: unknown joint"):
+        sensor_readings(system, *state, sensors=[pf.Encoder("e", "Q")])
+    with pytest.raises(
+        pf.InputError, match=r'sensor.p.axis: not an axis \(got \'z\'\); give "x", "y" or an angle in rad'
+    ):
+        sensor_readings(system, *state, sensors=[pf.PositionSensor("p", "first.P", "z")])
+    with pytest.raises(pf.InputError, match=r"sensor: duplicate name"):
+        dataclasses.replace(mechanism, sensors=[pf.Encoder("e", "A"), pf.Encoder("e", "B")])
+    assert sensor_readings(system, *state, sensors=[pf.StrainGauge("s", "second", 0.1, 0.001)]).shape == (1, 1)
+
+
+def test_units():
+    mechanism = everything()
+    units = dict(zip([sensor.name for sensor in mechanism.sensors], mechanism.sensor_units(), strict=True))
+    assert [units[name] for name in ("angle", "travel", "slid", "rate", "speed")] == ["rad", "m", "m", "rad/s", "m/s"]
+    assert [units[name] for name in ("place", "carried", "shaken", "gauge")] == ["m", "m/s", "m/s^2", "1"]
+    assert [units[name] for name in ("pull", "turned", "bent", "slope")] == ["N", "N m", "m", "rad"]
+
+
+def test_a_model_with_sensors_is_read_back_equal(tmp_path):
+    mechanism = everything()
+    # An axis is a word though a parameter is called so, and a place may be a parameter or a point.
+    assert mechanism.sensors[5].axis == "x"
+    assert [sensor.at for sensor in mechanism.sensors if sensor.kind == "strain"] == [0.12, "M", 0.0]
+    mechanism.save(tmp_path / "saved.toml")
+    assert pf.load(tmp_path / "saved.toml").mechanism == mechanism
+
+
+def test_sensors_do_not_act():
+    mechanism = everything()
+    plain = dataclasses.replace(mechanism, sensors=())
+    assert build_system(mechanism).rows == build_system(plain).rows
