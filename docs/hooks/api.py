@@ -25,6 +25,7 @@ PACKAGES = (
     "motion",
     "validity",
     "elastodynamics",
+    "linear",
     "integrators.methods",
     "integrators",
     "dynamics",

@@ -76,6 +76,9 @@ from .integrators import (
     SingularDistance as SingularDistance,
 )
 
+# Linear models
+from .linear import linearise as linearise, LinearModel as LinearModel
+
 # Studies
 from .campaign import Workers as Workers
 from .studies import (

@@ -54,7 +54,7 @@ class Chosen(NamedTuple):
     bodies: NDArray[np.int64]
 
     @property
-    def count(self) -> int:
+    def freedoms(self) -> int:
         """Number of degrees of freedom."""
         return self.joints.size + self.bodies.size
 
@@ -96,7 +96,17 @@ class RowTangents(NamedTuple):
 
     def taken(self, rows: NDArray[np.int64]) -> RowTangents:
         """Some of the rows."""
-        return RowTangents(*(part[rows] for part in self))
+        return RowTangents(
+            self.jacobian[rows], self.rate[rows], self.second_place[rows], self.second_rate[rows], self.number[rows]
+        )
+
+    def with_rows(self, others: RowTangents) -> RowTangents:
+        """These rows and then others."""
+        return RowTangents(
+            np.vstack([self.jacobian, others.jacobian]), np.vstack([self.rate, others.rate]),
+            np.vstack([self.second_place, others.second_place]), np.vstack([self.second_rate, others.second_rate]),
+            np.concatenate([self.number, others.number]),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -124,7 +134,12 @@ class Coordinates:
                      for joint in self.joints if joint not in held)  # fmt: skip
         if not more:
             return Tangency(self.system)
-        return Tangency(build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *more))))
+        extended = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *more)))
+        # Damping ratios are those of links whose motors turn freely, as in the system.
+        own, bodies = self.system.packed, extended.packed.bodies.copy()
+        bodies["damping"] = own.bodies["damping"]
+        packed = extended.packed._replace(bodies=bodies, modal=own.modal, damping=own.damping)
+        return Tangency(replace(extended, packed=packed))
 
     @cached_property
     def _rows(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -145,8 +160,10 @@ class Coordinates:
 
         def rows(wanted: NDArray[np.int64]) -> RowTangents:
             at = np.searchsorted(whole.rows, wanted)
-            parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
-            return RowTangents(*(part[at].toarray() for part in parts), number[wanted])
+            return RowTangents(
+                whole.jacobian[at].toarray(), whole.rate[at].toarray(), whole.second_place[at].toarray(),
+                whole.second_rate[at].toarray(), number[wanted],
+            )  # fmt: skip
 
         holding = whole.rows[~np.isin(whole.rows, coordinates)]
         return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant])

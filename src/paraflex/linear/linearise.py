@@ -4,23 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, build_system, consistent_state, joint_coordinate, start_state, static_equilibrium
+from paraflex.dynamics import (
+    State,
+    System,
+    build_system,
+    consistent_state,
+    joint_coordinate,
+    start_state,
+    static_equilibrium,
+)
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.sensors import sensor_rows
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError
+from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import Chosen, Coordinates, Quantity, coordinates_of
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import planned_point, resting_point, run_point
 from paraflex.mechanism import ActuationMode, Encoder, Mechanism, PointRef, PositionSensor, Sensor, Start, parse_mode
+from paraflex.mechanism.checks import known_point
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
 
@@ -52,7 +61,7 @@ class Ports:
 @checked_arguments()
 @solvable("a linear model")
 def linearise(
-    source: Mechanism | HasMechanism | TrackingTask | TrackingRun | MotionRun,
+    source: Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun,
     *,
     mode: str | ActuationMode | None = None,
     at: float | None = None,
@@ -128,7 +137,7 @@ def linear_model(
     system = coordinates.system
     mechanism, tangents = system.mechanism, coordinates.at(point)
     chosen = coordinates.choose(tangents) if chosen is None else chosen
-    if not chosen.count:
+    if not chosen.freedoms:
         raise InputError("has no freedom to move", field="mechanism", value=mechanism.name, remedy="free a joint")
     motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in ports.mode.motors]
     minimal = Minimal(
@@ -147,18 +156,101 @@ def linear_model(
         unbalanced=unbalanced,
         states=(*states, *(Quantity(f"{one.name}_rate", f"{one.unit}/s") for one in states)),
         inputs=inputs,
-        outputs=tuple(Quantity(sensor.name, sensor_unit(mechanism, sensor)) for sensor in ports.sensors),
+        outputs=tuple(Quantity(sensor.name, mechanism.sensor_unit(sensor)) for sensor in ports.sensors),
         minimal=minimal,
         rows=rows,
         wanted=(np.arange(len(inputs)), np.arange(len(ports.sensors))),
     )
 
 
-class HasMechanism(Protocol):
-    """A model, or anything else with a mechanism and a start."""
+def _mechanism_of(source: ModelWithPaths | TrackingTask | TrackingRun | MotionRun) -> Mechanism:
+    if isinstance(source, TrackingRun):
+        return source.task.mechanism
+    return source.system.mechanism if isinstance(source, MotionRun) else source.mechanism
 
-    @property
-    def mechanism(self) -> Mechanism: ...
 
-    @property
-    def start(self) -> Start | None: ...
+def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
+    if mode is None:
+        return ActuationMode("all motors", tuple(motor.name for motor in mechanism.motors))
+    return mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
+
+
+def _ports(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], prescribed: Sequence[str]) -> Ports:
+    if not (mode.motors or forces or prescribed):
+        prescribed = [one.name for one in mechanism.prescribed]
+        if not prescribed:
+            raise InputError(
+                "has neither motors nor prescribed motions, so that a linear model of it has no inputs",
+                field="mechanism", value=mechanism.name, remedy="name points at which forces act: forces, --force",
+            )  # fmt: skip
+    points = tuple(PointRef.parse(text, "forces") for text in forces)
+    for point in points:
+        known_point(mechanism, point, "forces")
+    return Ports(mode, points, tuple(prescribed), _sensors(mechanism))
+
+
+def _sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:
+    """An encoder of every motor's joint, the end-effector's place, then the mechanism's own sensors, each name once."""
+    joints = dict.fromkeys(motor.joint for motor in mechanism.motors)
+    found: list[Sensor] = [Encoder(joint, joint) for joint in joints]
+    effector = mechanism.end_effector
+    if effector is not None:
+        found += [PositionSensor(axis, effector.point, axis) for axis in ("x", "y") if axis in effector.coordinates]
+    taken = {sensor.name for sensor in mechanism.sensors}
+    return (*(sensor for sensor in found if sensor.name not in taken), *mechanism.sensors)
+
+
+def _pose(system: System, start: Start | State | None, assembly: str | None) -> State:
+    if isinstance(start, State):
+        return start
+    mechanism = system.mechanism
+    if start is None:
+        return consistent_state(system, assembly)
+    return start_state(system, start, mechanism.assembly(assembly) if mechanism.assemblies else None)
+
+
+def _moving(
+    source: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode, at: float | None
+) -> tuple[System, MotionPoint, str]:
+    times = source.motion.t if isinstance(source, TrackingTask) else source.solution.t
+    sample = 0 if at is None else nearest_sample(times, at)
+    if isinstance(source, TrackingTask):
+        return source.system, planned_point(source, mode, sample), "a planned motion"
+    system = source.system if isinstance(source, MotionRun) else source.task.system
+    return system, run_point(source, sample), "a run"
+
+
+def nearest_sample(times: Array, at: float) -> int:
+    """Number of the sample nearest to a time [s].
+
+    Raises
+    ------
+    InputError
+        It is outside the motion.
+    """
+    sample = int(np.argmin(np.abs(times - at)))
+    apart = float(np.max(np.diff(times), initial=0.0))
+    if abs(times[sample] - at) > _NEAR * apart * (1.0 + 1e-9):
+        raise InputError(
+            "is not a time of the motion", field="at", value=at,
+            remedy=f"choose one from {times[0]:.6g} to {times[-1]:.6g} s",
+        )  # fmt: skip
+    return sample
+
+
+def _forces(system: System, q: Array, motors: Sequence[int], points: Sequence[PointRef]) -> Array:
+    """Generalised forces (n, inputs) of unit torques of motors and of unit forces along x and y at points."""
+    mechanism = system.mechanism
+    columns = [joint_coordinate(system, mechanism.motors[k].joint, q[None]).rows[0] for k in motors]
+    columns += [row for point in points for row in marker_place(system, system.marker(point), q[None])[1][0]]
+    return np.array(columns).reshape(-1, system.n).T
+
+
+def _inputs(mechanism: Mechanism, motors: Sequence[int], ports: Ports) -> tuple[Quantity, ...]:
+    units = mechanism.motor_units()
+    prescribed = {one.name: mechanism.joint(one.joint).slides for one in mechanism.prescribed}
+    return (
+        *(Quantity(mechanism.motors[k].name, units[k]) for k in motors),
+        *(Quantity(f"{point}.{axis}", "N") for point in ports.forces for axis in ("x", "y")),
+        *(Quantity(f"{name}_acceleration", "m/s^2" if prescribed[name] else "rad/s^2") for name in ports.prescribed),
+    )

@@ -8,7 +8,7 @@ and accelerations and multipliers follow from
 
     [M, Phi_q^T; Phi_q, 0] [da; dlambda] = [S du - D dv - K dq; -Phi''_q dq - Phi''_v dv]
 
-with dy'' = T da + y''_q dq + y''_v dv. Coordinates that are driven have rows of their own among Phi'', their dy'' given.
+with dy'' = T da + y''_q dq + y''_v dv. Coordinates that are driven have rows among Phi'' too, their dy'' given.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ class Minimal:
     @cached_property
     def directions(self) -> Array:
         """Z (n, f): how all coordinates change with each y."""
-        return self._coordinates(np.eye(self.system.n)[:, self.system.n - self.chosen.count :])
+        return self._coordinates(np.eye(self.system.n)[:, self.system.n - self.chosen.freedoms :])
 
     @cached_property
     def changes(self) -> Changes:
@@ -126,10 +126,12 @@ class Minimal:
             still = np.zeros((self.chosen.bodies.size, Z.shape[1]))
             turned = -self._coordinates(np.vstack([self.constraints.rate @ Z, self.joints.rate @ Z, still]))
         q, v = np.hstack([Z, np.zeros_like(Z)]), np.hstack([turned, Z])
-        forces = np.hstack([-(whole.damping @ v + whole.stiffness @ q), self.forces, np.zeros((self.system.n, self.driven))])
+        forces = np.hstack(
+            [-(whole.damping @ v + whole.stiffness @ q), self.forces, np.zeros((self.system.n, self.driven))]
+        )
         held = self._held(q, v, forces.shape[1])
         a, kept = self._accelerations(forces, held)
-        second = np.zeros((self.chosen.count, a.shape[1]))
+        second = np.zeros((self.chosen.freedoms, a.shape[1]))
         moved = self.joints.second_place @ q + self.joints.second_rate @ v
         second[: moved.shape[0]] = self.joints.jacobian @ a
         second[: moved.shape[0], : moved.shape[1]] += moved
@@ -143,7 +145,7 @@ class Minimal:
     def _held_rows(self) -> RowTangents:
         """Rows whose second derivatives are given: constraints, and coordinates that are driven."""
         driven = self.joints.taken(np.arange(self.chosen.joints.size - self.driven, self.chosen.joints.size))
-        return RowTangents(*(np.concatenate(parts) for parts in zip(self.constraints, driven, strict=True)))
+        return self.constraints.with_rows(driven)
 
     def _held(self, q: Array, v: Array, columns: int) -> Array:
         """Phi_q da as states and inputs want it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,7 +22,6 @@ from paraflex.linear.minimal import Minimal
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
 if TYPE_CHECKING:
-    import control
     import xarray as xr
 
 Complex = NDArray[np.complex128]
@@ -44,6 +44,8 @@ class LinearModel:
     mechanism, mode : str
     about : str
         What the model is about: "a pose at rest", "static equilibrium", "a planned motion", "a run".
+    unbalanced : float
+        Of a pose at rest: what the mechanism would start with if let go [m/s^2]; forces that do not change hold it.
     states, inputs, outputs : tuple of Quantity
         Names and units.
     minimal : Minimal
@@ -57,6 +59,7 @@ class LinearModel:
     mechanism: str
     mode: str
     about: str
+    unbalanced: float
     states: tuple[Quantity, ...]
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
@@ -75,24 +78,24 @@ class LinearModel:
         return self.minimal.point.at_rest
 
     @cached_property
-    def A(self) -> Array:  # noqa: N802
+    def A(self) -> Array:
         """State matrix (2f, 2f)."""
         second, f = self.minimal.changes.second, len(self.states) // 2
         return np.vstack([np.eye(f, 2 * f, f), second[:, : 2 * f]])
 
     @cached_property
-    def B(self) -> Array:  # noqa: N802
+    def B(self) -> Array:
         """Input matrix (2f, inputs)."""
         second = self.minimal.changes.second[:, len(self.states) :][:, self.wanted[0]]
         return np.vstack([np.zeros_like(second), second])
 
     @cached_property
-    def C(self) -> Array:  # noqa: N802
+    def C(self) -> Array:
         """Output matrix (outputs, 2f)."""
         return self._outputs[0]
 
     @cached_property
-    def D(self) -> Array:  # noqa: N802
+    def D(self) -> Array:
         """Feed-through (outputs, inputs): of accelerations, strains and forces."""
         return self._outputs[1]
 
@@ -187,6 +190,22 @@ class LinearModel:
         squares = undamped_modes(mass, 0.5 * (stiffness + stiffness.T), self._typical)[0]
         return np.sqrt(np.maximum(squares, 0.0))
 
+    @checked_arguments()
+    def held_compliance(self, point: str, motors: Sequence[str] | None = None) -> Array:
+        """Displacement (2, 2) of a point along x and y under unit forces there along x and y, motors held [m/N].
+
+        Parameters
+        ----------
+        point : str
+            One of the `forces` of the model.
+        motors : sequence of str, optional
+            That are held: by default all that are inputs.
+        """
+        forces = self.select([f"{point}.{axis}" for axis in ("x", "y")])._force_rows
+        free = np.setdiff1d(np.arange(len(forces)), [self._joint_state(name) for name in self._motors(motors)])
+        stiffness = self._reduced[2][np.ix_(free, free)]
+        return np.asarray(forces[free].T @ scipy.linalg.solve(stiffness, forces[free]))
+
     def _motors(self, motors: Sequence[str] | None) -> list[str]:
         mechanism = self.minimal.system.mechanism
         if motors is None:
@@ -200,7 +219,10 @@ class LinearModel:
         names = [one.name for one in self.states]
         if joints[motor] not in names:
             raise InputError(
-                "moves only as other motors do", field="motors", value=motor, remedy="leave it out: it is held with them"
+                "moves only as other motors do",
+                field="motors",
+                value=motor,
+                remedy="leave it out: it is held with them",
             )
         return names.index(joints[motor])
 
@@ -210,7 +232,16 @@ class LinearModel:
         if self._is_vibrating and not np.any(self._modal_damping):
             root = np.sqrt(-squares.astype(complex))
             return _by_size(np.concatenate([root, -root]))
-        return _by_size(np.asarray(scipy.linalg.eigvals(self._scaled.A), dtype=complex))
+        A = self._scaled.A
+        # Free motions without damping have double poles, which an eigenvalue solver would take apart.
+        free = (
+            (squares == 0.0) & ~np.any(self._modal_damping, axis=1)
+            if self._is_vibrating
+            else np.zeros_like(squares, bool)
+        )
+        other = np.nonzero(~np.tile(free, 2))[0]
+        found = np.asarray(scipy.linalg.eigvals(A[np.ix_(other, other)]), dtype=complex)
+        return _by_size(np.concatenate([np.zeros(2 * int(free.sum()), dtype=complex), found]))
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
         """Transmission zeros between some inputs and some outputs, by default all, by magnitude [rad/s].
@@ -225,7 +256,9 @@ class LinearModel:
         if displacements is None:
             return zeros(chosen._scaled, shift)
         squares, shapes = chosen._modes
-        return vibrating_zeros(Vibrating(squares, chosen._modal_damping, shapes.T @ chosen._force_rows, displacements @ shapes), shift)
+        return vibrating_zeros(
+            Vibrating(squares, chosen._modal_damping, shapes.T @ chosen._force_rows, displacements @ shapes), shift
+        )
 
     @property
     def _force_rows(self) -> Array:
@@ -236,7 +269,7 @@ class LinearModel:
     def _displacements(self) -> Array | None:
         """What outputs (outputs, f) are of y, or derivatives of that; None where one is more than that."""
         rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
-        parts = [np.asarray((part @ self.minimal.directions)) for part in (rows.q, rows.v, rows.a)]
+        parts = [np.asarray(part @ self.minimal.directions) for part in (rows.q, rows.v, rows.a)]
         mixed = np.sum([np.any(part, axis=1) for part in parts], axis=0) != 1
         if np.any(mixed) or rows.multipliers.nnz or rows.torques.nnz or self.minimal.driven:
             return None
@@ -283,7 +316,7 @@ class LinearModel:
         """The model as SciPy's."""
         return scipy.signal.StateSpace(self.A, self.B, self.C, self.D)
 
-    def to_control(self) -> control.StateSpace:
+    def to_control(self) -> Any:
         """The model as python-control's; dots and spaces in names become underscores, as it takes none.
 
         Raises
@@ -292,7 +325,7 @@ class LinearModel:
             python-control is not installed.
         """
         try:
-            import control
+            control = importlib.import_module("control")
         except ImportError:
             raise InputError(
                 "python-control is not installed", field="to_control",
@@ -305,12 +338,13 @@ class LinearModel:
         """A, B, C and D by names of states, inputs and outputs, with units."""
         import xarray as xr
 
-        data = {"A": (("state", "state_of"), self.A), "B": (("state", "input"), self.B),
-                "C": (("output", "state_of"), self.C), "D": (("output", "input"), self.D)}  # fmt: skip
-        names = {key: [one.name for one in values] for key, values in
-                 (("state", self.states), ("state_of", self.states), ("input", self.inputs), ("output", self.outputs))}  # fmt: skip
-        units = {f"{key}_unit": (key, [one.unit for one in values]) for key, values in
-                 (("state", self.states), ("input", self.inputs), ("output", self.outputs))}  # fmt: skip
+        named = {"state": self.states, "state_of": self.states, "input": self.inputs, "output": self.outputs}
+        names = {key: [one.name for one in values] for key, values in named.items()}
+        units = {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
+        data = {
+            "A": (("state", "state_of"), self.A), "B": (("state", "input"), self.B),
+            "C": (("output", "state_of"), self.C), "D": (("output", "input"), self.D),
+        }  # fmt: skip
         attrs: dict[str, Any] = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}
         return xr.Dataset(data, coords=names | units, attrs=attrs)
 

@@ -29,7 +29,7 @@ _FURTHEST = 0.1
 
 
 class StateSpace(NamedTuple):
-    """x' = A x + B u, y = C x + D u, with states scaled such that entries of A are of the size of angular frequencies."""
+    """x' = A x + B u, y = C x + D u, states scaled such that entries of A are of the size of angular frequencies."""
 
     A: Array
     B: Array

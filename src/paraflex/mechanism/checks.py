@@ -115,7 +115,7 @@ def check_assemblies(mechanism: Members) -> None:
             finite([angle], f"assembly.{assembly.name}.{name}")
         for ref, place in assembly.points.items():
             field = f"assembly.{assembly.name}.points"
-            _known_point(mechanism, ref, field)
+            known_point(mechanism, ref, field)
             finite(place, f"{field}.{ref}")
             _on_body(ref, field, "the places of ground points are given in [ground]")
         # It names the body that neither angles nor points place.
@@ -140,7 +140,7 @@ def check_task(mechanism: Members) -> None:
     """Check that the end-effector is a point of a body."""
     if mechanism.end_effector is not None:
         point, field = mechanism.end_effector.point, "end_effector.point"
-        _known_point(mechanism, point, field)
+        known_point(mechanism, point, field)
         _on_body(point, field, "the end-effector is a point of the ground, which does not move")
 
 
@@ -160,7 +160,7 @@ def _check_points_of(mechanism: Members, group: Group, member: Any) -> None:
         _two_bodies(mechanism, member.a, member.b, f"{field}.points", f"a {group.word}", remedy)
     for name, point in points.items():
         if name not in ("a", "b"):
-            _known_point(mechanism, point, f"{field}.{name}")
+            known_point(mechanism, point, f"{field}.{name}")
             _on_body(point, f"{field}.{name}", "the ground does not move")
     check_numbers(member, field)
 
@@ -228,8 +228,8 @@ def _check_strain(mechanism: Members, sensor: StrainGauge, field: str) -> None:
 
 
 def _two_bodies(mechanism: Members, a: PointRef, b: PointRef, field: str, what: str, remedy: str) -> None:
-    _known_point(mechanism, a, field)
-    _known_point(mechanism, b, field)
+    known_point(mechanism, a, field)
+    known_point(mechanism, b, field)
     if a.body == b.body:
         raise InputError(f"{what} needs two different bodies", field=field, value=f"{a}, {b}", remedy=remedy)
 
@@ -239,7 +239,8 @@ def _on_body(ref: PointRef, field: str, problem: str) -> None:
         raise InputError(problem, field=field, value=str(ref), remedy="name a body's point")
 
 
-def _known_point(mechanism: Members, ref: PointRef, field: str) -> None:
+def known_point(mechanism: Members, ref: PointRef, field: str) -> None:
+    """Check that the mechanism has a point."""
     points = mechanism.points
     known(ref.body, points, field, "body")
     if ref.point not in points[ref.body]:
