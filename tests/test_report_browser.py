@@ -5,6 +5,7 @@ from collections import Counter
 import pytest
 from playwright.sync_api import Page
 
+from colours import APART, colour_distance
 from conftest import DESKTOP, PHONE
 from paraflex.report import Chart, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
@@ -152,6 +153,16 @@ def test_a_table_on_a_phone_says_that_it_scrolls(opened):
     assert not wide.locator("#part-modes .swipe").is_visible()
 
 
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_link_has_the_colour_of_the_trail_or_the_path(opened, theme):
+    page = opened()
+    page.evaluate("(name) => report.setTheme(name)", theme)
+    links = page.evaluate("report.palette()")
+    for name in ("trail", "text"):
+        own = page.evaluate("(name) => report.colour(name)", name)
+        assert min(colour_distance(own, link) for link in links) > APART
+
+
 def test_charts_below_the_screen_wait_until_they_are_seen(opened):
     page = opened()
     described = page.evaluate("charts.all.length")
@@ -212,7 +223,7 @@ def test_the_magnifier_bends_links_more_and_leaves_joints_alone(opened):
     page = opened()
     page.evaluate("player.seek(0.02)")
     # It begins with a round number at which bending is seen.
-    assert page.evaluate("report.state.magnify === report.told.film.magnify && report.state.magnify > 1")
+    assert page.evaluate("report.state.magnify === report.page.film.magnify && report.state.magnify > 1")
     page.evaluate("report.set('magnify', 1)")
     true = drawn(page)
     page.locator("#magnify").fill("100")
@@ -275,7 +286,7 @@ def test_a_line_in_every_chart_goes_with_time(opened):
         box = page.locator("#chart-torques .cursor").bounding_box()
         assert box is not None
         places.append(box["x"])
-    plot = page.evaluate("charts.all.find((c) => c.told.identity === 'torques').plot._fullLayout.xaxis._length")
+    plot = page.evaluate("charts.all.find((c) => c.description.identity === 'torques').plot._fullLayout.xaxis._length")
     assert places[1] - places[0] == pytest.approx(0.4 * plot, rel=0.02)
     # In the plane a dot goes along the path.
     page.locator("#chart-path").scroll_into_view_if_needed()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.plots.designs import DesignTable, in_conflict
-from paraflex.report.curves import look
+from paraflex.report.curves import DOTTED, look
 from paraflex.report.page import Chart, Curve, DesignColumn, Designs, Look, Panel, Picker
 from paraflex.report.text import count
 
@@ -87,7 +87,7 @@ def _history(steps: Sequence[Step]) -> Chart:
     allowed = np.array([step.allowed for step in steps], dtype=bool)
     least = np.minimum.accumulate(np.where(allowed & np.isfinite(values), values, np.inf))
     curves = [
-        Curve("a design", values, numbers, Look(4, 2)),
+        Curve("a design", values, numbers, Look(dash=DOTTED)),
         Curve("least until then", np.where(np.isfinite(least), least, np.nan), numbers, Look(0)),
     ]
     known = values[np.isfinite(values)]
