@@ -142,6 +142,24 @@ def test_charts_wider_than_paper_are_printed_smaller_as_a_whole(opened):
     assert page.evaluate(size) == pytest.approx(wide)
 
 
+def test_charts_over_time_are_flat_on_paper_and_as_before_after_it(opened):
+    page = opened(viewport={"width": 2000, "height": 1100})
+    curves(page, "errors")
+    size = (
+        "((box) => [box.width, box.height])(document.querySelector('#chart-errors .main-svg').getBoundingClientRect())"
+    )
+    title = "document.querySelector('#chart-errors .js-plotly-plot')._fullLayout.yaxis.title.font.size"
+    before = [*page.evaluate(size), page.evaluate(title)]
+    assert before[0] > 700
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate(size) == pytest.approx([640, 200], abs=1)
+    assert page.evaluate(title) < before[2]
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    wait_for_drawing(page)
+    page.wait_for_function(f"{size}[0] > 700")
+    assert [*page.evaluate(size), page.evaluate(title)] == pytest.approx(before, abs=1)
+
+
 def test_a_table_on_a_phone_says_that_it_scrolls(opened):
     page = opened(viewport=PHONE)
     table = page.locator("#part-modes .scroll")

@@ -3,6 +3,8 @@ const charts = (() => {
   const { page, state, element } = report;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
+  // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
+  const PAPER = 640, LOW = 200, LOW_TITLE = 10;
   const all = [];
 
   // Plotly reads tags in text; names are not to be read so.
@@ -164,11 +166,21 @@ const charts = (() => {
     });
   }
 
-  // A chart keeps the size of the screen on paper; one that is wider is made smaller as a whole, else it would be cut.
-  const PAPER = 640;
+  // On paper charts over time are as wide as the page, three of them a page. One that is to keep its proportions is made
+  // smaller as a whole where it is wider, and so are parallel coordinates, once they are no wider than their names need.
   function fitToPaper(chart) {
+    if (!chart.plot._fullLayout) return;
+    const { drawer, equal, figure } = chart.description;
+    if (drawer === "parallel") {
+      const needed = Math.max(PAPER, parseFloat(chart.plot.style.minWidth));
+      Plotly.relayout(chart.plot, { width: Math.min(chart.plot._fullLayout.width, needed) });
+    } else if (!equal && !figure) {
+      Plotly.relayout(chart.plot, { width: PAPER, height: LOW, "yaxis.title.font.size": LOW_TITLE });
+      chart.plot.parentElement.style.height = `${LOW}px`;
+      return;
+    }
     const drawn = chart.plot._fullLayout;
-    if (!drawn || drawn.width <= PAPER) return;
+    if (drawn.width <= PAPER) return;
     chart.plot.style.zoom = PAPER / drawn.width;
     chart.plot.parentElement.style.height = `${Math.ceil(drawn.height * PAPER / drawn.width) + 2}px`;
   }
@@ -231,6 +243,14 @@ const charts = (() => {
     });
     addEventListener("afterprint", () => {
       for (const chart of all) chart.plot.style.zoom = chart.plot.parentElement.style.height = "";
+      refresh();
+      for (const { plot, drawn } of all) {
+        if (!drawn) continue;
+        // Plotly fits only charts without a size of their own.
+        delete plot.layout.width;
+        delete plot.layout.height;
+        Plotly.Plots.resize(plot);
+      }
     });
   }
 

@@ -156,7 +156,9 @@ const player = (() => {
     pen.font = `13px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "top"; pen.fillStyle = colours.soft;
     const run = page.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
     const by = state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
-    pen.fillText(`${run}t = ${secondsText(state.time)}${by}`, 12, 8);
+    const caption = `t = ${secondsText(state.time)}${by}`;
+    // On a narrow screen the buttons alone name the run.
+    pen.fillText(pen.measureText(run + caption).width < width - 24 ? run + caption : caption, 12, 8);
     if (stopped !== null) { pen.fillStyle = colours.mark; pen.fillText(`this run ended at ${secondsText(stopped)}`, 12, 27); }
   }
 
