@@ -125,17 +125,17 @@ pf.plots.link_motions(data, "++++").savefig("links.pdf")
 
 def main() -> None:
     """Make what is missing, draw everything, write the page."""
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("--results", type=Path, default=Path("results/gallery"), help="folder for results")
-    folder = asked.parse_args().results
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--results", type=Path, default=Path("results/gallery"), help="folder for results")
+    folder = parser.parse_args().results
     folder.mkdir(parents=True, exist_ok=True)
     drawn: set[str] = set()
     page = [INTRODUCTION]
     for kind, command in COMMANDS.items():
-        source = made(kind, command, folder)
+        source = results_of(kind, command, folder)
         if source.kind != kind:
             raise SystemExit(f"{source.folder} holds results of kind {source.kind}, not {kind}")
-        page.append(f"\n## {TITLES[kind]}\n\n`{told(command, kind)}`\n")
+        page.append(f"\n## {TITLES[kind]}\n\n`{command_line(command, kind)}`\n")
         for figure in CATALOGUE[kind]:
             again = figure.name in drawn
             page.append(entry(figure, source, again=again))
@@ -143,7 +143,7 @@ def main() -> None:
     (DOCS / "gallery.md").write_text("\n".join(page), encoding="utf-8")
 
 
-def made(kind: str, command: list[str], folder: Path) -> Source:
+def results_of(kind: str, command: list[str], folder: Path) -> Source:
     """Results of a kind; made by their command if they are not there."""
     place = folder / ("modes.json" if kind == "modes" else kind)
     if not place.exists():
@@ -158,7 +158,7 @@ def made(kind: str, command: list[str], folder: Path) -> Source:
     return open_source(place)
 
 
-def told(command: list[str], kind: str) -> str:
+def command_line(command: list[str], kind: str) -> str:
     """A command as one would type it."""
     shown = command[: command.index("--tol")] if "--tol" in command else command
     return "paraflex " + " ".join(part.format(kind) for part in shown) + (" > modes.json" if kind == "modes" else "")
@@ -168,14 +168,14 @@ def entry(figure: CatalogueFigure, source: Source, *, again: bool) -> str:
     """A figure's part of the page; its file is written, unless it was with other results."""
     if figure not in figures_of(source):
         raise SystemExit(f"{figure.name} cannot be drawn of {source.folder}")
-    says = f"### {figure.name}\n\n{figure.shows[0].upper()}{figure.shows[1:]}"
+    text = f"### {figure.name}\n\n{figure.shows[0].upper()}{figure.shows[1:]}"
     if again:
-        return f"{says}; as above.\n"
+        return f"{text}; as above.\n"
     drawing = drawings(source, figure)[0]
     (file,) = write_figures([drawing], IMAGES, ["png"], dpi=110.0, force=True)
     shrink(file)
     shown = file.rename(file.with_name(f"{figure.name}.png"))
-    return f"{says}.\n\n![{figure.name}](images/gallery/{shown.name})\n"
+    return f"{text}.\n\n![{figure.name}](images/gallery/{shown.name})\n"
 
 
 def shrink(file: Path) -> None:

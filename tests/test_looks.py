@@ -8,12 +8,14 @@ import xarray as xr
 from matplotlib.figure import Figure
 from scipy.interpolate import CubicSpline
 
+from colours import APART, colour_distance
 from paraflex.plots.labels import three_digits
 from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.runs import draw_curves
 from paraflex.plots.scene import MAGNIFICATIONS, default_magnification, followed_station
 from paraflex.plots.selection import moving_directions
 from paraflex.plots.style import journal_style
+from paraflex.plots.themes import THEMES
 from paraflex.results.outlines import Hold, Outline, stiff_shape
 
 
@@ -139,3 +141,8 @@ def test_an_axis_along_which_nothing_moves_has_no_panel() -> None:
     )
     assert moving_directions(run) == ["x"]
     assert moving_directions(0.0 * run) == ["x", "y"]
+
+
+@pytest.mark.parametrize("look", THEMES.values(), ids=THEMES)
+def test_no_link_is_drawn_in_the_colour_of_the_trail_or_the_path(look) -> None:
+    assert min(colour_distance(own, link) for own in (look.trail, look.desired) for link in look.links) > APART

@@ -5,6 +5,7 @@ from collections import Counter
 import pytest
 from playwright.sync_api import Page
 
+from colours import APART, colour_distance
 from conftest import DESKTOP, PHONE
 from paraflex.report import Chart, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
@@ -141,6 +142,24 @@ def test_charts_wider_than_paper_are_printed_smaller_as_a_whole(opened):
     assert page.evaluate(size) == pytest.approx(wide)
 
 
+def test_charts_over_time_are_flat_on_paper_and_as_before_after_it(opened):
+    page = opened(viewport={"width": 2000, "height": 1100})
+    curves(page, "errors")
+    size = (
+        "((box) => [box.width, box.height])(document.querySelector('#chart-errors .main-svg').getBoundingClientRect())"
+    )
+    title = "document.querySelector('#chart-errors .js-plotly-plot')._fullLayout.yaxis.title.font.size"
+    before = [*page.evaluate(size), page.evaluate(title)]
+    assert before[0] > 700
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate(size) == pytest.approx([640, 200], abs=1)
+    assert page.evaluate(title) < before[2]
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    wait_for_drawing(page)
+    page.wait_for_function(f"{size}[0] > 700")
+    assert [*page.evaluate(size), page.evaluate(title)] == pytest.approx(before, abs=1)
+
+
 def test_a_table_on_a_phone_says_that_it_scrolls(opened):
     page = opened(viewport=PHONE)
     table = page.locator("#part-modes .scroll")
@@ -150,6 +169,16 @@ def test_a_table_on_a_phone_says_that_it_scrolls(opened):
     page.wait_for_function("!document.querySelector('#part-modes .scroll').classList.contains('goes-on')")
     wide = opened(viewport={"width": 1560, "height": 900})
     assert not wide.locator("#part-modes .swipe").is_visible()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_link_has_the_colour_of_the_trail_or_the_path(opened, theme):
+    page = opened()
+    page.evaluate("(name) => report.setTheme(name)", theme)
+    links = page.evaluate("report.palette()")
+    for name in ("trail", "text"):
+        own = page.evaluate("(name) => report.colour(name)", name)
+        assert min(colour_distance(own, link) for link in links) > APART
 
 
 def test_charts_below_the_screen_wait_until_they_are_seen(opened):
@@ -212,7 +241,7 @@ def test_the_magnifier_bends_links_more_and_leaves_joints_alone(opened):
     page = opened()
     page.evaluate("player.seek(0.02)")
     # It begins with a round number at which bending is seen.
-    assert page.evaluate("report.state.magnify === report.told.film.magnify && report.state.magnify > 1")
+    assert page.evaluate("report.state.magnify === report.page.film.magnify && report.state.magnify > 1")
     page.evaluate("report.set('magnify', 1)")
     true = drawn(page)
     page.locator("#magnify").fill("100")
@@ -275,7 +304,7 @@ def test_a_line_in_every_chart_goes_with_time(opened):
         box = page.locator("#chart-torques .cursor").bounding_box()
         assert box is not None
         places.append(box["x"])
-    plot = page.evaluate("charts.all.find((c) => c.told.identity === 'torques').plot._fullLayout.xaxis._length")
+    plot = page.evaluate("charts.all.find((c) => c.description.identity === 'torques').plot._fullLayout.xaxis._length")
     assert places[1] - places[0] == pytest.approx(0.4 * plot, rel=0.02)
     # In the plane a dot goes along the path.
     page.locator("#chart-path").scroll_into_view_if_needed()

@@ -1,4 +1,4 @@
-"""Loads in the results of every run: joints, drives, the ground, stresses, and where they are told."""
+"""Loads in the results of every run: joints, drives, the ground, stresses, and where they are reported."""
 
 from __future__ import annotations
 
@@ -88,13 +88,13 @@ def test_every_effort_has_its_unit():
     )
     run = simulate_motion(mechanism, 0.1, samples=3, torques={"lift": 5.0, "turn": 0.2}, options=OPTIONS)
     data = motion_dataset(run)
-    told = load_figures(data)
+    loads = load_figures(data)
     units = {
-        name: (one["torque_unit"], one["speed_unit"]) for name, one in {**told["motors"], **told["drives"]}.items()
+        name: (one["torque_unit"], one["speed_unit"]) for name, one in {**loads["motors"], **loads["drives"]}.items()
     }
     turns, slides = ("N m", "rad/s"), ("N", "m/s")
     assert units == {"lift": slides, "turn": turns, "push": slides, "spin": turns}
-    push, spin = effort_lines(told)
+    push, spin = effort_lines(loads)
     assert push.startswith("drive push: force up to ")
     assert " N, speed up to 2 m/s, power up to " in push
     assert spin.startswith("drive spin: torque up to ")
@@ -180,13 +180,13 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
     assert most == pytest.approx(data["stress"].sel(body="rod").max().item(), rel=1e-6)
     assert data["safety_factor"].sel(body="rod").item() == pytest.approx(3e7 / most)
     assert np.isnan(data["stress_max"].sel(body="crank").item())
-    told = motion_summary(data)["loads"]
-    assert told["beams"]["rod"]["stress_max"] == most
-    assert set(told) == {"beams", "joints", "motors", "drives", "frame"}
-    assert list(told["beams"]) == ["rod"]
-    assert "MPa in rod at" in stress_line({"": told})
+    loads = motion_summary(data)["loads"]
+    assert loads["beams"]["rod"]["stress_max"] == most
+    assert set(loads) == {"beams", "joints", "motors", "drives", "frame"}
+    assert list(loads["beams"]) == ["rod"]
+    assert "MPa in rod at" in stress_line({"": loads})
     # Below one, which is said three times.
-    assert told["beams"]["rod"]["safety_factor"] < 1.0
+    assert loads["beams"]["rod"]["safety_factor"] < 1.0
     assert "stress-over-strength" in {one.code for one in crank.doubts}
     page = motion_page(data)
     tables = dict(page.more)

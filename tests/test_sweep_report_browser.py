@@ -45,7 +45,7 @@ def report(tmp_path_factory):
 def traces(page: Page, chart: str) -> list[dict]:
     """What Plotly draws in a chart, once it is drawn."""
     page.locator(f"#chart-{chart}").scroll_into_view_if_needed()
-    page.wait_for_function("(id) => charts.all.find((c) => c.told.identity === id).drawn", arg=chart)
+    page.wait_for_function("(id) => charts.all.find((c) => c.description.identity === id).drawn", arg=chart)
     wait_for_drawing(page)
     return page.evaluate(
         """(id) => document.querySelector(`#chart-${id} .js-plotly-plot`).data.map((trace) => ({
@@ -60,7 +60,7 @@ def traces(page: Page, chart: str) -> list[dict]:
 def values(page: Page, identity: str) -> list[float]:
     """A column of all designs."""
     return page.evaluate(
-        "(name) => Array.from(report.row(report.told.designs.columns.find((c) => c.identity === name).row))", identity
+        "(name) => Array.from(report.row(report.page.designs.columns.find((c) => c.identity === name).row))", identity
     )
 
 
@@ -140,7 +140,7 @@ def test_a_design_chosen_moves_and_is_ringed(opened):
     page.wait_for_function("report.state.time > 0.031")
     assert drawn(page) != still
     # A mark of a run that is shown selects it.
-    page.evaluate("designs.choose({ customdata: Array.from(report.row(report.told.designs.shown)).indexOf(1) })")
+    page.evaluate("designs.choose({ customdata: Array.from(report.row(report.page.designs.shown)).indexOf(1) })")
     assert page.evaluate("report.state.run") == 1
 
 

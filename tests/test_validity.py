@@ -277,7 +277,7 @@ def test_further_modes_with_the_same_doubt_share_a_line():
     assert doubt_lines([one, gravity, other, third]) == [
         "warning: mode a: too far; go back [validity]",
         "warning: gravity: odd; look [gravity]",
-        "warning: so is mode b, c [validity]",
+        "warning: the same in mode b, c [validity]",
     ]
 
 

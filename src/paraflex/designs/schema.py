@@ -13,6 +13,8 @@ from paraflex.files.read import naming, read_toml, validate
 from paraflex.files.schema import Count, Number, NumberOfFields, Text, Yes
 
 T = TypeVar("T", bound=BaseModel)
+# Name of a study whose file gives none.
+DEFAULT_NAME = "sweep"
 
 
 class Table(BaseModel):
@@ -60,7 +62,7 @@ class IntegrationTable(Table):
 class SweepTable(Table):
     """A study file."""
 
-    name: Text = Field(default="sweep", description="a name for the study")
+    name: Text = Field(default=DEFAULT_NAME, description="a name for the study")
     mechanism: Text = Field(description="a library mechanism or a file, seen from the study file's folder")
     set: dict[str, Any] = Field(default={}, description="values in place of the mechanism's file, by field")
     paths: list[Text] = Field(default=[], description="paths of the mechanism's file by name")

@@ -103,15 +103,19 @@ class DisplayUnit(NamedTuple):
 _PREFIXES = {
     "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
     "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
+    "Pa": (DisplayUnit("GPa", 1e-9), DisplayUnit("MPa", 1e-6), DisplayUnit("Pa", 1.0)),
 }
+# The largest value of a unit is at least so many: stresses are in MPa, moduli in GPa.
+_LEAST, _LEAST_OF = 0.1, {"GPa": 2.0}
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """The unit in which the largest of lengths ("m") or angles ("rad") has few digits; any other unit as it is."""
+    """The unit in which the largest of lengths, angles or stresses has few digits: "m", "rad", "Pa"; others stay."""
     largest, choices = peak(values), _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
     if largest == 0.0:
         return choices[0]
-    return next((choice for choice in choices if largest * choice.factor >= 0.1), choices[-1])
+    fits = (one for one in choices if largest * one.factor >= _LEAST_OF.get(one.name, _LEAST))
+    return next(fits, choices[-1])
 
 
 def peak(values: ArrayLike) -> float:

@@ -43,6 +43,18 @@ def load_tables(data: xr.Dataset, selected: str = "") -> list[tuple[str, str]]:
     return out
 
 
+def stress_tile(data: xr.Dataset) -> list[tuple[str, str, str]]:
+    """The main number of the beams' stresses: the largest, and where; none of earlier results."""
+    stress = data.get("stress", xr.DataArray(np.nan))
+    most = stress.max()
+    if not most > 0.0:
+        return []
+    where = stress.where(stress == most, drop=True)
+    body = text_symbol(str(where["body"].values[0]))
+    mode = f", mode {where['mode'].values[0]}" if data.sizes.get("mode", 1) > 1 else ""
+    return [("largest stress", f"{number(float(most), _MEGA)} MPa", body + mode)]
+
+
 def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
     rows = [(mode, body, one) for mode, each in figures.items() for body, one in each.get("beams", {}).items()]
     note = "Bending in the outermost fibre; stress: bending and axial together, with place and time of the largest."
@@ -59,14 +71,16 @@ def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
     elif any(one["axial_stress_max"] is None for _, _, one in rows):
         note += " Coordinates of a beam without axial stress do not stretch: its stress is of bending alone."
     several = len(figures) > 1
+    strengths = any(one["safety_factor"] is not None for _, _, one in rows)
     heads = [("mode" if several else "beam", ""), *([("beam", "")] if several else []),
              ("stress", "[MPa]"), ("at", "[m]"), ("time", "[s]"), ("bending", "[MPa]"), ("axial", "[MPa]"),
-             ("safety", "factor")]  # fmt: skip
+             *([("safety", "factor")] if strengths else [])]  # fmt: skip
     cells = [
         (mode if several else text_symbol(body), [
             *([text_symbol(body)] if several else []),
             number(one["stress_max"], _MEGA), number(one["place"]), number(one["time"]),
-            number(one["bending_stress_max"], _MEGA), number(one["axial_stress_max"], _MEGA), _factor(one),
+            number(one["bending_stress_max"], _MEGA), number(one["axial_stress_max"], _MEGA),
+            *([_factor(one)] if strengths else []),
         ])
         for mode, body, one in rows
     ]  # fmt: skip

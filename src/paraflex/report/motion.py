@@ -12,7 +12,7 @@ from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.curves import TIPS, bending, energies, energy_scale, followed, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.loads import load_panel, load_tables
+from paraflex.report.loads import load_panel, load_tables, stress_tile
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import count, number, pairs, quantity
@@ -156,7 +156,13 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
         for choice, members in kinds:
             if members:
                 curves += [
-                    Curve(names[k].removeprefix(f"{body}."), values[k], run=0, choice=len(choices), look=look(i))
+                    Curve(
+                        text_symbol(names[k].removeprefix(f"{body}.")),
+                        values[k],
+                        run=0,
+                        choice=len(choices),
+                        look=look(i),
+                    )
                     for i, k in enumerate(members)
                 ]
                 choices.append(choice)
@@ -183,8 +189,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         tiles.append(
             ("largest joint force", f"{number(largest(force))} N", text_symbol(str(data["joint"].values[joint])))
         )
-    tiles.append(("computed in", f"{number(data['wall_time'].item())} s", f"{count(data['steps'].item())} steps"))
-    return tiles
+    return [*tiles, *stress_tile(data)]
 
 
 def _last_time(data: xr.Dataset) -> float:

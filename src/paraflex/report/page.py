@@ -209,8 +209,8 @@ class Page:
         The command that gives these results again, below them; empty where it is not known.
     figures : sequence of (str, str, str)
         The few numbers that matter: name, value, and what it is of.
-    tables, more : sequence of (str, str)
-        Headings and HTML of what stands before the charts and after them; see `text.table`.
+    summary, tables, more : sequence of (str, str)
+        Headings and HTML of what stands before all charts, before those over time, and after them; see `text.table`.
     survey : sequence of Panel
         Charts before the tables: what all designs do.
     designs : Designs, optional
@@ -241,6 +241,7 @@ class Page:
     facts: Sequence[tuple[str, str]] = ()
     command: str = ""
     figures: Sequence[tuple[str, str, str]] = ()
+    summary: Sequence[tuple[str, str]] = ()
     tables: Sequence[tuple[str, str]] = ()
     more: Sequence[tuple[str, str]] = ()
     survey: Sequence[Panel] = ()
@@ -268,6 +269,7 @@ def render(page: Page) -> str:
         origin=_origin(page),
         figures=_figures(page.figures),
         notes=_notes(page.notes) + _paragraphs(page.remarks, "notice remark"),
+        summary=_sections(page.summary),
         tables=_sections(page.tables),
         more=_sections(page.more),
         no_film=escape(page.no_film),
@@ -371,6 +373,7 @@ def _anchor(heading: str) -> str:
 def _contents(page: Page) -> str:
     """Links to the parts of the page, in their order."""
     parts = [
+        *((heading, _anchor(heading)) for heading, _ in page.summary),
         *([("All designs", "survey")] if page.survey else []),
         *((heading, _anchor(heading)) for heading, _ in page.tables),
         *([("Animation and charts", "moving")] if page.panels else []),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.plots.designs import DesignTable, in_conflict
-from paraflex.report.curves import look
+from paraflex.report.curves import DOTTED, look
 from paraflex.report.page import Chart, Curve, DesignColumn, Designs, Look, Panel, Picker
 from paraflex.report.text import count
 
@@ -25,18 +25,23 @@ class Step(NamedTuple):
 
 
 def survey(
-    designs: DesignTable, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], history: Sequence[Step]
+    designs: DesignTable,
+    rows: NDArray[np.intp],
+    drawn: Sequence[DesignColumn],
+    history: Sequence[Step],
+    *,
+    seeks_least: bool = True,
 ) -> list[Panel]:
-    """Charts of all designs."""
+    """Charts of all designs; that of the front only where less is better in the metrics, not targets are to be met."""
     parameters = [k for k, column in enumerate(drawn) if column.parameter]
     metrics = [k for k, column in enumerate(drawn) if not column.parameter]
     place = {column.identity: k for k, column in enumerate(drawn)}
     charts = []
     if history:
-        charts.append(_history(history))
+        charts.append(_history(history, "objective" if seeks_least else "residual"))
     if parameters and metrics:
         charts += _responses(parameters, metrics)
-    if len(metrics) > 1:
+    if seeks_least and len(metrics) > 1:
         pair = [place[name] for name in in_conflict(designs, designs.judged)]
         first, second = pair if len(pair) == 2 else metrics[:2]
         charts.append(Chart(
@@ -80,19 +85,19 @@ def _drawn(designs: DesignTable, rows: NDArray[np.intp]) -> str:
     )
 
 
-def _history(steps: Sequence[Step]) -> Chart:
-    """Objectives of a search in the order of evaluation, and the least so far."""
+def _history(steps: Sequence[Step], goal: str) -> Chart:
+    """Objectives or residuals of a search in the order of evaluation, and the least so far."""
     numbers = np.array([step.number for step in steps], dtype=float)
     values = np.array([step.objective for step in steps], dtype=float)
     allowed = np.array([step.allowed for step in steps], dtype=bool)
     least = np.minimum.accumulate(np.where(allowed & np.isfinite(values), values, np.inf))
     curves = [
-        Curve("a design", values, numbers, Look(4, 2)),
+        Curve("a design", values, numbers, Look(dash=DOTTED)),
         Curve("least until then", np.where(np.isfinite(least), least, np.nan), numbers, Look(0)),
     ]
     known = values[np.isfinite(values)]
     wide = bool(known.size and known.min() > 0.0 and known.max() > 50.0 * known.min())
-    return Chart("history", "Convergence", "objective", curves, x="design", over_time=False, log=wide)
+    return Chart("history", "Convergence", goal, curves, x="design", over_time=False, log=wide)
 
 
 def drawn_designs(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -28,6 +28,7 @@ from paraflex.report.curves import (
 from paraflex.report.designs import columns, metric_name, reasons, shown_unit
 from paraflex.report.film import animation
 from paraflex.report.page import Page, Panel
+from paraflex.report.search import IDENTIFICATION, search_tables, search_tiles
 from paraflex.report.survey import LOWER, Step, drawn_designs, survey
 from paraflex.report.text import NO_VALUE, count, number, table
 
@@ -74,6 +75,8 @@ class StudyAccount:
         Runs made again, by row.
     failed : mapping of int to str
         Why others could not be.
+    found : mapping of str to object
+        Content of a search's `result.json`; empty for a sweep.
     history : sequence of Step
         Of a search.
     notes : sequence of str
@@ -87,8 +90,19 @@ class StudyAccount:
     facts: Sequence[tuple[str, str]] = ()
     runs: Mapping[int, xr.Dataset] = field(default_factory=dict)
     failed: Mapping[int, str] = field(default_factory=dict)
+    found: Mapping[str, Any] = field(default_factory=dict)
     history: Sequence[Step] = ()
     notes: Sequence[str] = ()
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the parameters."""
+        return {name: one.unit for name, one in self.parameters.items()}
+
+    @property
+    def seeks_least(self) -> bool:
+        """Whether less is better in the metrics: not where targets are to be met."""
+        return self.kind != IDENTIFICATION
 
 
 def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAccount) -> Page:
@@ -106,9 +120,8 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
     labels = [designs.label(row) for row in shown]
     data = side_by_side(list(shown.values()), labels) if shown else None
     rows = drawn_rows(designs, [one.row for one in picked])
-    units = {name: one.unit for name, one in account.parameters.items()}
     logarithmic = [name for name, one in account.parameters.items() if one.spread == "log"]
-    drawn = columns(designs, rows, units, logarithmic)
+    drawn = columns(designs, rows, account.units, logarithmic)
     few = None if data is None else thinned(data)
     missing = dict(account.failed) | dict.fromkeys(
         others, "it has other bodies, joints, motors or springs than the first"
@@ -119,11 +132,12 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
         subtitle=_subtitle(designs, account),
         facts=account.facts,
         figures=_tiles(designs, account),
-        survey=survey(designs, rows, drawn, account.history) if rows.size else [],
+        summary=search_tables(account.found, account.units, designs.units),
+        survey=survey(designs, rows, drawn, account.history, seeks_least=account.seeks_least) if rows.size else [],
         designs=drawn_designs(designs, rows, drawn, {row: k for k, row in enumerate(shown)}) if rows.size else None,
-        tables=[("Best designs", _best_table(designs, picked, list(shown), units))] if picked else [],
+        tables=[_best_table(designs, picked, list(shown), account)] if picked else [],
         more=[("What was varied", _parameter_table(account)), *_trouble(designs)],
-        panels=[] if few is None else _panels(few, labels),
+        panels=[] if few is None else _panels(few, labels, account),
         time=[] if few is None else few["time"].values,
         runs=labels,
         selecting="design",
@@ -212,6 +226,8 @@ def _tiles(designs: DesignTable, account: StudyAccount) -> list[tuple[str, str, 
     rest = [f"{count(number)} {status}" for status, number in sorted(counts.items()) if status != "complete"]
     of = f"of {count(account.total)} runs" if account.total is not None else f"of {count(done)} runs"
     tiles = [("complete", f"{count(counts.get('complete', 0))}", ", ".join([of, *rest]))]
+    if account.found.get("values"):
+        return [*search_tiles(account.found, account.units, designs.units), *tiles]
     for name in designs.judged[:3]:
         values = designs.metrics[name]
         known = np.flatnonzero(designs.complete & np.isfinite(values))
@@ -223,25 +239,31 @@ def _tiles(designs: DesignTable, account: StudyAccount) -> list[tuple[str, str, 
     return tiles
 
 
-def _best_table(designs: DesignTable, picked: Sequence[Picked], shown: Sequence[int], units: Mapping[str, str]) -> str:
-    """The best designs: their numbers, metrics, and the metrics in which they are best."""
+def _best_table(
+    designs: DesignTable, picked: Sequence[Picked], shown: Sequence[int], account: StudyAccount
+) -> tuple[str, str]:
+    """Title and table of the best designs: their numbers, metrics, and the metrics in which they are best."""
+    title, why_head, note = (
+        ("Best designs", "best in", LOWER) if account.seeks_least else ("Designs shown", "which", "")
+    )
     named = [*((name, True) for name in designs.varied), *((name, False) for name in designs.judged)]
     heads, cells, keys = [("design", "")], {}, {}
     names = {row: designs.label(row) for row, _ in picked}
     for row, why in picked:
         cells[row], keys[row] = ["; ".join(why)], [int(designs.design[row]), None]
-    heads.append(("best in", ""))
+    heads.append((why_head, ""))
     for name, parameter in named[:_MOST_COLUMNS]:
         values = (designs.parameters if parameter else designs.metrics)[name]
-        unit, factor = shown_unit((units if parameter else designs.units).get(name, ""), values)
+        unit, factor = shown_unit((account.units if parameter else designs.units).get(name, ""), values)
         heads.append((name.replace("_", " ") if parameter else metric_name(name), f"[{unit}]" if unit else ""))
         for row, _ in picked:
             cells[row].append(number(values[row], factor))
             keys[row].append(float(values[row]))
     selects = {names[row]: k for k, row in enumerate(shown)}
-    note = f"{LOWER} A row chosen is shown in motion below and ringed in the charts." if shown else LOWER
-    return table(
-        heads, [(names[row], cells[row]) for row, _ in picked], caption="The best designs", note=note, runs=selects,
+    if shown:
+        note = f"{note} A row chosen is shown in motion below and ringed in the charts.".lstrip()
+    return title, table(
+        heads, [(names[row], cells[row]) for row, _ in picked], caption=title, note=note, runs=selects,
         keys={names[row]: keys[row] for row, _ in picked},
     )  # fmt: skip
 
@@ -278,7 +300,7 @@ def _not_shown(designs: DesignTable, missing: Mapping[int, str]) -> list[str]:
     return [f"{designs.label(row)} is not shown in motion: {reason}" for row, reason in missing.items()]
 
 
-def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
+def _panels(data: xr.Dataset, runs: list[str], account: StudyAccount) -> list[Panel]:
     """The runs shown in motion, over time."""
     data = data.transpose("mode", "time", ...)
     charts = [
@@ -289,4 +311,4 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     if bending(data).size:
         charts.append(followed(TIPS, bending(data), runs, selecting="design"))
     charts.append(compared(STRAIN, data["strain_energy"], runs))
-    return [Panel("The best designs in motion", charts)]
+    return [Panel(f"The {'best ' if account.seeks_least else ''}designs in motion", charts)]

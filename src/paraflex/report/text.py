@@ -86,7 +86,7 @@ def table(
         f'<th scope="col"{_WORD_CLASS if words else ""}>{escape(name)}{_small(unit)}</th>'
         for (name, unit), words in zip(heads, wordy, strict=True)
     )
-    body = "".join(_row(name, cells, runs.get(name), keys[name] if keys else None) for name, cells in rows)
+    body = "".join(_row(name, cells, wordy[1:], runs.get(name), keys[name] if keys else None) for name, cells in rows)
     sortable = _SORTABLE if keys else ""
     below = f'<p class="note">{escape(note)}</p>' if note else ""
     return (
@@ -105,20 +105,22 @@ def _small(text: str) -> str:
     return f"<small>{escape(text)}</small>" if text else ""
 
 
-def _row(name: str, cells: Sequence[str], run: int | None, keys: Sequence[float | str | None] | None) -> str:
-    """A row; that of a run of the page is a button, keys are for sorting."""
+def _row(
+    name: str, cells: Sequence[str], wordy: Sequence[bool], run: int | None, keys: Sequence[float | str | None] | None
+) -> str:
+    """A row, columns of words as such; that of a run of the page is a button, keys are for sorting."""
     about, head = "", escape(name)
     if run is not None:
         about, head = f' data-run="{run}"', f'<button type="button" class="pick">{head}</button>'
     if keys is not None:
         plain = [None if isinstance(key, float) and not math.isfinite(key) else key for key in keys]
         about += f' data-keys="{escape(json.dumps(plain))}"'
-    return f'<tr{about}><th scope="row">{head}</th>{"".join(map(_cell, cells))}</tr>'
+    return f'<tr{about}><th scope="row">{head}</th>{"".join(map(_cell, cells, wordy))}</tr>'
 
 
-def _cell(text: str) -> str:
+def _cell(text: str, words: bool) -> str:
     first, _, second = text.partition("\n")
-    return f"<td{_WORD_CLASS if _is_words(text) else ''}>{escape(first)}{_small(second)}</td>"
+    return f"<td{_WORD_CLASS if words else ''}>{escape(first)}{_small(second)}</td>"
 
 
 def _is_words(text: str) -> bool:

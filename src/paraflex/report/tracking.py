@@ -31,7 +31,7 @@ from paraflex.report.curves import (
     torque_unit,
 )
 from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.loads import load_panel, load_tables
+from paraflex.report.loads import load_panel, load_tables, stress_tile
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
@@ -253,9 +253,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
         most = int(np.nanargmax(deflections))
         tiles.append(("largest deflection", quantity(deflections[most], "m"), _name(data, most)))
-    total = float(np.nansum(data["wall_time"].values))
-    tiles.append(("computed in", f"{number(total)} s", f"{data.sizes['mode']} runs" if several else "one run"))
-    return tiles
+    return [*tiles, *stress_tile(data)]
 
 
 def _name(data: xr.Dataset, run: int) -> str:

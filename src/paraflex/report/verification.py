@@ -124,19 +124,21 @@ def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str, wid
     """Every model in a mode of a mechanism whose path reaches so far from the origin [m]."""
     models = mode["models"]
     unit = display_unit("m", np.array([one.get("tracking_error") or np.nan for one in models.values()]))
+    away = display_unit("m", np.array([one.get("distance_max") or np.nan for one in models.values()]))
     heads = [
         ("model", ""), ("status", ""), ("tracking error", f"RMS [{unit.name}]"),
-        (f"from {printed(reference)}", "largest, RMS [m]"), ("finer step", "changes it by [m]"),
-        ("finer mesh", "changes it by [m]"), ("imbalance", "of energy [J]"), ("steps", ""), ("wall time", "[s]"),
-        ("method", ""),
+        (f"from {printed(reference)}", f"largest, RMS [{away.name}]"),
+        ("finer step", f"changes it by [{away.name}]"),
+        ("finer mesh", f"changes it by [{away.name}]"), ("imbalance", "of energy [J]"), ("steps", ""),
+        ("wall time", "[s]"), ("method", ""),
     ]  # fmt: skip
     rows = [
         (printed(model), [
             one["status"],
             number(one.get("tracking_error"), unit.factor, beside=wide),
-            "\n".join(number(one.get(key), beside=wide) for key in ("distance_max", "distance_rms")),
-            number(one.get("change_with_finer_step"), beside=wide),
-            number(one.get("change_with_finer_mesh"), beside=wide),
+            "\n".join(number(one.get(key), away.factor, beside=wide) for key in ("distance_max", "distance_rms")),
+            number(one.get("change_with_finer_step"), away.factor, beside=wide),
+            number(one.get("change_with_finer_mesh"), away.factor, beside=wide),
             number(one.get("energy_balance_max")),
             count(one.get("steps")),
             number(one.get("wall_time")),
@@ -150,13 +152,16 @@ def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str, wid
 
 
 def _distances(mode: Mapping[str, Any], wide: float) -> str:
-    names = list(mode["distances"])
+    distances = mode["distances"]
+    names = list(distances)
+    unit = display_unit("m", [distances[a][b] or np.nan for a in names for b in names if a != b])
     rows = [
-        (printed(a), [NO_VALUE if a == b else number(mode["distances"][a][b], beside=wide) for b in names])
+        (printed(a), [NO_VALUE if a == b else number(distances[a][b], unit.factor, beside=wide) for b in names])
         for a in names
     ]  # fmt: skip
-    return table([("[m]", ""), *((printed(name), "") for name in names)], rows, caption="Distances between models",
-                 note="Largest distance between the paths of two models.")  # fmt: skip
+    heads = [(f"[{unit.name}]", ""), *((printed(name), "") for name in names)]
+    note = "Largest distance between the paths of two models."
+    return table(heads, rows, caption="Distances between models", note=note)
 
 
 def _differences(mode: Mapping[str, Any], links: Sequence[str], reference: str) -> str:

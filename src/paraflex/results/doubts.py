@@ -37,4 +37,6 @@ def doubt_lines(verdict: Iterable[Finding]) -> list[str]:
         if whose:
             further[one.code] = []
         lines.append(f"{_LEVEL_WORDS[one.level]}: {one}")
-    return lines + [f"warning: so is mode {', '.join(names)} [{code}]" for code, names in further.items() if names]
+    return lines + [
+        f"warning: the same in mode {', '.join(names)} [{code}]" for code, names in further.items() if names
+    ]

@@ -18,7 +18,8 @@ class ReportRequest:
     """What `paraflex report` is asked for."""
 
     results: Annotated[
-        str, Argument(metavar="RESULTS", help="A folder that run, verify, sweep or optimise wrote, or a file of it.")
+        str,
+        Argument(metavar="RESULTS", help="A folder of run, verify, sweep, optimise or identify, or a file of it."),
     ]
     output: Annotated[
         str | None, Option("--output", metavar="FILE", help="Default: report.html beside the results.")

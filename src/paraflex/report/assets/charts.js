@@ -1,8 +1,10 @@
 // Charts: drawn by Plotly when they come into view, again when what they show changes.
 const charts = (() => {
-  const { told, state, element } = report;
+  const { page, state, element } = report;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
+  // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
+  const PAPER = 640, LOW = 200, LOW_TITLE = 10;
   const all = [];
 
   // Plotly reads tags in text; names are not to be read so.
@@ -11,13 +13,13 @@ const charts = (() => {
   const isShown = (chart, curve) =>
     (curve.shown === null || curve.shown.includes(state.run)) && (curve.choice === null || curve.choice === chart.choice);
 
-  const isOwn = (chart) => Boolean(chart.told.figure || chart.told.drawer);
-  const ownFigure = (chart) => (chart.told.drawer ? designs.figure(chart) : chart.told.figure);
+  const isOwn = (chart) => Boolean(chart.description.figure || chart.description.drawer);
+  const ownFigure = (chart) => (chart.description.drawer ? designs.figure(chart) : chart.description.figure);
 
   function traces(chart) {
     const own = ownFigure(chart);
     if (own) return own.data;
-    const shown = chart.told.curves.filter((curve) => isShown(chart, curve));
+    const shown = chart.description.curves.filter((curve) => isShown(chart, curve));
     const beside = new Set(shown.filter((curve) => curve.run !== null).map((curve) => curve.run)).size > 1;
     return shown.map((curve) => {
       const chosen = beside && curve.run === state.run;
@@ -47,7 +49,7 @@ const charts = (() => {
   const MOST_DECADES = 5;
   function decades(chart) {
     let low = Infinity, high = 0;
-    for (const curve of chart.told.curves) {
+    for (const curve of chart.description.curves) {
       if (!isShown(chart, curve)) continue;
       for (const value of report.row(curve.y)) {
         if (value > 0 && value < low) low = value;
@@ -61,7 +63,7 @@ const charts = (() => {
   }
 
   function layout(chart) {
-    const { log, equal, over_time: overTime } = chart.told;
+    const { log, equal, over_time: overTime } = chart.description;
     const figure = ownFigure(chart);
     const common = {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false,
@@ -74,13 +76,13 @@ const charts = (() => {
     };
     if (figure) {
       const { xaxis, yaxis, noAxes, ...own } = figure.layout || {};
-      return { ...common, ...own, ...(noAxes ? {} : { xaxis: axis(chart.told.x, xaxis), yaxis: axis(chart.told.y, yaxis) }) };
+      return { ...common, ...own, ...(noAxes ? {} : { xaxis: axis(chart.description.x, xaxis), yaxis: axis(chart.description.y, yaxis) }) };
     }
     return {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
-      xaxis: axis(chart.told.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : {}),
-      yaxis: axis(chart.told.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), dtick: 1, tickformat: "~g" } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
+      xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : {}),
+      yaxis: axis(chart.description.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), dtick: 1, tickformat: "~g" } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
     };
   }
 
@@ -94,11 +96,11 @@ const charts = (() => {
     chart.stale = false;
     const first = !chart.drawn;
     chart.drawn = true;
-    await Plotly.react(chart.plot, traces(chart), layout(chart), { ...config, toImageButtonOptions: { filename: chart.told.identity, format: "svg" } });
+    await Plotly.react(chart.plot, traces(chart), layout(chart), { ...config, toImageButtonOptions: { filename: chart.description.identity, format: "svg" } });
     if (first) {
       chart.plot.on("plotly_afterplot", () => moveCursor(chart));
-      if (chart.told.drawer) chart.plot.on("plotly_click", (event) => designs.choose(event.points[0]));
-      else if (chart.told.over_time && !chart.told.figure) chart.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
+      if (chart.description.drawer) chart.plot.on("plotly_click", (event) => designs.choose(event.points[0]));
+      else if (chart.description.over_time && !chart.description.figure) chart.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
     }
     drawLegend(chart);
     moveCursor(chart);
@@ -116,7 +118,7 @@ const charts = (() => {
 
   function drawLegend(chart) {
     const byName = new Map();
-    for (const curve of chart.told.curves) {
+    for (const curve of chart.description.curves) {
       if (isShown(chart, curve)) byName.set(curve.name, [...(byName.get(curve.name) || []), curve]);
     }
     chart.legend.replaceChildren();
@@ -144,18 +146,18 @@ const charts = (() => {
       mark.style.visibility = shows ? "visible" : "hidden";
       if (shows) mark.style.transform = `translate(${xaxis._offset + x}px, ${yaxis._offset + y}px)`;
     };
-    if (chart.told.over_time) {
+    if (chart.description.over_time) {
       chart.cursor.style.height = `${yaxis._length}px`;
       put(chart.cursor, xaxis.d2p(state.time), 0);
       return;
     }
-    const curves = chart.told.curves.filter(
+    const curves = chart.description.curves.filter(
       (curve) => curve.run === state.run && isShown(chart, curve) && !chart.hidden.has(curve.name));
     while (chart.dots.length < curves.length) {
       chart.dots.push(element("div", { class: "dot" }));
       chart.plot.parentElement.append(chart.dots.at(-1));
     }
-    const [before, share] = report.between(report.row(told.time), state.time);
+    const [before, share] = report.between(report.row(page.time), state.time);
     chart.dots.forEach((dot, k) => {
       if (k >= curves.length) { dot.style.visibility = "hidden"; return; }
       const at = (row) => row[before] + (share ? share * (row[before + 1] - row[before]) : 0);
@@ -164,11 +166,21 @@ const charts = (() => {
     });
   }
 
-  // A chart keeps the size of the screen on paper; one that is wider is made smaller as a whole, else it would be cut.
-  const PAPER = 640;
+  // On paper charts over time are as wide as the page, three of them a page. One that is to keep its proportions is made
+  // smaller as a whole where it is wider, and so are parallel coordinates, once they are no wider than their names need.
   function fitToPaper(chart) {
+    if (!chart.plot._fullLayout) return;
+    const { drawer, equal, figure } = chart.description;
+    if (drawer === "parallel") {
+      const needed = Math.max(PAPER, parseFloat(chart.plot.style.minWidth));
+      Plotly.relayout(chart.plot, { width: Math.min(chart.plot._fullLayout.width, needed) });
+    } else if (!equal && !figure) {
+      Plotly.relayout(chart.plot, { width: PAPER, height: LOW, "yaxis.title.font.size": LOW_TITLE });
+      chart.plot.parentElement.style.height = `${LOW}px`;
+      return;
+    }
     const drawn = chart.plot._fullLayout;
-    if (!drawn || drawn.width <= PAPER) return;
+    if (drawn.width <= PAPER) return;
     chart.plot.style.zoom = PAPER / drawn.width;
     chart.plot.parentElement.style.height = `${Math.ceil(drawn.height * PAPER / drawn.width) + 2}px`;
   }
@@ -179,20 +191,20 @@ const charts = (() => {
     return window.Plotly && Promise.all(all.filter((chart) => chart.inView).map(draw));
   }
 
-  function make(described) {
+  function make(description) {
     const plot = element("div", { style: "width:100%;height:100%" });
-    const kind = described.drawer ? ` own ${described.drawer}` : described.figure ? " own" : described.equal ? " square" : "";
-    const holder = element("div", { class: `plot${kind}`, role: "img", "aria-label": `${described.title}: ${described.y} over ${described.x}` }, plot);
-    const chart = { told: described, plot, choice: 0, picked: described.pickers.map((picker) => picker.chosen), hidden: new Set(), dots: [], drawn: false, stale: true, inView: false };
-    const header = element("header", {}, element("h3", {}, described.title));
-    if (described.choices.length) {
-      const select = element("select", { "aria-label": `${described.title}: ${described.choosing}` });
-      described.choices.forEach((name, k) => select.append(new Option(name, k)));
+    const kind = description.drawer ? ` own ${description.drawer}` : description.figure ? " own" : description.equal ? " square" : "";
+    const holder = element("div", { class: `plot${kind}`, role: "img", "aria-label": `${description.title}: ${description.y} over ${description.x}` }, plot);
+    const chart = { description, plot, choice: 0, picked: description.pickers.map((picker) => picker.chosen), hidden: new Set(), dots: [], drawn: false, stale: true, inView: false };
+    const header = element("header", {}, element("h3", {}, description.title));
+    if (description.choices.length) {
+      const select = element("select", { "aria-label": `${description.title}: ${description.choosing}` });
+      description.choices.forEach((name, k) => select.append(new Option(name, k)));
       select.addEventListener("change", () => { chart.choice = Number(select.value); draw(chart); });
       header.append(select);
     }
-    described.pickers.forEach((picker, k) => {
-      const select = element("select", { "aria-label": `${described.title}: ${picker.name}` });
+    description.pickers.forEach((picker, k) => {
+      const select = element("select", { "aria-label": `${description.title}: ${picker.name}` });
       picker.columns.forEach((column, choice) => select.append(new Option(designs.columnName(column), choice)));
       select.value = String(picker.chosen);
       select.addEventListener("change", () => { chart.picked[k] = Number(select.value); draw(chart); });
@@ -200,15 +212,15 @@ const charts = (() => {
     });
     chart.cursor = element("div", { class: "cursor" });
     holder.append(chart.cursor);
-    chart.legend = element("div", { class: "legend", role: "group", "aria-label": `Curves of ${described.title}` });
-    const note = described.note ? [element("figcaption", { class: "note" }, described.note)] : [];
-    chart.figure = element("figure", { class: "card chart", id: `chart-${described.identity}` }, header, holder, chart.legend, ...note);
+    chart.legend = element("div", { class: "legend", role: "group", "aria-label": `Curves of ${description.title}` });
+    const note = description.note ? [element("figcaption", { class: "note" }, description.note)] : [];
+    chart.figure = element("figure", { class: "card chart", id: `chart-${description.identity}` }, header, holder, chart.legend, ...note);
     all.push(chart);
     return chart.figure;
   }
 
   function start() {
-    const holders = [...told.survey.map((panel) => [panel, "survey"]), ...told.panels.map((panel) => [panel, "panels"])];
+    const holders = [...page.survey.map((panel) => [panel, "survey"]), ...page.panels.map((panel) => [panel, "panels"])];
     for (const [panel, place] of holders) {
       document.getElementById(place).append(element("h2", {}, panel.title), element("div", { class: "charts" }, ...panel.charts.map(make)));
     }
@@ -231,6 +243,14 @@ const charts = (() => {
     });
     addEventListener("afterprint", () => {
       for (const chart of all) chart.plot.style.zoom = chart.plot.parentElement.style.height = "";
+      refresh();
+      for (const { plot, drawn } of all) {
+        if (!drawn) continue;
+        // Plotly fits only charts without a size of their own.
+        delete plot.layout.width;
+        delete plot.layout.height;
+        Plotly.Plots.resize(plot);
+      }
     });
   }
 

@@ -1,7 +1,7 @@
 // Many designs: each chosen number over another, all at once, their front, their spread; tables that sort.
 const designs = (() => {
-  const { told, state, element } = report;
-  const { designs: own } = told;
+  const { page, state, element } = report;
+  const { designs: own } = page;
   const GROUPS = 12, MOST_LINES = 60;
   const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
   const numberText = (value) => (Number.isFinite(value) ? String(+value.toPrecision(4)) : "–");
@@ -9,7 +9,7 @@ const designs = (() => {
 
   const columnName = (column) => own.columns[column].name;
   const label = (column) => columns[column].name + (columns[column].unit ? ` [${columns[column].unit}]` : "");
-  const colour = (k) => report.palette()[series[k].colour ?? 4];
+  const colour = (k) => report.palette()[series[k].colour ?? 0];
   const SYMBOLS = ["circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x", "star"];
 
   function read() {
@@ -237,10 +237,10 @@ const designs = (() => {
   const drawers = { responses, front, parallel, distribution };
 
   function figure(chart) {
-    const picked = chart.told.pickers.map((picker, k) => picker.columns[chart.picked[k]]);
+    const picked = chart.description.pickers.map((picker, k) => picker.columns[chart.picked[k]]);
     // As wide as its axes' names need: it scrolls in its holder where that is narrower.
-    if (chart.told.drawer === "parallel") chart.plot.style.minWidth = `${100 * (parallelAxes(picked[0]).length + 1)}px`;
-    return drawers[chart.told.drawer](...picked);
+    if (chart.description.drawer === "parallel") chart.plot.style.minWidth = `${100 * (parallelAxes(picked[0]).length + 1)}px`;
+    return drawers[chart.description.drawer](...picked);
   }
 
   // A point clicked at is the run shown, where it is one of those.

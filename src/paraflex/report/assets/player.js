@@ -1,12 +1,12 @@
 // The animation: bodies at base + m (shape - base), symbols, path and trail of the scenes of all runs on a canvas.
 const player = (() => {
-  const { told, state, element } = report;
+  const { page, state, element } = report;
   const MAGNIFICATIONS = [1, 2, 5, 10, 20, 50, 100, 200];
   const LARGEST = MAGNIFICATIONS.at(-1);
   const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5];
   const byId = (name) => document.getElementById(name);
   const canvas = byId("canvas"), pen = canvas.getContext("2d");
-  const { film } = told;
+  const { film } = page;
   let arrays = null, times = [0], speed = 1, last = 0, width = 0, height = 0, place = null, colours = {}, waiting = false;
 
   const end = () => times[times.length - 1];
@@ -107,7 +107,7 @@ const player = (() => {
       for (const k of [start, start + 1]) points.push(arrays.base.values[k] + state.magnify * arrays.bend.values[k]);
     }
     points.push(drawn[2 * tip], drawn[2 * tip + 1]);
-    pen.lineWidth = 2; pen.strokeStyle = colours.mark; pen.lineJoin = "round";
+    pen.lineWidth = 2; pen.strokeStyle = colours.trail; pen.lineJoin = "round";
     line(points, 0, before + 2);
   }
 
@@ -154,9 +154,11 @@ const player = (() => {
 
   function drawCaption(stopped) {
     pen.font = `13px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "top"; pen.fillStyle = colours.soft;
-    const run = told.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
+    const run = page.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
     const by = state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
-    pen.fillText(`${run}t = ${secondsText(state.time)}${by}`, 12, 8);
+    const caption = `t = ${secondsText(state.time)}${by}`;
+    // On a narrow screen the buttons alone name the run.
+    pen.fillText(pen.measureText(run + caption).width < width - 24 ? run + caption : caption, 12, 8);
     if (stopped !== null) { pen.fillStyle = colours.mark; pen.fillText(`this run ended at ${secondsText(stopped)}`, 12, 27); }
   }
 
@@ -195,7 +197,7 @@ const player = (() => {
       if (tip !== null) drawTrail(before, drawn, tip);
       drawMarks(moving, points);
       if (tip !== null) {
-        pen.fillStyle = colours.mark; pen.strokeStyle = colours.card; pen.lineWidth = 1.5;
+        pen.fillStyle = colours.trail; pen.strokeStyle = colours.card; pen.lineWidth = 1.5;
         pen.beginPath(); pen.arc(px(drawn[2 * tip]), py(drawn[2 * tip + 1]), 5, 0, 2 * Math.PI); pen.fill(); pen.stroke();
       }
       if (byId("names").checked) drawNames(drawn, moving, points);
@@ -214,7 +216,7 @@ const player = (() => {
 
   function recolour() {
     colours = { bodies: report.palette() };
-    for (const name of ["text", "soft", "card", "mark"]) colours[name] = report.colour(name);
+    for (const name of ["text", "soft", "card", "mark", "trail"]) colours[name] = report.colour(name);
     Object.assign(colours, { ground: colours.card, ink: colours.text, earth: colours.soft });
     repaint();
   }
@@ -262,7 +264,7 @@ const player = (() => {
   }
 
   async function start() {
-    times = film ? film.time : report.row(told.time);
+    times = film ? film.time : report.row(page.time);
     if (!(times.length > 1)) times = [0, 1];
     seek(times[0]);
     connect();

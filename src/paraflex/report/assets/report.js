@@ -1,11 +1,11 @@
 "use strict";
 // What all parts of the page share: the numbers, what is selected and when it is, the theme.
 const report = (() => {
-  const told = JSON.parse(document.getElementById("report-data").textContent);
+  const page = JSON.parse(document.getElementById("report-data").textContent);
   const root = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const listeners = { run: [], time: [], theme: [], magnify: [], playing: [] };
-  const state = { run: told.selected, time: 0, magnify: told.film ? told.film.magnify : 1, playing: false };
+  const state = { run: page.selected, time: 0, magnify: page.film ? page.film.magnify : 1, playing: false };
   let rows = [];
 
   async function inflated(text) {
@@ -25,14 +25,14 @@ const report = (() => {
   }
 
   async function readSeries() {
-    const { buffer } = gathered(await inflated(told.series.data), 4);
+    const { buffer } = gathered(await inflated(page.series.data), 4);
     let from = 0;
-    rows = told.series.lengths.map((length) => {
+    rows = page.series.lengths.map((length) => {
       const row = new Float32Array(buffer, 4 * from, length);
       from += length;
       return row;
     });
-    delete told.series.data;
+    delete page.series.data;
   }
 
   // An array (runs, frames, ...) with x, y last, in metres; NaN where there is nothing.
@@ -57,29 +57,30 @@ const report = (() => {
 
   const isDark = () => (root.dataset.theme === "auto" ? dark.matches : root.dataset.theme === "dark");
   const colour = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
-  // Okabe and Ito's colours, apart for eyes of all kinds; lighter ones on a dark ground.
+  // Okabe and Ito's colours, apart for eyes of all kinds; lighter ones on a dark ground. None is near that of the
+  // end-effector's trail, or the grey and ink of the planned path.
   const palettes = {
-    light: ["#0072b2", "#d55e00", "#009e73", "#b04a8a", "#4a4a4a", "#c98700", "#3fa0db", "#7a5195"],
-    dark: ["#56b4e9", "#ff8a3d", "#2fd0a0", "#e79bc5", "#d8dce2", "#f0c93a", "#8fa8ff", "#b98a5a"],
+    light: ["#0072b2", "#c98700", "#009e73", "#b04a8a", "#3fa0db", "#6a4fcf", "#7a7f00", "#8c5a2b"],
+    dark: ["#56b4e9", "#f0c93a", "#2fd0a0", "#e79bc5", "#8fa8ff", "#b6d24a", "#c08cf0", "#b98a5a"],
   };
   const palette = () => palettes[isDark() ? "dark" : "light"];
 
-  function tell(what) {
+  function notify(what) {
     for (const listener of listeners[what]) listener(state[what]);
   }
 
   function set(what, value) {
     if (state[what] === value) return;
     state[what] = value;
-    tell(what);
+    notify(what);
   }
 
   function setTheme(name, keep = true) {
     root.dataset.theme = name;
     if (keep) try { localStorage.setItem("paraflex-theme", name); } catch (refused) { /* a file's storage may be closed */ }
-    tell("theme");
+    notify("theme");
   }
-  dark.addEventListener("change", () => root.dataset.theme === "auto" && tell("theme"));
+  dark.addEventListener("change", () => root.dataset.theme === "auto" && notify("theme"));
 
   // Where a time is among ascending ones: the sample before it and the share of the way to the next.
   function between(times, time) {
@@ -101,9 +102,9 @@ const report = (() => {
   };
 
   return {
-    told, state, set, setTheme, isDark, colour, palette, readSeries, unpacked, between, element,
+    page, state, set, setTheme, isDark, colour, palette, readSeries, unpacked, between, element,
     row: (number) => rows[number],
     on: (what, listener) => listeners[what].push(listener),
-    runName: () => told.runs[state.run] || "",
+    runName: () => page.runs[state.run] || "",
   };
 })();

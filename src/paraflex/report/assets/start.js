@@ -1,11 +1,11 @@
 // Selection, theme and keys; then everything is begun.
 const begin = (() => {
-  const { told, state, element } = report;
+  const { page, state, element } = report;
   const byId = (name) => document.getElementById(name);
   const MOST_BUTTONS = 12;
 
   function selectRun(run) {
-    report.set("run", (run + told.runs.length) % told.runs.length);
+    report.set("run", (run + page.runs.length) % page.runs.length);
   }
 
   function showRun() {
@@ -19,20 +19,20 @@ const begin = (() => {
     }
     const select = byId("run");
     if (select) select.value = String(state.run);
-    byId("canvas").setAttribute("aria-label", `The mechanism in motion${report.runName() ? `, ${told.selecting} ${report.runName()}` : ""}`);
+    byId("canvas").setAttribute("aria-label", `The mechanism in motion${report.runName() ? `, ${page.selecting} ${report.runName()}` : ""}`);
   }
 
   function makeSelector() {
     const holder = byId("runs");
-    if (told.runs.length < 2) { holder.hidden = byId("key-run").hidden = true; return; }
-    holder.querySelector("legend").textContent = told.selecting;
-    if (told.runs.length > MOST_BUTTONS) {
-      const select = element("select", { id: "run", "aria-label": told.selecting });
-      told.runs.forEach((name, k) => select.append(new Option(name, k)));
+    if (page.runs.length < 2) { holder.hidden = byId("key-run").hidden = true; return; }
+    holder.querySelector("legend").textContent = page.selecting;
+    if (page.runs.length > MOST_BUTTONS) {
+      const select = element("select", { id: "run", "aria-label": page.selecting });
+      page.runs.forEach((name, k) => select.append(new Option(name, k)));
       select.addEventListener("change", () => selectRun(Number(select.value)));
       holder.append(select);
     } else {
-      told.runs.forEach((name, k) => {
+      page.runs.forEach((name, k) => {
         const radio = element("input", { type: "radio", name: "run", value: k });
         radio.addEventListener("change", () => selectRun(k));
         holder.append(element("label", {}, radio, name));
@@ -41,7 +41,7 @@ const begin = (() => {
     for (const row of document.querySelectorAll("tr[data-run]")) row.addEventListener("click", () => selectRun(Number(row.dataset.run)));
     report.on("run", () => {
       showRun();
-      byId("said").textContent = `${told.selecting} ${report.runName()}`;
+      byId("announcement").textContent = `${page.selecting} ${report.runName()}`;
     });
   }
 
@@ -65,7 +65,7 @@ const begin = (() => {
   }
 
   function listen() {
-    if (!told.panels.length) return;
+    if (!page.panels.length) return;
     const keys = {
       " ": () => player.play(!state.playing),
       ArrowRight: (event) => player.step(event.shiftKey ? 10 : 1),
@@ -114,10 +114,10 @@ const begin = (() => {
     makeSelector();
     makeTheme();
     showScrolling();
-    byId("keyed").textContent = told.selecting;
+    byId("keyed").textContent = page.selecting;
     listen();
     await report.readSeries();
-    const time = report.row(told.time);
+    const time = report.row(page.time);
     report.timeRange = time.length > 1 ? [time[0], time[time.length - 1]] : undefined;
     showRun();
     designs.start();
@@ -125,7 +125,7 @@ const begin = (() => {
     await player.start();
     document.documentElement.dataset.ready = "true";
     performance.mark("ready");
-    if (!told.panels.length && !told.survey.length) return;
+    if (!page.panels.length && !page.survey.length) return;
     // After the screen shows what there is.
     await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0)));
     loadPlotly();

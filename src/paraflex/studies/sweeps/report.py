@@ -17,6 +17,7 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits
 from paraflex.designs.reopen import StudyFolder, open_study, run_again
 from paraflex.designs.run import Abandoned
+from paraflex.designs.schema import DEFAULT_NAME
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError, ParaflexError
 from paraflex.files import model_from
@@ -24,6 +25,7 @@ from paraflex.folders import check_listed
 from paraflex.plots.designs import DesignTable, read_designs
 from paraflex.report import Page
 from paraflex.report.choice import MOST_RUNS, Picked, best_runs
+from paraflex.report.search import IDENTIFICATION
 from paraflex.report.survey import Step
 from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
 from paraflex.results.doubts import doubt_lines
@@ -64,15 +66,17 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
     if on_progress is not None and picked:
         on_progress(f"simulating {len(picked)} of the best designs again, to be seen in motion")
     runs, failed, differ = _again(study, designs, picked)
+    kind = str(found.get("kind", "sweep"))
     account = StudyAccount(
-        kind=str(found.get("kind", "sweep")),
-        name=study.name,
+        kind=kind,
+        name=kind if study.name == DEFAULT_NAME else study.name,
         mechanism=study.setting.source,
         total=study.runs,
         parameters=_parameters(study, designs),
         facts=_facts(study, found),
         runs=runs,
         failed=failed,
+        found=found,
         history=[Step(n, np.nan if value is None else value, bool(holds)) for n, value, holds in _history(found)],
         notes=_notes(study, designs, differ),
     )
@@ -132,7 +136,10 @@ def _parameters(study: StudyFolder, designs: DesignTable) -> dict[str, VariedPar
 def _facts(study: StudyFolder, found: Mapping[str, Any]) -> list[tuple[str, str]]:
     setting = study.setting
     integration = setting.integration
-    facts = [("search", str(found["method"]))] if "method" in found else [("sampling", study.sampling)]
+    facts = [("sampling", study.sampling)]
+    if found:
+        facts = [("search", str(found.get("method", "least squares")))]
+        facts += [("ended", str(found["stopped"]))] if found.get("stopped") else []
     if setting.duration is not None:
         facts.append(("duration", f"{setting.duration:g} s"))
     for name, unit in (("method", ""), ("tolerance", " m"), ("step", " s"), ("constraints", "")):
@@ -173,9 +180,10 @@ def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool
 
 
 def _searched(designs: DesignTable, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:
-    """Runs of the best design of a search and of its start, and some of the best by single metrics."""
+    """Runs of the best design of a search and of its start; of an optimisation also the best by single metrics."""
     out: dict[int, list[str]] = {}
-    for key, why in (("values", "what was sought"), ("start", "the start")):
+    identified = found.get("kind") == IDENTIFICATION
+    for key, why in (("values", "found" if identified else "objective"), ("start", "the start")):
         design = found.get(key) or {}
         if set(design) != set(designs.parameters) or not design:
             continue
@@ -184,7 +192,7 @@ def _searched(designs: DesignTable, found: Mapping[str, Any], picked: Sequence[P
             alike &= designs.parameters[name] == value
         for row in np.flatnonzero(alike)[:3]:
             out.setdefault(int(row), []).append(why)
-    for row, why in picked:
+    for row, why in () if identified else picked:
         if row in out:
             out[row] += why
         elif len(out) < MOST_RUNS:
