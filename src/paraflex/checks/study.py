@@ -13,7 +13,7 @@ from paraflex.files import Model
 from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
 from paraflex.mechanism import ActuationMode, AngleLaw, Mechanism
-from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
+from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw, marks
 from paraflex.mechanism.loads import InTime
 from paraflex.tracking import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
@@ -229,10 +229,10 @@ def _given_torques(model: Model) -> Iterator[Finding]:
 
 
 def _largest_torque(torque: InTime, duration: float) -> float:
-    """The largest magnitude of a torque until a time, knots of its law included [N m]."""
+    """The largest magnitude of a torque until a time, knots and rows of its law included [N m]."""
     if not isinstance(torque, AngleLaw):
         return abs(torque)
-    times = [*np.linspace(0.0, duration, _SAMPLES), *(knot for knot in torque.knots if knot <= duration)]
+    times = [*np.linspace(0.0, duration, _SAMPLES), *(time for time in marks(torque) if 0.0 <= time <= duration)]
     return float(np.max(np.abs(torque.evaluate(np.array(times))[0])))
 
 

@@ -111,6 +111,10 @@ class _Table(BaseModel):
 
 
 _UNTIL = Field(default=None, description="the time in s at which the next piece takes over")
+_INTERPOLATION = Field(
+    default=None, description='how a table is interpolated: "spline", smoothly, by default, or "linear"'
+)
+InterpolationName = Literal["spline", "linear"]
 _PAIR_IN_TIME = Annotated[list[FunctionOfTime], Field(min_length=2, max_length=2)]
 
 
@@ -149,6 +153,7 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
         ),
         "pieces": (pieces | None, Field(default=None, description=example)),
         "table": (rows | None, Field(default=None, description=f"a list of {columns} such columns")),
+        "interpolation": (InterpolationName | None, _INTERPOLATION),
     }
 
 
@@ -555,6 +560,7 @@ class TorqueTable(_Table):
     table: Rows | None = Field(
         default=None, description="a list of [t, torque] in s and N m, or the name of a file with two such columns"
     )
+    interpolation: InterpolationName | None = _INTERPOLATION
 
 
 # A number or an expression of the time, or a table. Tags are such that errors do not show them.
