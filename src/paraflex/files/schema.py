@@ -136,7 +136,7 @@ class TorquePiece(_Table):
 _IN_TIME: dict[Any, tuple[Any, Any, Any, str]] = {
     InTime: (FunctionOfTime, TorquePiece, Rows, "[t, torque] in s and N m, or the name of a file with two"),
     tuple[InTime, InTime]: (
-        _PAIR_IN_TIME, ForcePiece, ForceRows, "[t, x, y] in s and N, or the name of a file with three"
+        _PAIR_IN_TIME, ForcePiece, ForceRows, "[t, x, y] in s, N and N, or the name of a file with three"
     ),
 }  # fmt: skip
 
