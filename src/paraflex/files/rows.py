@@ -157,8 +157,8 @@ def _units(headings: str, count: int, file: str, field: str) -> list[tuple[str, 
         return [(part, _unit_in(part)) for part in parts]
     if given and len(given) != count:
         raise InputError(
-            f"the headings of {file} do not tell to which of {count} columns their units belong", field=field, value=headings.strip(),
-            remedy="separate headings by commas",
+            f"the headings of {file} do not tell to which of {count} columns their units belong", field=field,
+            value=headings.strip(), remedy="separate headings by commas",
         )  # fmt: skip
     return [(f"[{unit}]", unit) for unit in given]
 
