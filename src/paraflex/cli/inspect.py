@@ -106,11 +106,20 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "flexible_coordinates": system.n_flexible,
         "constraints": system.n_constraints,
         "total_mass": system.total_mass,
+        "payload": _payload_facts(mechanism),
         "assemblies": [assembly.name for assembly in mechanism.assemblies],
         "modes": [mode.name for mode in mechanism.modes],
         "paths": list(model.paths),
         **{group.words: list(map(_equation, members)) for group, members in grouped(mechanism) if group.relates},
     }
+
+
+def _payload_facts(mechanism: Mechanism) -> dict[str, Any] | None:
+    carried, effector = mechanism.payload, mechanism.end_effector
+    if carried is None or effector is None:
+        return None
+    numbers = {"mass": carried.mass, "inertia": carried.inertia, "offset": list(carried.offset)}
+    return {"point": str(effector.point), **numbers}
 
 
 def _equation(one: Relation) -> str:

@@ -99,8 +99,20 @@ def _counts(facts: dict[str, Any]) -> Table:
         # Most mechanisms have no gears and the like.
         if key in facts and (facts[key] or key not in related):
             value = facts[key]
+            if key == "total_mass" and facts["payload"]:
+                table.add_row(label, f"{value:g}, its payload among it")
+                table.add_row("payload", _payload(facts["payload"]))
+                continue
             table.add_row(label, (_some(value) or "none") if isinstance(value, list) else f"{value:g}")
     return table
+
+
+def _payload(carried: dict[str, Any]) -> str:
+    """What the end-effector carries, and where."""
+    inertia = f", {carried['inertia']:g} kg m^2" if carried["inertia"] else ""
+    x, y = carried["offset"]
+    beside = f", {x:g}, {y:g} m from it" if x or y else ""
+    return f"{carried['mass']:g} kg{inertia} at {carried['point']}{beside}"
 
 
 def _some(names: Sequence[Any]) -> str:

@@ -23,6 +23,7 @@ from paraflex.mechanism.loads import (
     TorsionalDamper,
     TorsionalSpring,
 )
+from paraflex.mechanism.payload import Payload
 from paraflex.mechanism.quantities import known
 
 T = TypeVar("T")
@@ -138,6 +139,8 @@ class Members(CheckedFields):
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
+    # The body that carries it has it, so that it is no part of what is compared, saved or simulated.
+    payload: Payload | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def taken_from(cls, given: object, field: str = "mechanism") -> Self | None:
