@@ -79,6 +79,7 @@ def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]
         "assembly": None if chosen is None else chosen.assembly,
         "assembly_closes": None if chosen is None else (chosen.closes or chosen.problem),
         "gruebler_count": seen.rigid.n - seen.rigid.n_constraints,
+        "several_paths": not request.path and len(model.study.paths) > 1,
         "verdict": verdict.to_dict(),
     }
     if seen.mobility is None or seen.reach is None:

@@ -60,7 +60,8 @@ def print_verdict(console: Console, facts: dict[str, Any]) -> None:
         console.print(f"{one['level']}: {one['place']}: {one['text']}; {one['remedy']} [{one['code']}]", soft_wrap=True)
     if verdict["level"] == Level.SOUND.value:
         drives = ", every mode drives all that is free" if facts["modes"] else ""
-        path = ", the study's path can be followed" if facts["paths"] else ""
+        paths = "paths" if facts["several_paths"] else "path"
+        path = f", the study's {paths} can be followed" if facts["paths"] else ""
         console.print(f"sound: every assembly closes, the pose is not a special one{drives}{path}", soft_wrap=True)
     else:
         count = len(verdict["findings"])

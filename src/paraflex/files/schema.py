@@ -575,7 +575,8 @@ class StudyDefaultsTable(_Table):
 
     path: Text | None = Field(default=None, description="the name of a [path.NAME] table")
     paths: list[Text] = Field(
-        default=[], description="in its place several names, all of which `paraflex run` runs, and others the first"
+        default=[],
+        description="in its place several names: runs and studies of many designs take all, others the first",
     )
     modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
     duration: Number | None = Field(default=None, description="the duration in s, dwell included")
