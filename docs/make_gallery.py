@@ -101,7 +101,8 @@ paraflex plot RESULTS FIGURE... --style single --format pdf,svg,png
 
 `RESULTS` is the folder that a command wrote, or one of its files. Without a figure, or with `--list`, the command lists
 the figures of these results; `all` draws all of them. Figures that show one actuation mode are drawn for each `--mode`;
-the others show the modes named, or all. Figures of many designs take `--metric`.
+the others show the modes named, or all. Figures of many designs take `--metric`;
+those of the end-effector's motion, trails and points `--point link1.B1`.
 
 `--style single` makes them 84 mm wide, one column of most journals, and `--style double` 174 mm, two columns; panels
 that do not fit side by side are placed below one another. Text is 8 pt, numbers on axes 7 pt; fonts are embedded in PDF

@@ -5,6 +5,7 @@ import signal
 import sys
 import weakref
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,19 @@ def test_a_scene_is_the_data_magnified_and_between_samples_the_line_between(data
     assert right > drawn[..., 0].max()
     assert bottom < drawn[..., 1].min()
     assert top > drawn[..., 1].max()
+
+
+def test_the_trail_is_that_of_the_point_asked_for(data):
+    run = select(data, "++++")
+    t = run["time"].values
+    shown = scene(run, t, 1.0, "link1.B1")
+    np.testing.assert_allclose(shown.trail, run["point_position"].sel(point="link1.B1"), rtol=0, atol=1e-5)
+    film = plan_film(data, ["++++"], replace(SMALL, point="link1.B1"))
+    assert film.scenes[0].followed == shown.followed
+    assert film.caption.endswith(", trail of link1.B1")
+    figure = pf.plots.mechanism_drawing(data, "++++", float(t[10]), 1.0, point="link1.B1")
+    ends = [line.get_xydata()[-1] for line in figure.axes[0].get_lines() if len(line.get_xydata()) == 11]
+    np.testing.assert_allclose(ends[0], shown.trail[10], rtol=0, atol=1e-6)
 
 
 def test_true_deflections_have_no_stiff_twin_and_after_the_end_the_last_picture_stays(data):
@@ -387,6 +401,7 @@ def test_the_command_makes_a_film_and_writes_over_none(folder, tmp_path):
         (["--mode", "+++"], "--mode: no such mode in these results (got '+++')"),
         (["--theme", "drak"], "--theme: unknown theme (got 'drak'); did you mean \"dark\"?"),
         (["--magnify", "-2"], "--magnify: must not be negative"),
+        (["--point", "link1.Z"], "--point: no such point in these results (got 'link1.Z'); one of "),
     ],
 )
 def test_the_command_names_the_option_at_fault(folder, tmp_path, monkeypatch, capsys, arguments, message):

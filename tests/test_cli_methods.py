@@ -1,6 +1,7 @@
 """Methods, steps, constraints and events on the command line and in a model's [study]."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -21,6 +22,9 @@ from shell import paraflex
         ("joint:A1=..-1e-1", JointLimit("A1", high=-0.1)),
         ("joint:A1=-.5..", JointLimit("A1", low=-0.5)),
         ("deflection:link1=0.002", DeflectionLimit("link1", 0.002)),
+        ("joint:A1=-30 deg..0.25 rev", JointLimit("A1", -math.pi / 6, math.pi / 2)),
+        ("joint:rail=..80 mm", JointLimit("rail", high=0.08)),
+        ("deflection:link1=1.1 mm", DeflectionLimit("link1", 0.0011)),
         ("singular=0.05", SingularDistance(0.05)),
         ("singular:tau1,tau5=0.05", SingularDistance(0.05, ("tau1", "tau5"))),
     ],
@@ -60,6 +64,10 @@ def test_events_are_read(text, event):
         ),
         ({"stop_at": ["deflection:link1=nan"]}, "--stop-at: .*not a number"),
         ({"stop_at": ["singular:=0.1"]}, "--stop-at: not an event"),
+        ({"stop_at": ["deflection:link1=2 deg"]}, "--stop-at: a quantity in rad where one in m is asked for .*2 deg'"),
+        ({"stop_at": ["deflection:link1=2 mn"]}, '--stop-at: "2 mn" is not a number .*in m, or with a unit'),
+        ({"stop_at": ["singular=0.1 m"]}, "--stop-at: a quantity in m where a number without a unit is asked for"),
+        ({"stop_at": ["joint:A1=..2 N"]}, "--stop-at: a quantity in N where one in rad or m is asked for"),
         ({"stop_at": ["singular=2"]}, "--stop-at: not between 0 and 1"),
     ],
 )
@@ -154,6 +162,10 @@ def test_a_study_stopped_by_an_event_is_a_success(tmp_path):
         (["run", "--ked", "--method", "newmark"], "--method: means nothing with --ked (got 'newmark')"),
         (["run", "--ked", "--stop-at", "singular=0.1"], "--stop-at: means nothing with --ked (got 'singular=0.1')"),
         (["run", "--stop-at", "joint:A9=0..1"], "--stop-at: unknown joint A9 (got 'joint:A9=0..1'); choose from A1"),
+        (
+            ["run", "--stop-at", "joint:A1=..80 mm"],
+            "--stop-at: a quantity in m where one in rad is asked for (got 'joint:A1=..80 mm'); give it in rad",
+        ),
         (["run", "--rigid", "--stop-at", "deflection:link1=1"], "--stop-at: a rigid body does not bend"),
         (["run", "--stop-at", "joint:A1=50.."], "--stop-at: the run would start outside the limits of joint A1"),
         (["run", "-m", "pendulum", "--stop-at", "joint:pivot=1.."], "--stop-at: the run would start outside"),

@@ -229,6 +229,16 @@ def test_a_start_that_does_not_run(tmp_path):
         identify(study_of(tmp_path, *linear_targets()), tmp_path / "out", run=made_up(tracking_rms=out))
 
 
+def test_a_target_may_have_a_unit(tmp_path):
+    text = TARGET % ("tracking_rms", 0.0, "")
+    study = study_of(tmp_path, text.replace("value = 0.0", 'value = "1.1 mm"'))
+    (target,) = study.targets
+    assert (target.value, type(target.value)) == (0.0011, float)
+    text = TARGET % ("peak_torque.tau1", 0.0, "")
+    (target,) = study_of(tmp_path, text.replace("value = 0.0", 'value = "7 Nmm"')).targets
+    assert target.value == 0.007
+
+
 def test_the_figure_shows_every_target(tmp_path):
     result = identify(study_of(tmp_path, *linear_targets()), tmp_path / "out", run=made_up(**METRICS))
     figure = targets_reached(result.to_dict())
@@ -251,6 +261,8 @@ ONE = TARGET % ("tracking_rms", 1.0, "")
         (ONE, "", "target: is missing"),
         ("value = 1.0", "value = 0.0", "target.0.value: nothing is relative to zero (got 0.0); say relative = false"),
         ("value = 1.0", "value = 1.0\nweight = 0.0", "target.0.weight: must be positive"),
+        ("value = 1.0", 'value = "1 kg"', "target.0.value: a quantity in kg where one in m is asked for (got '1 kg')"),
+        ("value = 1.0", 'value = "1 mn"', "target.0.value"),
         ("value = 1.0", 'value = 1.0\nmode = "+++"', "target.0.mode: the study has none of that name (got '+++')"),
         ("value = 1.0", 'value = 1.0\npath = "squares"', "target.0.path: the study has none of that name"),
         (

@@ -12,6 +12,7 @@ from paraflex.designs.derivatives.changes import Change
 from paraflex.designs.derivatives.plans import given, given_torques, nominal_values
 from paraflex.designs.run import Task, plan_task
 from paraflex.dynamics import acting_loads, balanced_state, build_system, consistent_state, inputs_of
+from paraflex.dynamics.signals import law_signal
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import ExpressionLaw, library_file, load
@@ -40,9 +41,10 @@ from paraflex.mechanism import (
     WeldJoint,
     raparm_i,
 )
+from paraflex.mechanism.laws import Interpolation
 from paraflex.motion import simulate_motion
 from paraflex.studies import load_sensitivities
-from paraflex.tracking import plan_tracking
+from paraflex.tracking import path_stops, plan_tracking
 from paraflex.validity.actions import doubtful_actions
 from test_loads import INERTIA, MASS, REACH, five_bar, pendulum
 from test_sensitivities import PLACES
@@ -157,6 +159,106 @@ def test_loads_in_time_are_as_constant_ones_where_they_are_constant():
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-9)
 
 
+# A ramp from 0.1 to 0.2 s, a constant force, and a fall to nothing within a microsecond.
+RAMP = ((0.0, 0.1, 0.2, 0.5, 0.500001, 1.0), (0.0, 0.0, FORCE, FORCE, 0.0, 0.0))
+IN_PIECES = PiecewiseLaw(
+    (
+        ConstantSpeed(0.0, 0.0),
+        ConstantSpeed(-FORCE, 10 * FORCE),
+        ConstantSpeed(FORCE, 0.0),
+        ConstantSpeed(FORCE * 500001, -FORCE * 1e6),
+        ConstantSpeed(0.0, 0.0),
+    ),
+    RAMP[0][1:5],
+)
+
+
+def test_a_linear_table_is_exact_at_its_rows_and_straight_between_them():
+    law, smooth = TabulatedLaw(*RAMP, "linear"), TabulatedLaw(*RAMP)
+    times = np.linspace(0.0, 1.0, 301)
+    for found, expected in zip(law.evaluate(times), IN_PIECES.evaluate(times), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(law.evaluate(np.array(RAMP[0]))[0], RAMP[1])
+    assert law.knots == law.stops == RAMP[0][1:5]
+    assert smooth.knots == ()
+    # What it is for: a smooth curve leaves the rows far behind.
+    assert np.max(smooth.evaluate(times)[0]) > 2 * FORCE
+    signal, ends = law_signal("load.push", law, 0.45)
+    np.testing.assert_array_equal(signal.breaks, [0.0, 0.1, 0.2, 0.45])
+    np.testing.assert_allclose(signal.coefficients[:, :2], [[0, 0], [0, 10 * FORCE], [FORCE, 0]], rtol=1e-12, atol=0)
+    assert ends == [0.1, 0.2]
+
+
+@pytest.mark.parametrize("method", ["esdirk5", "radau"])
+def test_an_oscillator_under_a_ramp_from_a_linear_table_and_the_same_in_pieces(method):
+    springs = (TorsionalSpring("k", "rail", K),)
+    options = IntegrationOptions(method=method, tolerance=1e-8)
+    table, pieces = (
+        simulate_motion(slider(law, springs=springs), 1.0, samples=41, options=options)
+        for law in (TabulatedLaw(*RAMP, "linear"), IN_PIECES)
+    )
+    np.testing.assert_allclose(table.solution.q, pieces.solution.q, rtol=0, atol=2e-8)
+    own = np.sqrt(K / MASS)
+
+    def ramp(t):
+        return np.where(t > 0.0, 10 * FORCE / K * (t - np.sin(own * t) / own), 0.0)
+
+    t = table.times
+    fall = np.where(t > 0.5, FORCE / K * (1.0 - np.cos(own * (t - 0.5))), 0.0)
+    np.testing.assert_allclose(table.solution.q[:, 0], ramp(t - 0.1) - ramp(t - 0.2) - fall, rtol=0, atol=1e-6)
+
+
+def test_a_pulse_between_the_rows_of_a_long_linear_table_is_not_stepped_over():
+    times, forces = np.linspace(0.0, 0.3, 3001), np.zeros(3001)
+    forces[1000:1020] = 500.0
+    forces += 1e-3 * np.sin(40.0 * times)
+    law = TabulatedLaw(tuple(times), tuple(forces), "linear")
+    # Both ends of both flanks, though there are far more rows than stops.
+    assert {times[k] for k in (999, 1000, 1019, 1020)} <= set(law.stops)
+    assert len(law.stops) == 200
+    assert len(law.knots) == 2999
+    run = simulate_motion(slider(law), 0.3, samples=4)
+    momentum = np.trapezoid(forces, times)
+    np.testing.assert_allclose(run.solution.v[-1, 0], momentum / MASS, rtol=1e-8)
+    assert run.solution.steps < 1000
+
+
+def test_torques_along_a_path_carry_a_long_linear_table():
+    """Its rows are noise, so that no spline passes for them; steps end at few of them."""
+    times = np.linspace(0.0, 0.2, 801)
+    law = TabulatedLaw(tuple(times), tuple(np.random.default_rng(3).uniform(-1.0, 1.0, times.size)), "linear")
+    mechanism = five_bar(loads=(PointForce("tool", PointRef("distal2", "C"), (law, 0.0)),))
+    task = plan_tracking(mechanism, Line((0.0, 0.30), (0.04, 0.27), 20.0), duration=0.2, samples=41)
+    run = task.simulate("++", options=IntegrationOptions(tolerance=1e-8))
+    assert np.max(np.linalg.norm(run.driven.actual - run.driven.desired, axis=1)) < 1e-7
+    assert task.plan.knots.size > 799
+    assert path_stops(task.plan.knots, mechanism).size < 210
+    # Between the rows the torques take the load as it is.
+    between = 0.5 * (times[1:] + times[:-1])[[7, 400, 790]]
+    effort = required_effort(task.plan.follow(between)).required
+    free = replace(task.plan.follow(between), mechanism=five_bar(), system=build_system(five_bar().rigid()))
+    np.testing.assert_allclose((required_effort(free).required - effort)[:, 0], np.interp(between, times, law.values))
+
+
+def test_a_linear_table_is_as_its_pieces_in_elastodynamics_and_segments():
+    line = Line((0.0, 0.264), (0.01, 0.264), 5.0)
+    pieces = PiecewiseLaw((ConstantSpeed(0.0, 100.0), ConstantSpeed(3.0, -50.0), ConstantSpeed(1.5, 0.0)), (0.02, 0.03))
+    table = TabulatedLaw((0.0, 0.02, 0.03, 0.05), (0.0, 2.0, 1.5, 1.5), "linear")
+    tasks = [
+        plan_tracking(
+            replace(raparm_i(), loads=(PointForce("tool", PointRef("link4", "C"), (law, 0.0)),)),
+            line, duration=0.05, samples=6,
+        )
+        for law in (pieces, table)
+    ]  # fmt: skip
+    for of in (
+        lambda task: simulate_ked(task, "++++").solution.q,
+        lambda task: task.in_segments(2).simulate("++++").solution.q,
+    ):
+        one, other = (of(task) for task in tasks)
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-9)
+
+
 def test_statics_take_a_load_at_the_time_of_the_pose():
     mechanism = slider(ExpressionLaw("10 * t"), springs=(TorsionalSpring("k", "rail", K),))
     system = build_system(mechanism)
@@ -194,6 +296,12 @@ def test_only_motions_have_to_meet():
     with pytest.raises(InputError, match=r"prescribed\.turn\.pieces: the law jumps by 1 at t = 0\.1 s"):
         PrescribedAngle("turn", "pin", jump)
     assert PointForce("push", PointRef("arm", "B"), (jump, 0.0)).laws == (jump,)
+    with pytest.raises(
+        InputError, match=r"prescribed\.turn\.interpolation: the rate of a motion between straight lines"
+    ):
+        PrescribedAngle("turn", "pin", TabulatedLaw((0.0, 1.0), (0.0, 0.2), "linear"))
+    with pytest.raises(InputError, match=r"law\.interpolation: unknown interpolation \(got 'cubic'\)"):
+        TabulatedLaw((0.0, 1.0), (0.0, 0.2), "cubic")
 
 
 # --- Files --------------------------------------------------------------------------------------------------------
@@ -241,6 +349,11 @@ SINE = ExpressionLaw("a * sin(t)", {"a": 0.3})
             (PiecewiseLaw((ConstantSpeed(0.0, 0.0), SINE), (0.5,)), 1.0),
         ),
         (FORCE_AT + 'table = "force.csv"', (TabulatedLaw((0.0, 0.5, 1.0), (1.0, 3.0, 2.0)), 0.0)),
+        (
+            FORCE_AT + 'table = "force.csv"\ninterpolation = "linear"',
+            (TabulatedLaw((0.0, 0.5, 1.0), (1.0, 3.0, 2.0), Interpolation.LINEAR), 0.0),
+        ),
+        (FORCE_AT + 'table = [[0, 1, 0], [1, 1, 1]]\ninterpolation = "spline"', (1.0, TabulatedLaw((0, 1), (0, 1)))),
         (TORQUE_AT + 'torque = "a * sin(t)"', (SINE,)),
         (TORQUE_AT + 'table = "torque.csv"', (TabulatedLaw((0.0, 1.0), (0.0, 0.2)),)),
         (
@@ -283,6 +396,8 @@ def test_files_give_loads_in_time_and_take_them(tmp_path, text, components):
             "load.push.pieces: the times of pieces must ascend from 0 (got 1.0)",
         ),
         (TORQUE_AT + "pieces = [{ until = 1, force = 1 }, { torque = 0 }]", "load.push.pieces.0"),
+        (FORCE_AT + 'force = [1, 0]\ninterpolation = "linear"', "load.push.interpolation: is of tables alone (got"),
+        (FORCE_AT + 'table = "force.csv"\ninterpolation = "cubic"', "load.push.interpolation"),
     ],
 )  # fmt: skip
 def test_loads_in_time_that_make_no_sense_are_refused_by_name(tmp_path, text, says):
@@ -300,6 +415,10 @@ def test_what_a_file_has_no_words_for_is_refused(tmp_path):
         mechanism.save(tmp_path / "no.toml")
     with pytest.raises(InputError, match=r"load\.push\.force: not a number or a law in time"):
         PointForce("push", PointRef("arm", "B"), ("t", 0.0))
+    differing = tuple(TabulatedLaw((0.0, 1.0), (0.0, 2.0), kind) for kind in ("spline", "linear"))
+    mechanism = pendulum(loads=(PointForce("push", PointRef("arm", "B"), differing),))
+    with pytest.raises(InputError, match="tables of the same times and interpolation"):
+        mechanism.save(tmp_path / "no.toml")
 
 
 # --- Derivatives --------------------------------------------------------------------------------------------------
@@ -351,11 +470,18 @@ def test_runs_have_derivatives_by_a_number_in_a_law_of_a_load(tmp_path):
             assert np.abs(exact[0] - expected).max() < within * np.abs(expected).max(), kind
 
 
-def test_loads_with_pieces_have_no_derivative_along_a_path(tmp_path):
-    study = study_of(tmp_path, 'pieces = [{ until = 0.03, force = ["a", 0] }, { force = [0, 0] }]')
+@pytest.mark.parametrize(
+    "force",
+    [
+        'pieces = [{ until = 0.03, force = ["a", 0] }, { force = [0, 0] }]',
+        'table = [[0, "a", 0], [0.03, 1, 0], [1.0, 0, 0]]\ninterpolation = "linear"',
+    ],
+)
+def test_loads_with_pieces_have_no_derivative_along_a_path(tmp_path, force):
+    study = study_of(tmp_path, force)
     task = Task(0, 0, nominal_values(study.setting), "line")
     planned, options = plan_task(study.setting, task)
-    with pytest.raises(InputError, match="loads whose law has pieces: no derivative"):
+    with pytest.raises(InputError, match="loads whose law has pieces or a linear table: no derivative"):
         Change(study.setting, task, planned, 0, 5.0).of_mode(given(planned, options, "++++"))
 
 
@@ -396,6 +522,7 @@ def test_torques_of_motors_in_time_do_the_work_that_the_arm_has():
         ('"2 * a"', 0.6),
         ('"a * sin(t)"', SINE),
         ("{ table = 'torque.csv' }", TabulatedLaw((0.0, 1.0), (0.0, 0.2))),
+        ("{ table = 'torque.csv', interpolation = 'linear' }", TabulatedLaw((0.0, 1.0), (0.0, 0.2), "linear")),
         (
             "{ pieces = [{ until = 0.5, torque = 'a * sin(t)' }, { torque = 0 }] }",
             PiecewiseLaw((SINE, ConstantSpeed(0.0, 0.0)), (0.5,)),

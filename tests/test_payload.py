@@ -4,8 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import paraflex as pf
+from paraflex.checks.drawing import pose_of
+from paraflex.cli.app import app
+from paraflex.cli.inspect import describe
 from paraflex.designs.sweep import load_sweep
 from paraflex.dynamics import build_system
 from paraflex.files import library_text, load_data, model_from
@@ -136,6 +140,41 @@ def test_saved_files_keep_the_table_unless_its_body_is_another(tmp_path):
         heavier = replace(model, mechanism=model.mechanism.with_bodies([changed]))
         heavier.save(tmp_path / "heavier.toml")
         assert pf.load(tmp_path / "heavier.toml").mechanism == heavier.mechanism
+
+
+def test_it_is_listed_and_drawn_where_it_is(tmp_path):
+    rod = pendulum(ROD).with_payload(Payload(0.1, 1e-3, (0.03, 0.02))).with_payload(Payload(0.3, 2e-3, (0.07, -0.02)))
+    both = rod.payload
+    assert (both.mass, *both.offset) == pytest.approx((0.4, 0.06, -0.01))
+    # By Steiner's theorem, 0.05 m being the distance of one from the other.
+    assert both.inertia == pytest.approx(3e-3 + 0.1 * 0.3 / 0.4 * (0.04**2 + 0.04**2))
+    assert rod.rigid().payload == both
+    facts = describe(pf.Model(rod))
+    assert facts["payload"]["point"] == "rod.P"
+    assert facts["payload"]["mass"] == pytest.approx(0.4)
+    assert facts["total_mass"] == pytest.approx(0.7)
+    figure = pf.draw(rod)
+    assert "payload 0.4 kg" in [text.get_text() for text in figure.legends[0].get_texts()]
+    (mark,) = [
+        line for line in figure.axes[0].get_lines() if line.get_marker() == "s" and line.get_markersize() == 11.0
+    ]
+    c, s = np.cos(-0.4), np.sin(-0.4)
+    place = [[c, -s], [s, c]] @ np.array([0.25 + 0.06, -0.01])
+    np.testing.assert_allclose(mark.get_xydata(), [place], rtol=0, atol=1e-6)
+    # Of a beam at the point; without one there is nothing.
+    shown = pose_of(with_table({"mass": "200 g"}))
+    np.testing.assert_allclose(shown.payload, pose_of("five_bar").desired[0], rtol=0, atol=1e-6)
+    assert pose_of("five_bar").payload is None
+    assert describe(pf.load("five_bar"))["payload"] is None
+
+
+def test_info_prints_it(tmp_path):
+    text = library_text("five_bar") + '\n[payload]\nmass = "200 g"\ninertia = "30 kg mm^2"\n'
+    (tmp_path / "model.toml").write_text(text)
+    done = CliRunner().invoke(app, ["info", str(tmp_path / "model.toml")])
+    assert "0.2 kg, 3e-05 kg m^2 at distal1.C" in done.output
+    assert "its payload among it" in done.output
+    assert "payload" not in CliRunner().invoke(app, ["info", "five_bar"]).output
 
 
 def test_it_is_varied_and_differentiated(tmp_path, monkeypatch):

@@ -257,6 +257,61 @@ def test_modes_are_chosen_and_unknown_ones_refused(results: Path) -> None:
         drawn(open_source(results / "motion"), "energies", modes=["++"])
 
 
+def curves(figure: Figure) -> dict[str, list]:
+    """Ordinates of the labelled curves of a figure."""
+    found: dict[str, list] = {}
+    for axes in figure.axes:
+        for line in axes.get_lines():
+            found.setdefault(str(line.get_label()), []).append(line.get_ydata())
+    return found
+
+
+def test_figures_of_the_end_effector_are_drawn_of_a_named_point(results: Path, tmp_path: Path) -> None:
+    data = pf.load_results(results / "tracking").isel(mode=0)
+    point = data.sel(point="proximal1.B1")
+    label = "proximal1.B1, mode ++"
+    moved = curves(plots.end_effector_motion(results / "tracking", "++", point="proximal1.B1"))
+    assert "desired" not in moved
+    parts = (1e3 * point["point_position"], point["point_velocity"], point["point_acceleration"])
+    for drawn_, part in zip(moved[label], [part.sel(axis=axis) for part in parts for axis in "xy"], strict=True):
+        np.testing.assert_array_equal(drawn_, part.values)
+    (path,) = curves(plots.end_effector_path(results / "tracking", "++", point="proximal1.B1"))[label]
+    np.testing.assert_array_equal(path, 1e3 * point["point_position"].sel(axis="y").values)
+    phases = curves(plots.phase_diagrams(results / "tracking", "++", point="proximal1.B1"))[label]
+    np.testing.assert_array_equal(phases[0], point["point_velocity"].sel(axis="x").values)
+    # The end-effector by its name is what it is without.
+    effector = str(data.attrs["end_effector_point"])
+    assert "desired" in curves(plots.end_effector_motion(results / "tracking", "++", point=effector))
+    with pytest.raises(InputError, match="magnification: a point without a desired path has no deviation"):
+        plots.end_effector_path(results / "tracking", "++", 10.0, point="proximal1.B1")
+    old = pf.load_results(results / "tracking").drop_vars(["point_velocity", "point_acceleration"])
+    with pytest.raises(InputError, match="no motion of points: they are of an earlier version"):
+        plots.end_effector_motion(old, "++", point="proximal1.B1")
+
+
+def test_the_command_draws_the_figures_of_points(results: Path, tmp_path: Path) -> None:
+    asked = ("--point", "proximal1.B1", "--point", "distal1.C", "--format", "png", "--dpi", 60)
+    code, said, _ = plot(results / "tracking", "end_effector_path", "point_motions", *asked, "--out", tmp_path / "two")
+    assert code == 0
+    assert [Path(line).name for line in said.splitlines()] == [
+        "end_effector_path_++_proximal1.B1.png",
+        "end_effector_path_++_distal1.C.png",
+        "point_motions_++_proximal1.B1,distal1.C.png",
+    ]
+    code, said, _ = plot(results / "motion", "all", *asked[4:], "--point", "beam.tip", "--out", tmp_path / "all")
+    assert code == 0, said
+    able = [figure.name for figure in CATALOGUE["motion"] if figure.points]
+    assert [Path(line).stem for line in said.splitlines()] == [f"{name}_beam.tip" for name in able]
+    code, _, said = plot(results / "tracking", "energies", "--point", "proximal1.B1")
+    assert code == 2
+    assert "--point: energies is not of a named point (got 'proximal1.B1'); choose from end_effector_path," in said
+    code, _, said = plot(results / "tracking", "end_effector_path", "--point", "C")
+    assert code == 2
+    assert "--point: no such point in these results (got 'C'); one of " in said
+    assert "distal1.C" in said
+    assert "\n" not in said
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

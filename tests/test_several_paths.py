@@ -1,6 +1,7 @@
 """Several paths in one run: each in every mode, each with the results that a run of its own would have."""
 
 import json
+import re
 import signal
 import sys
 from dataclasses import replace
@@ -11,6 +12,7 @@ import xarray as xr
 import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults, library_file
+from paraflex.studies import load_sensitivities, load_sweep
 from processes import started
 from shell import BEGUN, paraflex
 
@@ -87,6 +89,52 @@ def test_the_study_names_paths(tmp_path):
     one = paraflex("run", file, "--rigid", "--path", "line", *FAST, "--out", tmp_path / "one", "--json")
     assert json.loads(one.stdout)["parameters"]["run"]["path"] == "line"
     assert (tmp_path / "one" / "results.nc").is_file()
+
+
+FAR = '[path.far]\ntype = "line"\nstart = [0.0, 0.3]\nend = [0.0, 3.0]\nmax_acceleration = 5.0\n'
+FASTER = '[path.fast]\ntype = "line"\nstart = [0.0, 0.3]\nend = [0.02, 0.3]\nmax_acceleration = 5e3\n'
+
+
+def test_info_looks_at_all_paths_of_the_study(tmp_path):
+    file = model_file(tmp_path, 'paths = ["line", "far", "fast"]\nmodes = ["++"]', FAR + FASTER)
+    found = {one.place: one for one in pf.check(file)}
+    assert found["path.far"].code == "path-unreachable"
+    assert found["path.fast"].code == "path-fast"
+    assert "path.line" not in found
+    assert [one.place for one in pf.check(file, path="line")] == []
+    assert "path.far" not in {one.place for one in pf.check(file, path="fast")}
+    done = paraflex("info", file)
+    assert done.returncode == 1
+    assert "path.far: " in done.stdout
+    file = model_file(tmp_path, 'paths = ["line", "square"]\nmodes = ["++"]')
+    assert "the study's paths can be followed" in paraflex("info", file).stdout
+    assert "the study's path can be followed" in paraflex("info", file, "--path", "line").stdout
+
+
+def test_findings_that_differ_between_paths_name_theirs(tmp_path):
+    push = '[load.push]\ntype = "torque"\npoint = "distal1.C"\ntable = [[0, 0], [2, 0.1]]\n'
+    file = model_file(tmp_path, 'paths = ["line", "square"]\nmodes = ["++"]', push)
+    found = [one.text for one in pf.check(file) if one.code == "law-cut-short"]
+    assert [text.partition(", ")[0] for text in found] == ["on path line", "on path square"]
+    # What is the same for all of them is said once, and of no path.
+    file.write_text(re.sub(r"\[mode\]\n.*?\n\n", "\n", file.read_text(), flags=re.DOTALL).replace('modes = ["++"]', ""))
+    (one,) = [one for one in pf.check(file) if one.code == "mode-missing"]
+    assert not one.text.startswith("on path")
+
+
+def test_studies_of_many_designs_take_all_paths_of_the_study(tmp_path):
+    model_file(tmp_path, 'paths = ["square", "line"]\nmodes = ["++"]')
+    text = (
+        'mechanism = "bars.toml"\nmetrics = ["tracking_rms"]\nsamples = 11\n[vary.w]\nfields = ["section.bar.width"]\n'
+    )
+    (tmp_path / "sweep.toml").write_text(text + "values = [0.03]\n[integration]\ntolerance = 1e-3\n")
+    sweep = load_sweep(tmp_path / "sweep.toml")
+    assert sweep.setting.paths == ("square", "line")
+    assert {*sweep.run(tmp_path / "out").data["path"].values.tolist()} == {"square", "line"}
+    (tmp_path / "sweep.toml").write_text('paths = ["line"]\n' + text + "values = [0.03]\n")
+    assert load_sweep(tmp_path / "sweep.toml").setting.paths == ("line",)
+    (tmp_path / "slopes.toml").write_text(text)
+    assert load_sensitivities(tmp_path / "slopes.toml").setting.paths == ("square", "line")
 
 
 @pytest.mark.parametrize(

@@ -171,6 +171,103 @@ def test_a_name_may_look_like_a_quantity():
     assert changed("five_bar", ("name",), "2 mm").mechanism.name == "2 mm"
 
 
+SLIDING = """
+name = "slide"
+ground = { O = [0.0, 0.0] }
+[body.block]
+type = "rigid"
+mass = 2.0
+inertia = 0.1
+points = { C = [0.0, 0.0] }
+[joint.rail]
+type = "prismatic"
+points = ["ground.O", "block.C"]
+[assembly.start]
+block = 0.0
+"""
+MOVED = '[prescribed.drive]\njoint = "rail"\ntable = "table.csv"\n'
+PUSHED = '[load.push]\ntype = "force"\npoint = "block.C"\ntable = "table.csv"\n'
+DRIVEN = '[motor]\nlift = "rail"\n[study.torques.lift]\ntable = "table.csv"\n'
+DRAWN = '[path.p]\ntype = "table"\nmotion_time = 1.0\ntable = "table.csv"\n'
+
+
+def with_table(folder, text, table):
+    (folder / "table.csv").write_text(table)
+    (folder / "slide.toml").write_text(SLIDING + text)
+    return pf.load(folder / "slide.toml")
+
+
+def columns_of(model):
+    """Times and values of the table of a model's law."""
+    members = [one.law for one in model.mechanism.prescribed] + [x for one in model.mechanism.loads for x in one.laws]
+    return [(law.times, law.values) for law in [*members, *model.study.torques.values()]]
+
+
+@pytest.mark.parametrize(
+    ("text", "table", "expected"),
+    [
+        (MOVED, "t [ms], x [mm]\n0, 0\n100, 1.1\n", [((0.0, 0.1), (0.0, 0.0011))]),
+        (MOVED, "t; x (mm)\n0; 0\n1; 20\n", [((0.0, 1.0), (0.0, 0.02))]),
+        (MOVED, "t [ms] x [m]\n0 0\n100 1\n", [((0.0, 0.1), (0.0, 1.0))]),
+        # As NumPy's savetxt writes headings.
+        (MOVED, "# measured\n# t [ms], x [mm]\n0,0\n100,20\n", [((0.0, 0.1), (0.0, 0.02))]),
+        # Remarks, and names that end in a unit, are no units.
+        (MOVED, "t (by hand), x_mm\n0, 0\n1, 2\n", [((0.0, 1.0), (0.0, 2.0))]),
+        (MOVED, "# sampled at [1 kHz], [t]\nt, x\n0, 0\n1, 2\n", [((0.0, 1.0), (0.0, 2.0))]),
+        (PUSHED, '"t [s]","x [kN]","y [mN]"\n0,0,0\n1,2,30\n', [((0, 1), (0, 2000)), ((0, 1), (0, 0.03))]),
+        (DRIVEN, "t [min], F [kN]\n0 0\n0.5 2\n", [((0.0, 30.0), (0.0, 2000.0))]),
+    ],
+)
+def test_columns_of_tables_may_have_units(tmp_path, text, table, expected):
+    model = with_table(tmp_path, text, table)
+    assert columns_of(model) == expected
+    # A model that is saved beside the file names it still.
+    replace(model, mechanism=replace(model.mechanism, gravity=(0.0, -9.81))).save(tmp_path / "saved.toml")
+    assert 'table = "table.csv"' in (tmp_path / "saved.toml").read_text()
+    assert columns_of(pf.load(tmp_path / "saved.toml")) == expected
+
+
+def test_points_of_a_path_may_have_units(tmp_path):
+    table = "x [mm], y [cm]\n" + "".join(f"{10 * k}, {k * k}\n" for k in range(5))
+    path = with_table(tmp_path, DRAWN, table).path("p")
+    np.testing.assert_allclose(path.points, [[0.01 * k, 0.01 * k * k] for k in range(5)], rtol=1e-15)
+    (tmp_path / "path.toml").write_text(DRAWN.replace("[path.p]", "[path]"))
+    np.testing.assert_array_equal(pf.load_path(tmp_path / "path.toml").points, path.points)
+    timed = DRAWN.replace("motion_time = 1.0\n", "")
+    table = "x [mm], y [mm], t [ms]\n" + "".join(f"{10 * k}, {k * k}, {100 * k}\n" for k in range(5))
+    np.testing.assert_allclose(with_table(tmp_path, timed, table).path("p").times, [0, 0.1, 0.2, 0.3, 0.4], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "table", "says"),
+    [
+        (
+            MOVED, "t [s], x [deg]\n0, 0\n1, 2\n",
+            "prescribed.drive.table: column 2 of table.csv is in rad where m is asked for (got 'x [deg]')",
+        ),
+        (PUSHED, "t [s], x [mm], y [N]\n0,0,0\n1,1,1\n", "load.push.table: column 2 of table.csv is in m where N is"),
+        (PUSHED, "t [N], x [N], y [N]\n0,0,0\n1,1,1\n", "load.push.table: column 1 of table.csv is in N where s is"),
+        (DRIVEN, "t, F [Nm]\n0,0\n1,1\n", "study.torques.lift.table: column 2 of table.csv is in N m where N is"),
+        (DRAWN, "x [s], y [m]\n0,0\n1,1\n", "path.p.table: column 1 of table.csv is in s where m is"),
+        (MOVED, "t [s], x [mn]\n0, 0\n1, 2\n", 'drive.table: column 2 of table.csv has the unknown unit "mn"'),
+        (MOVED, "t [s], x [-]\n0, 0\n1, 2\n", 'drive.table: column 2 of table.csv has the unknown unit "-"'),
+        (MOVED, "time of run x [mm]\n0 0\n1 2\n", "the headings of table.csv do not tell to which of 2 columns"),
+    ],
+)  # fmt: skip
+def test_units_of_columns_are_those_of_the_field(tmp_path, text, table, says):
+    with pytest.raises(pf.InputError) as caught:
+        with_table(tmp_path, text, table)
+    assert says in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "slide.toml"))
+    assert caught.value.remedy
+
+
+def test_rows_of_a_force_have_units_of_their_place(tmp_path):
+    rows = 'table = [[0, "1 kN", 0], ["1 min", 0, "3 mN"]]\n'
+    model = with_table(tmp_path, PUSHED.replace('table = "table.csv"\n', rows), "")
+    assert columns_of(model) == [((0.0, 60.0), (1000.0, 0.0)), ((0.0, 60.0), (0.0, 0.003))]
+
+
 def test_joints_that_slide_have_forces_and_lengths():
     data = {"joint": {"A": {"type": "prismatic"}, "B": ["a", "b"]}, "motor": {"push": "A", "turn": "B"}}
     data |= {"spring": {"s": {"joint": "A"}, "t": {"joint": "B"}}, "friction": {"f": {"joint": "A"}}}

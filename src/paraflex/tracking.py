@@ -30,6 +30,7 @@ from paraflex.integrators import IntegrationOptions, Method, Solution, check_tim
 from paraflex.integrators.beam_ends import leave_beam
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
+from paraflex.mechanism.laws import stops
 from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn, with_blame
 
 # Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
@@ -420,7 +421,7 @@ def _drive(
     on_progress: Callable[[float], None] | None,
 ) -> Solution:
     signals, knots = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))
-    stops = np.sort(np.concatenate([torques.knots, knots]))
+    stops = np.sort(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))
     try:
         return integrate(task.system, signals, task.start, times, knots=stops, options=options, on_progress=on_progress)
     except IntegrationError as error:
@@ -502,3 +503,9 @@ def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Ar
     # Of two that are one, that of the load is kept: steps end there.
     apart = np.abs(knots[:, None] - given) > _SAME_TIME * end
     return np.unique(np.concatenate([knots[apart.all(axis=1)], given]))
+
+
+def path_stops(knots: Array, mechanism: Mechanism) -> Array:
+    """Those of the knots of planned torques at which steps end: not all rows of a long table of a load."""
+    laws = [law for load in mechanism.loads for law in load.laws]
+    return knots[~np.isin(knots, [knot for law in laws for knot in set(law.knots) - set(stops(law))])]

@@ -113,6 +113,11 @@ def unit_named(text: str) -> Unit:
     return unit
 
 
+def unit_of(text: str) -> Unit | None:
+    """The unit that a text is, None for a text that is no unit."""
+    return unit_named(text.strip()) if _QUANTITY.fullmatch(f"1 {text.strip()}") else None
+
+
 def quantities_in(text: str) -> list[NumberWithUnit]:
     """Numbers with units in a text, in their order."""
     return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from paraflex.files import Model
 from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
 from paraflex.mechanism import ActuationMode, AngleLaw, Mechanism
-from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw
+from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw, marks
 from paraflex.mechanism.loads import InTime
 from paraflex.tracking import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
@@ -54,7 +55,19 @@ def study_findings(
             "add an [end_effector] table with its point",
         )  # fmt: skip
         return
-    name = model.path_name(path)
+    names = model.study.paths if path is None and model.study.paths else (model.path_name(path),)
+    found = {name: [*_of_path(model, name, assembly, modes)] for name in names}
+    shared = [one for one in found[names[0]] if all(one in of_path for of_path in found.values())]
+    yield from shared
+    for name, of_path in found.items():
+        for one in of_path:
+            if one not in shared:
+                of_its_place = one.place.startswith("path.")
+                yield one if of_its_place else replace(one, text=f"on path {name}, {one.text}")
+
+
+def _of_path(model: Model, name: str, assembly: str | None, modes: Sequence[str] | None) -> Iterator[Finding]:
+    """What is wrong or doubtful about one path of a study."""
     chosen, duration = model.paths[name], model.duration(name)
     if duration < chosen.duration:
         # With xarray, which descriptions of mechanisms do without.
@@ -229,10 +242,10 @@ def _given_torques(model: Model) -> Iterator[Finding]:
 
 
 def _largest_torque(torque: InTime, duration: float) -> float:
-    """The largest magnitude of a torque until a time, knots of its law included [N m]."""
+    """The largest magnitude of a torque until a time, knots and rows of its law included [N m]."""
     if not isinstance(torque, AngleLaw):
         return abs(torque)
-    times = [*np.linspace(0.0, duration, _SAMPLES), *(knot for knot in torque.knots if knot <= duration)]
+    times = [*np.linspace(0.0, duration, _SAMPLES), *(time for time in marks(torque) if 0.0 <= time <= duration)]
     return float(np.max(np.abs(torque.evaluate(np.array(times))[0])))
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from paraflex.plots.film import Film
 
 # Fields of `FilmOptions` that are given as they are.
-_OPTIONS = ("magnify", "fps", "speed", "theme", "at", "model")
+_OPTIONS = ("magnify", "fps", "speed", "theme", "at", "model", "point")
 
 
 def animate_command(request: AnimateRequest) -> int:

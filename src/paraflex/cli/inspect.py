@@ -79,6 +79,7 @@ def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]
         "assembly": None if chosen is None else chosen.assembly,
         "assembly_closes": None if chosen is None else (chosen.closes or chosen.problem),
         "gruebler_count": seen.rigid.n - seen.rigid.n_constraints,
+        "several_paths": not request.path and len(model.study.paths) > 1,
         "verdict": verdict.to_dict(),
     }
     if seen.mobility is None or seen.reach is None:
@@ -106,11 +107,20 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "flexible_coordinates": system.n_flexible,
         "constraints": system.n_constraints,
         "total_mass": system.total_mass,
+        "payload": _payload_facts(mechanism),
         "assemblies": [assembly.name for assembly in mechanism.assemblies],
         "modes": [mode.name for mode in mechanism.modes],
         "paths": list(model.paths),
         **{group.words: list(map(_equation, members)) for group, members in grouped(mechanism) if group.relates},
     }
+
+
+def _payload_facts(mechanism: Mechanism) -> dict[str, Any] | None:
+    carried, effector = mechanism.payload, mechanism.end_effector
+    if carried is None or effector is None:
+        return None
+    numbers = {"mass": carried.mass, "inertia": carried.inertia, "offset": list(carried.offset)}
+    return {"point": str(effector.point), **numbers}
 
 
 def _equation(one: Relation) -> str:

@@ -60,7 +60,8 @@ def print_verdict(console: Console, facts: dict[str, Any]) -> None:
         console.print(f"{one['level']}: {one['place']}: {one['text']}; {one['remedy']} [{one['code']}]", soft_wrap=True)
     if verdict["level"] == Level.SOUND.value:
         drives = ", every mode drives all that is free" if facts["modes"] else ""
-        path = ", the study's path can be followed" if facts["paths"] else ""
+        paths = "paths" if facts["several_paths"] else "path"
+        path = f", the study's {paths} can be followed" if facts["paths"] else ""
         console.print(f"sound: every assembly closes, the pose is not a special one{drives}{path}", soft_wrap=True)
     else:
         count = len(verdict["findings"])
@@ -99,8 +100,20 @@ def _counts(facts: dict[str, Any]) -> Table:
         # Most mechanisms have no gears and the like.
         if key in facts and (facts[key] or key not in related):
             value = facts[key]
+            if key == "total_mass" and facts["payload"]:
+                table.add_row(label, f"{value:g}, its payload among it")
+                table.add_row("payload", _payload(facts["payload"]))
+                continue
             table.add_row(label, (_some(value) or "none") if isinstance(value, list) else f"{value:g}")
     return table
+
+
+def _payload(carried: dict[str, Any]) -> str:
+    """What the end-effector carries, and where."""
+    inertia = f", {carried['inertia']:g} kg m^2" if carried["inertia"] else ""
+    x, y = carried["offset"]
+    beside = f", {x:g}, {y:g} m from it" if x or y else ""
+    return f"{carried['mass']:g} kg{inertia} at {carried['point']}{beside}"
 
 
 def _some(names: Sequence[Any]) -> str:

@@ -10,6 +10,8 @@ from paraflex.cli.commands.requests import flags
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults
+from paraflex.files.expressions import ExpressionError, evaluate
+from paraflex.files.fields import check_unit
 from paraflex.integrators import (
     DeflectionLimit,
     Event,
@@ -20,10 +22,13 @@ from paraflex.integrators import (
     check_events,
 )
 from paraflex.mechanism import Mechanism
+from paraflex.units import quantities_in
 
 # Fields of a request that `IntegrationOptions` has too, and those that kineto-elastodynamics has no use for.
 _OPTIONS = ("tolerance", "alpha", "beta", "max_steps", "method", "step", "constraints", "automatic_gains")
 _OF_STEPS = (*_OPTIONS, "parameters", "stop_at", "balanced", "after")
+# Units of what events are about; a joint's is known with the mechanism.
+_OF_JOINT, _OF_DEFLECTION = ("rad", "m"), ("m",)
 _SPECS = "joint:NAME=LOW..HIGH, deflection:BODY=METRES or singular=DISTANCE"
 
 
@@ -78,14 +83,14 @@ def _parameter(text: str) -> tuple[str, float]:
 
 
 def parse_event(text: str) -> Event:
-    """Read an event: "joint:A1=0.1..1.4", "deflection:link1=0.002", "singular=0.05", "singular:tau1,tau5=0.05"."""
+    """Read an event: "joint:A1=0.1..80 deg", "deflection:link1=2 mm", "singular=0.05", "singular:tau1,tau5=0.05"."""
     what, sign, value = text.rpartition("=")
     kind, colon, name = (part.strip() for part in what.partition(":"))
     named = bool(colon and name)
     if sign and kind == "joint" and named:
         return _event(JointLimit, text, name, *_range(value, text))
     if sign and kind == "deflection" and named:
-        return _event(DeflectionLimit, text, name, _number(value, "--stop-at", text))
+        return _event(DeflectionLimit, text, name, _number(value, "--stop-at", text, _OF_DEFLECTION))
     if sign and kind == "singular" and named is bool(colon):
         motors = tuple(motor.strip() for motor in name.split(",")) if named else ()
         return _event(SingularDistance, text, _number(value, "--stop-at", text), motors)
@@ -105,17 +110,23 @@ def _range(value: str, text: str) -> tuple[float, float]:
         raise InputError(
             "not a range", field="--stop-at", value=text, remedy="write LOW..HIGH; either may be left out, say ..1.4"
         )
-    lower = _number(low, "--stop-at", text) if low.strip() else -math.inf
-    return lower, _number(high, "--stop-at", text) if high.strip() else math.inf
+    lower = _number(low, "--stop-at", text, _OF_JOINT) if low.strip() else -math.inf
+    return lower, _number(high, "--stop-at", text, _OF_JOINT) if high.strip() else math.inf
 
 
-def _number(value: str, flag: str, text: str) -> float:
+def _number(value: str, flag: str, text: str, units: tuple[str, ...] = ()) -> float:
+    """A number, or one with a unit of the dimension of one of some units."""
+    remedy = f"give one in {' or '.join(units)}, or with a unit" if units else "give one"
     try:
-        number = float(value)
-    except ValueError:
+        number = evaluate(value, {}) if quantities_in(value) else float(value)
+    except (ValueError, ExpressionError):
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f'"{value.strip()}" is not a number', field=flag, value=text, remedy="give one, in SI units")
+        raise InputError(f'"{value.strip()}" is not a number', field=flag, value=text, remedy=remedy)
+    try:
+        check_unit(value, {}, units, flag, f"it in {' or '.join(units)}" if units else "a number")
+    except InputError as error:
+        raise InputError(error.problem, field=flag, value=text, remedy=error.remedy) from None
     return number
 
 
@@ -124,6 +135,11 @@ def check_stops(mechanism: Mechanism, options: IntegrationOptions, stop_at: Sequ
     for event, text in zip(options.events, stop_at, strict=True):
         try:
             check_events(mechanism, (event,))
+            if isinstance(event, JointLimit):
+                slides = mechanism.joint(event.joint).slides
+                for limit in text.rpartition("=")[2].split("..", 1):
+                    if limit.strip():
+                        _number(limit, "--stop-at", text, _OF_JOINT[slides : slides + 1])
         except InputError as error:
             problem = f"{error.problem} {error.value}" if error.problem.startswith("unknown") else error.problem
             raise InputError(problem, field="--stop-at", value=text, remedy=error.remedy) from None

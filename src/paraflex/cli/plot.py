@@ -26,9 +26,12 @@ def plot_command(request: PlotRequest) -> int:
     if request.only_list or not request.figures:
         _list(source, request.results)
         return COMPLETE
-    chosen = figures_of(source) if request.figures == [ALL] else [find_figure(source, n) for n in request.figures]
-    chosen = list(dict.fromkeys(chosen))
-    drawn = [drawing for figure in chosen for drawing in drawings(source, figure, request.modes, request.metrics)]
+    if request.figures == [ALL]:
+        chosen = [figure for figure in figures_of(source) if figure.points or not request.points] or figures_of(source)
+    else:
+        chosen = list(dict.fromkeys(find_figure(source, name) for name in request.figures))
+    asked = (request.modes, request.metrics, request.points)
+    drawn = [drawing for figure in chosen for drawing in drawings(source, figure, *asked)]
     # Only now: Matplotlib takes longer to import than all until here.
     from paraflex.plots.save import write_figures
 

@@ -65,7 +65,9 @@ class SweepTable(Table):
     name: Text = Field(default=DEFAULT_NAME, description="a name for the study")
     mechanism: Text = Field(description="a library mechanism or a file, seen from the study file's folder")
     set: dict[str, Any] = Field(default={}, description="values in place of the mechanism's file, by field")
-    paths: list[Text] = Field(default=[], description="paths of the mechanism's file by name")
+    paths: list[Text] = Field(
+        default=[], description="paths of the mechanism's file by name; by default those of its [study]"
+    )
     modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
     duration: Number | None = Field(default=None, description="the duration in s, dwell included")
     samples: Count | None = Field(default=None, description="the number of samples of each run")

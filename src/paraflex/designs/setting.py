@@ -260,7 +260,7 @@ def _place(data: Mapping[str, Any], field: str) -> Place:
 
 def _paths(model: Model, names: list[str]) -> tuple[str, ...]:
     if not names:
-        return (model.path_name(),)
+        return model.study.paths or (model.path_name(),)
     for name in names:
         known(name, model.paths, "paths", "path")
     return tuple(dict.fromkeys(names))

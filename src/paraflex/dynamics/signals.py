@@ -12,7 +12,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.errors import InputError
 from paraflex.kernel.packed import PackedSystem, Signals
-from paraflex.mechanism import AngleLaw, Mechanism
+from paraflex.mechanism import AngleLaw, Mechanism, TabulatedLaw
 
 # Breaks of a prescribed law: its quintic Hermite pieces are this short, as a fraction of the run.
 _LAW_PIECES = 2000
@@ -110,6 +110,9 @@ def law_signal(place: str, law: AngleLaw, end: float) -> tuple[InputSignals, lis
         It does not cover the run or is not finite in it.
     """
     inner = sorted(knot for knot in law.knots if 0.0 < knot < end)
+    if isinstance(law, TabulatedLaw) and law.linear:
+        t = _grid(law, 0.0, end, end)
+        return _polyline(t, _evaluate(place, law, t)[0]), [stop for stop in law.stops if 0.0 < stop < end]
     # The law or a derivative may jump at a knot: pieces on either side take its one-sided limits.
     parts = []
     for a, b in pairwise([0.0, *inner, end]):
@@ -119,6 +122,13 @@ def law_signal(place: str, law: AngleLaw, end: float) -> tuple[InputSignals, lis
         inside[-1] = min(b - 1e-12 * (b - a), np.nextafter(b, a))
         parts.append(piecewise_quintic(t, *_evaluate(place, law, inside)))
     return _join(parts), inner
+
+
+def _polyline(t: Array, value: Array) -> InputSignals:
+    """Straight lines between values at times t."""
+    coefficients = np.zeros((t.size - 1, _DEGREE + 1))
+    coefficients[:, 0], coefficients[:, 1] = value[:-1], np.diff(value) / np.diff(t)
+    return InputSignals(t, coefficients)
 
 
 def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float]]:

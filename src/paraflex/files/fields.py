@@ -19,13 +19,14 @@ from paraflex.units import FIELD_UNITS, PLAIN, Dimension, quantities_in, spelt, 
 Place = tuple[str | int, ...]
 
 _SI = f"(?:{'|'.join(map(re.escape, FIELD_UNITS))})"
-# "in m", "in rad/s or m/s", "in s and rad or m"; the longest unit that fits stands first in the list.
-_IN_UNITS = re.compile(rf"\bin ({_SI}(?:,? (?:or|and) {_SI})*)(?=[\s,.)]|$)")
+# "in m", "in rad/s or m/s", "in s and rad or m", "in s, N and N"; the longest unit that fits stands first in the list.
+_IN_UNITS = re.compile(rf"\bin ({_SI}(?:(?:,|,? (?:or|and)) {_SI})*)(?=[\s,.)]|$)")
+_AND = re.compile(r" and |, (?!or\b)")
 # Tables of numbers by names of the user's, and of values whose fields are those of another file.
 _OF_ANY_UNIT = ("parameters", "set")
 # What a spring's stiffness, a rest, a torque or a speed at a joint is where the joint slides.
-_WHERE_IT_SLIDES = {"N m/rad": "N/m", "N m s/rad": "N s/m", "N m": "N", "rad": "m", "rad/s": "m/s"}
-_WHERE_IT_TURNS = {slides: turns for turns, slides in _WHERE_IT_SLIDES.items()}
+WHERE_IT_SLIDES = {"N m/rad": "N/m", "N m s/rad": "N s/m", "N m": "N", "rad": "m", "rad/s": "m/s"}
+_WHERE_IT_TURNS = {slides: turns for turns, slides in WHERE_IT_SLIDES.items()}
 
 
 class FileField(NamedTuple):
@@ -84,7 +85,7 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
     slides = _slides(data, place)
     if slides is None:
         return units
-    other = _WHERE_IT_SLIDES if slides else _WHERE_IT_TURNS
+    other = WHERE_IT_SLIDES if slides else _WHERE_IT_TURNS
     return tuple(dict.fromkeys(other.get(unit, unit) for unit in units))
 
 
@@ -180,9 +181,9 @@ def _units_in(description: str, row: Sequence[Any] | None, key: str | int) -> tu
     if row is not None and isinstance(key, int):
         for before, units in found:
             names = before[before.rfind("[") :].split("]")[0].split(",")
+            each = _AND.split(units)
             if len(names) == len(row):
-                first, _, last = units.rpartition(" and ")
-                return _alternatives(last if key == len(row) - 1 or not first else first)
+                return _alternatives(each[key] if len(each) == len(row) else each[-1 if key == len(row) - 1 else 0])
     return tuple(dict.fromkeys(unit for _, units in found for unit in _alternatives(units)))
 
 

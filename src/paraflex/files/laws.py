@@ -20,7 +20,7 @@ from paraflex.files.expressions import (
 )
 from paraflex.files.schema import PieceTable, PrescribedTable
 from paraflex.mechanism import AngleLaw, ConstantSpeed, PiecewiseLaw, TabulatedLaw
-from paraflex.mechanism.laws import Values
+from paraflex.mechanism.laws import Interpolation, Values
 from paraflex.mechanism.loads import InTime
 
 # Instants at which a law is tried when it is read.
@@ -125,7 +125,7 @@ def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
             return {key: value for key, value in ((quantity, angle), ("speed", speed)) if value != 0.0}
         case ExpressionLaw(text=text, knots=()):
             return {quantity: text}
-        case TabulatedLaw(times=times, values=values, knots=()):
+        case TabulatedLaw(times=times, values=values):
             return {"table": list(zip(times, values, strict=True))}
         case PiecewiseLaw(pieces=pieces, ends=ends):
             last = {quantity: _piece(pieces[-1])}
@@ -142,7 +142,7 @@ def read_components(
     Parameters
     ----------
     entry : table
-        With a field of the quantity's name, `pieces` and `table`, of which one is given.
+        With a field of the quantity's name, `pieces` and `table`, of which one is given, and a table's `interpolation`.
     quantity : str
     parameters : mapping of str to float
     duration : float or None
@@ -160,9 +160,14 @@ def read_components(
             problem, field=given[-1] if given else quantity, value=", ".join(given) or None,
             remedy=f"drop all but {given[0]}" if given else f"give it, or pieces or a table of the {quantity}",
         )  # fmt: skip
+    if entry.interpolation is not None and entry.table is None:
+        raise InputError(
+            "is of tables alone", field="interpolation", value=entry.interpolation, remedy="drop it, or give a table"
+        )
     if entry.table is not None:
         times, *columns = zip(*entry.table, strict=True) if entry.table else ((), ())
-        found = [TabulatedLaw(times, column) for column in columns]
+        kind = Interpolation(entry.interpolation or Interpolation.SPLINE)
+        found = [TabulatedLaw(times, column, kind) for column in columns]
         components = tuple(law.values[0] if len(set(law.values)) == 1 else law for law in found)
     elif entry.pieces is not None:
         ends = _ends(entry.pieces)
@@ -214,15 +219,17 @@ def components_table(components: Sequence[InTime], quantity: str) -> dict[str, A
     tables = [law for law in components if isinstance(law, TabulatedLaw)]
     pieces = [law for law in components if isinstance(law, PiecewiseLaw)]
     if tables:
-        times = tables[0].times
+        times, kind = tables[0].times, tables[0].interpolation
         columns = [
             law.values if isinstance(law, TabulatedLaw) else (law,) * len(times)
             for law in components
-            if (isinstance(law, TabulatedLaw) and law.times == times) or not isinstance(law, AngleLaw)
+            if not isinstance(law, AngleLaw)
+            or (isinstance(law, TabulatedLaw) and (law.times, law.interpolation) == (times, kind))
         ]
         if len(columns) < len(components):
             raise _unlike(components)
-        return {"table": [[*row] for row in zip(times, *columns, strict=True)]}
+        table = {"table": [[*row] for row in zip(times, *columns, strict=True)]}
+        return table | ({"interpolation": kind.value} if tables[0].linear else {})
     if not pieces:
         return {quantity: said([_piece(law) for law in components])}
     ends = pieces[0].ends
@@ -278,7 +285,7 @@ def _unlike(components: Sequence[InTime]) -> InputError:
     return InputError(
         "a model file cannot say a force whose components change at different times",
         field="force", value=", ".join(type(law).__name__ for law in components),
-        remedy="give both pieces with the same ends, or tables of the same times",
+        remedy="give both pieces with the same ends, or tables of the same times and interpolation",
     )  # fmt: skip
 
 

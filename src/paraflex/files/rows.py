@@ -1,4 +1,7 @@
-"""Rows of numbers from a text file, such as a motion or a force measured or computed elsewhere."""
+"""Rows of numbers from a text file, such as a motion or a force measured or computed elsewhere.
+
+Headings may give units in brackets, "t [ms], x [N]"; columns without are in SI units.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,16 @@ import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError
+from paraflex.files.fields import Place, units_at
+from paraflex.files.overlay import overlaid
 from paraflex.files.read import text_of
+from paraflex.files.schema import ModelTable, PathFile
+from paraflex.units import spelt, unit_named, unit_of, unknown_unit
 
 # Columns that a file may have: what they are called, and what stands in them.
 _TWO, _THREE, _PATH = (2,), (3,), (2, 3)
@@ -22,6 +30,10 @@ _VALUES = {
     _PATH: "x and y in m, and perhaps a time",
 }
 _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
+_BETWEEN_HEADINGS = re.compile(r"[,;\t]")
+# A unit at the end of a heading; round brackets may also hold a remark.
+_SQUARE_ANYWHERE = re.compile(r"\[([^\[\]]*)\]")
+_SQUARE, _ROUND = re.compile(r"\[([^\[\]]*)\]\W*$"), re.compile(r"\(([^()]*)\)\W*$")
 
 
 def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -37,7 +49,8 @@ def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        A file that cannot be read or has anything but so many columns of numbers below one line of headings.
+        A file that cannot be read or has anything but so many columns of numbers below one line of headings, or a unit
+        in these that is not the column's.
     """
     if not any(isinstance(entry.get("table"), str) for _, entry, _ in _entries(data)):
         return data
@@ -45,7 +58,7 @@ def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     for place, entry, columns in _entries(data):
         file = entry.get("table")
         if isinstance(file, str):
-            entry["table"] = _read_rows(folder / file, file, f"{place}.table", columns)
+            entry["table"] = _read_rows(data, place, folder / file, file, columns)
     return data
 
 
@@ -56,25 +69,25 @@ def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
     for place, entry, columns in _entries(data):
         file = named.get(place)
         with suppress(InputError):
-            if isinstance(file, str) and _read_rows(folder / file, file, place, columns) == entry.get("table"):
+            if isinstance(file, str) and _read_rows(data, place, folder / file, file, columns) == entry.get("table"):
                 entry["table"] = file
     return data
 
 
-def _entries(data: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], tuple[int, ...]]]:
+def _entries(data: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any], tuple[int, ...]]]:
     """The tables of a model's data that may name a file as their `table`: where each is, itself, and columns."""
     for group in ("prescribed", "load"):
         for name, entry in _tables(data.get(group)):
-            yield f"{group}.{name}", entry, _THREE if group == "load" and entry.get("type") == "force" else _TWO
+            yield (group, name), entry, _THREE if group == "load" and entry.get("type") == "force" else _TWO
     for name, entry in _tables(_of_study(data)):
-        yield f"study.torques.{name}", entry, _TWO
+        yield ("study", "torques", name), entry, _TWO
     paths: Any = data.get("path")
     # A file of one path has it in place of its name.
     if isinstance(paths, dict) and isinstance(paths.get("type"), str):
-        yield "path", paths, _PATH
+        yield ("path",), paths, _PATH
         return
     for name, entry in _tables(paths):
-        yield f"path.{name}", entry, _PATH
+        yield ("path", name), entry, _PATH
 
 
 def _of_study(data: dict[str, Any]) -> Any:
@@ -85,18 +98,22 @@ def _tables(given: Any) -> list[tuple[str, dict[str, Any]]]:
     return [(name, one) for name, one in given.items() if isinstance(one, dict)] if isinstance(given, dict) else []
 
 
-def _read_rows(path: Path, name: str, field: str, columns: tuple[int, ...]) -> list[list[float]]:
-    count = _COUNTS[columns]
+def _read_rows(
+    data: dict[str, Any], place: Place, path: Path, name: str, columns: tuple[int, ...]
+) -> list[list[float]]:
+    """Rows of a file for the table at a place, in SI units."""
+    field, count = ".".join(map(str, (*place, "table"))), _COUNTS[columns]
     unread, wrong = "name a file, seen from the model file's folder", f"save {count} columns as CSV"
     lines = text_of(path, field, name, unread=unread, wrong=wrong).splitlines()
     rows: list[list[float]] = []
-    headed = False
+    headings, comment = None, ""
     for number, line in enumerate(lines, start=1):
         if not line.strip() or line.lstrip().startswith("#"):
+            comment = comment if rows or not line.strip() else line
             continue
         row = _numbers(line, (len(rows[0]),) if rows else columns)
-        if row is None and not rows and not headed and not any(map(_is_number, _SEPARATOR.split(line.strip()))):
-            headed = True
+        if row is None and not rows and headings is None and not any(map(_is_number, _SEPARATOR.split(line.strip()))):
+            headings = line
         elif row is None:
             raise InputError(
                 f"line {number} of {name} is not {count} numbers", field=field, value=line.strip(),
@@ -104,7 +121,53 @@ def _read_rows(path: Path, name: str, field: str, columns: tuple[int, ...]) -> l
             )  # fmt: skip
         else:
             rows.append(row)
-    return rows
+    if rows and headings is None and len(_SQUARE_ANYWHERE.findall(comment)) == len(rows[0]):
+        headings = comment
+    return _in_si(data, place, name, headings, rows) if rows and headings else rows
+
+
+def _in_si(data: dict[str, Any], place: Place, file: str, headings: str, rows: list[list[float]]) -> list[list[float]]:
+    """Rows in SI units, of those that the headings give in brackets."""
+    schema = PathFile if place == ("path",) else ModelTable
+    field = ".".join(map(str, (*place, "table")))
+    found = [list(column) for column in zip(*rows, strict=True)]
+    for k, (heading, text) in enumerate(_units(headings, len(found), file, field)):
+        if text is None:
+            continue
+        unit, where = unit_of(text), f"column {k + 1} of {file}"
+        if unit is None:
+            _, remedy = unknown_unit(f"1 {text}") or ("", 'write units like "ms", "N m" or "deg"')
+            raise InputError(f'{where} has the unknown unit "{text}"', field=field, value=heading, remedy=remedy)
+        given = overlaid(data, [((*place, "table"), [[0.0] * len(found)])])
+        wanted = units_at(schema, given, (*place, "table", 0, k)) or ()
+        if unit.dimension not in [unit_named(one).dimension for one in wanted]:
+            raise InputError(
+                f"{where} is in {spelt(unit.dimension)} where {' or '.join(wanted)} is asked for", field=field,
+                value=heading, remedy=f"give it in {' or '.join(wanted)} or a multiple, or take another column",
+            )  # fmt: skip
+        found[k] = [unit.in_si(repr(x)) if isfinite(x) else x for x in found[k]]
+    return [list(row) for row in zip(*found, strict=True)]
+
+
+def _units(headings: str, count: int, file: str, field: str) -> list[tuple[str, str | None]]:
+    """Headings of so many columns, each with the unit that stands in its brackets."""
+    parts = [part.strip() for part in _BETWEEN_HEADINGS.split(headings.strip())]
+    given = _SQUARE_ANYWHERE.findall(headings)
+    if len(parts) == count:
+        return [(part, _unit_in(part)) for part in parts]
+    if given and len(given) != count:
+        raise InputError(
+            f"the headings of {file} do not tell to which of {count} columns their units belong", field=field,
+            value=headings.strip(), remedy="separate headings by commas",
+        )  # fmt: skip
+    return [(f"[{unit}]", unit) for unit in given]
+
+
+def _unit_in(heading: str) -> str | None:
+    if square := _SQUARE.search(heading):
+        return square[1].strip()
+    found = _ROUND.search(heading)
+    return found[1].strip() if found and unit_of(found[1]) else None
 
 
 def _numbers(line: str, columns: tuple[int, ...]) -> list[float] | None:

@@ -111,6 +111,10 @@ class _Table(BaseModel):
 
 
 _UNTIL = Field(default=None, description="the time in s at which the next piece takes over")
+_INTERPOLATION = Field(
+    default=None, description='how a table is interpolated: "spline", smoothly, by default, or "linear"'
+)
+InterpolationName = Literal["spline", "linear"]
 _PAIR_IN_TIME = Annotated[list[FunctionOfTime], Field(min_length=2, max_length=2)]
 
 
@@ -132,7 +136,7 @@ class TorquePiece(_Table):
 _IN_TIME: dict[Any, tuple[Any, Any, Any, str]] = {
     InTime: (FunctionOfTime, TorquePiece, Rows, "[t, torque] in s and N m, or the name of a file with two"),
     tuple[InTime, InTime]: (
-        _PAIR_IN_TIME, ForcePiece, ForceRows, "[t, x, y] in s and N, or the name of a file with three"
+        _PAIR_IN_TIME, ForcePiece, ForceRows, "[t, x, y] in s, N and N, or the name of a file with three"
     ),
 }  # fmt: skip
 
@@ -149,6 +153,7 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
         ),
         "pieces": (pieces | None, Field(default=None, description=example)),
         "table": (rows | None, Field(default=None, description=f"a list of {columns} such columns")),
+        "interpolation": (InterpolationName | None, _INTERPOLATION),
     }
 
 
@@ -580,6 +585,7 @@ class TorqueTable(_Table):
     table: Rows | None = Field(
         default=None, description="a list of [t, torque] in s and N m, or the name of a file with two such columns"
     )
+    interpolation: InterpolationName | None = _INTERPOLATION
 
 
 # A number or an expression of the time, or a table. Tags are such that errors do not show them.
@@ -594,7 +600,8 @@ class StudyDefaultsTable(_Table):
 
     path: Text | None = Field(default=None, description="the name of a [path.NAME] table")
     paths: list[Text] = Field(
-        default=[], description="in its place several names, all of which `paraflex run` runs, and others the first"
+        default=[],
+        description="in its place several names: runs and studies of many designs take all, others the first",
     )
     modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
     duration: Number | None = Field(default=None, description="the duration in s, dwell included")

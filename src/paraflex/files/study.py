@@ -23,7 +23,7 @@ class StudyDefaults:
     path : str or None
         The name of one of the model's paths.
     paths : tuple of str
-        In its place names of several, all of which `paraflex run` runs; what takes one path takes the first.
+        In its place names of several: `paraflex run` and studies of many designs take all, what takes one the first.
     modes : tuple of str
     duration : float or None
         [s]; the path's own where None.

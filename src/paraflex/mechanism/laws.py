@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 from itertools import pairwise
 from typing import Protocol, runtime_checkable
@@ -22,6 +23,8 @@ _SMOOTH = 1e-9
 # A run may end this far beyond a table, as a fraction of it: rounding of times.
 _BEYOND_TABLE = 1e-9
 _DEGREE = 5
+# Kinks of a linear table at which integration steps end, at most: error control does without the less sharp ones.
+_MOST_STOPS = 200
 
 
 @given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")
@@ -35,7 +38,7 @@ class AngleLaw(Protocol):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Times [s] at which a derivative of the law jumps; integration steps end there."""
+        """Times [s] at which a derivative of the law jumps; steps end there, or at its `stops` if it has any."""
         ...
 
 
@@ -118,9 +121,16 @@ class PiecewiseLaw(CheckedFields):
         return out[0], out[1], out[2]
 
 
+class Interpolation(Enum):
+    """How a table is interpolated: by a quintic spline with four continuous derivatives, or by straight lines."""
+
+    SPLINE = "spline"
+    LINEAR = "linear"
+
+
 @dataclass(frozen=True)
 class TabulatedLaw(CheckedFields):
-    """A quintic spline through values at times: four continuous derivatives.
+    """A quintic spline through values at times, or straight lines between them, for loads and torques alone.
 
     Fewer than six points are passed by the polynomial through them.
 
@@ -129,7 +139,9 @@ class TabulatedLaw(CheckedFields):
     times : tuple of float
         Ascending, at least two [s].
     values : tuple of float
-        [rad or m]
+        [rad, m, N or N m]
+    interpolation : Interpolation
+        "spline" or "linear".
 
     Raises
     ------
@@ -141,7 +153,7 @@ class TabulatedLaw(CheckedFields):
 
     times: tuple[float, ...]
     values: tuple[float, ...]
-    knots: tuple[float, ...] = ()
+    interpolation: Interpolation = Interpolation.SPLINE
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -164,13 +176,33 @@ class TabulatedLaw(CheckedFields):
         degree = min(_DEGREE, len(self.times) - 1)
         return scipy.interpolate.make_interp_spline(self.times, self.values, k=degree)
 
+    @cached_property
+    def _slopes(self) -> Array:
+        return np.diff(self.values) / np.diff(self.times)
+
+    @property
+    def linear(self) -> bool:
+        """Whether straight lines join the rows."""
+        return self.interpolation is Interpolation.LINEAR
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Inner times of a linear table [s]; none of a spline."""
+        return self.times[1:-1] if self.linear else ()
+
+    @cached_property
+    def stops(self) -> tuple[float, ...]:
+        """Knots at which integration steps end [s]: all, but of a long table only the sharpest kinks."""
+        sharpest = np.argsort(-np.abs(np.diff(self._slopes)), kind="stable")[:_MOST_STOPS]
+        return tuple(self.knots[k] for k in np.sort(sharpest)) if self.linear else ()
+
     @property
     def breaks(self) -> tuple[float, ...]:
         """Times between which the law is one polynomial of degree five at most [s]."""
         return self.times
 
     def evaluate(self, t: Array) -> Values:
-        """Value, rate and acceleration at times t.
+        """Value, rate and acceleration at times t; at a kink the rate after it.
 
         Raises
         ------
@@ -186,7 +218,20 @@ class TabulatedLaw(CheckedFields):
                     remedy="add rows, or shorten the run",
                 )  # fmt: skip
         x = np.clip(t, first, last)
+        if self.linear:
+            after = np.clip(np.searchsorted(self.times, x, side="right") - 1, 0, self._slopes.size - 1)
+            return np.interp(x, self.times, self.values), self._slopes[after], np.zeros_like(x)
         return self._spline(x), self._spline(x, 1), self._spline(x, 2)
+
+
+def marks(law: AngleLaw) -> tuple[float, ...]:
+    """Times at which a law may be largest between those that are looked at anyhow: its knots and rows [s]."""
+    return (*law.knots, *getattr(law, "breaks", ()))
+
+
+def stops(law: AngleLaw) -> tuple[float, ...]:
+    """Times at which integration steps end [s]: all knots of a law but those that it can do without."""
+    return getattr(law, "stops", law.knots)
 
 
 def check_motion(law: AngleLaw) -> None:
@@ -195,8 +240,13 @@ def check_motion(law: AngleLaw) -> None:
     Raises
     ------
     InputError
-        A jump between pieces of the law or its rate.
+        A jump between pieces of the law or its rate, or a linear table.
     """
+    if isinstance(law, TabulatedLaw) and law.linear:
+        raise InputError(
+            "the rate of a motion between straight lines jumps", field="interpolation", value="linear",
+            remedy='give "spline", or pieces that meet in value and rate',
+        )  # fmt: skip
     if not isinstance(law, PiecewiseLaw):
         return
     for piece in law.pieces:

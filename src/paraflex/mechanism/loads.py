@@ -11,7 +11,7 @@ from paraflex.arguments import CheckedFields, given_as
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.joints import PointRef
-from paraflex.mechanism.laws import AngleLaw
+from paraflex.mechanism.laws import AngleLaw, marks
 from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, positive, said
 
 
@@ -150,8 +150,7 @@ class _Load(CheckedFields):
 
     def largest(self, t: Array) -> float:
         """The largest magnitude at times t, and where a law between them has a knot or a row [N, N m]."""
-        marks = [time for law in self.laws for time in (*law.knots, *getattr(law, "breaks", ()))]
-        within = [time for time in marks if np.min(t) <= time <= np.max(t)]
+        within = [time for law in self.laws for time in marks(law) if np.min(t) <= time <= np.max(t)]
         return float(np.max(np.linalg.norm(self.evaluate(np.concatenate([t, within])), axis=1)))
 
 

@@ -14,7 +14,7 @@ from paraflex.fem import ReferenceCondition
 from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
-from paraflex.mechanism.payload import Payload, loaded
+from paraflex.mechanism.payload import Payload, loaded, together
 from paraflex.mechanism.phases import with_phases
 from paraflex.mechanism.quantities import known
 
@@ -56,6 +56,8 @@ class Mechanism(Members, Shown):
     geometry : Geometry or str
         Of its flexible beams: "second-order" by default, "linear" in the paper.
     description : str
+    payload : Payload or None
+        What `with_payload` has added to the body that carries the end-effector, for drawings and lists.
 
     Raises
     ------
@@ -110,7 +112,8 @@ class Mechanism(Members, Shown):
         effector = self.end_effector
         if effector is None:
             raise InputError("there is no end-effector to carry it", field="payload", remedy="name the end-effector")
-        return self.with_bodies([loaded(self.body(effector.point.body), effector.point.point, payload)])
+        carrying = self.with_bodies([loaded(self.body(effector.point.body), effector.point.point, payload)])
+        return replace(carrying, payload=together(self.payload, payload))
 
     @checked_arguments()
     def rigid(self, names: Sequence[str] | None = None) -> Mechanism:

@@ -23,6 +23,7 @@ from paraflex.mechanism.loads import (
     TorsionalDamper,
     TorsionalSpring,
 )
+from paraflex.mechanism.payload import Payload
 from paraflex.mechanism.quantities import joints_named, known
 from paraflex.mechanism.sensors import SENSOR_KINDS, Sensor
 
@@ -140,6 +141,8 @@ class Members(CheckedFields):
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
+    # The body that carries it has it, so that it is no part of what is compared, saved or simulated.
+    payload: Payload | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def taken_from(cls, given: object, field: str = "mechanism") -> Self | None:

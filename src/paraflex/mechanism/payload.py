@@ -40,6 +40,17 @@ class Payload(CheckedFields):
         finite(self.offset, "payload.offset")
 
 
+def together(one: Payload | None, other: Payload) -> Payload:
+    """Two payloads as one, about their common centre of mass."""
+    if one is None or not one.mass + other.mass:
+        return other
+    masses = np.array([one.mass, other.mass])
+    places = np.array([one.offset, other.offset])
+    centre = masses @ places / masses.sum()
+    inertia = one.inertia + other.inertia + masses @ np.sum((places - centre) ** 2, axis=1)
+    return Payload(float(masses.sum()), float(inertia), (float(centre[0]), float(centre[1])))
+
+
 def loaded(body: Body, point: str, payload: Payload) -> Body:
     """A body with a payload at one of its points, in addition to what it has.
 

@@ -38,6 +38,8 @@ class CatalogueFigure:
         The name of the file that the command which makes the results writes it to; empty where it does not.
     variables : tuple of str
         Of a dataset, without which there is nothing to draw.
+    points : str
+        The argument of the function that chooses what it shows by named points, "point" or "points"; else empty.
     """
 
     name: str
@@ -46,6 +48,7 @@ class CatalogueFigure:
     takes: Takes = "results"
     written_as: str = ""
     variables: tuple[str, ...] = ()
+    points: Literal["", "point", "points"] = ""
 
     @property
     def function(self) -> Callable[..., Figure]:
@@ -55,7 +58,12 @@ class CatalogueFigure:
 
 _RUN = (
     CatalogueFigure(
-        "mechanism_drawing", "drawing", "the mechanism half way, links as they bend", "mode", variables=("shape",)
+        "mechanism_drawing",
+        "drawing",
+        "the mechanism half way, links as they bend",
+        "mode",
+        variables=("shape",),
+        points="point",
     ),
     CatalogueFigure("energies", "energy", "kinetic and strain energy, work, and how far they balance", "mode"),
     CatalogueFigure(
@@ -99,6 +107,7 @@ _RUN = (
         "distance from the start, speed and acceleration of named points",
         "mode",
         variables=("point_velocity", "point_acceleration"),
+        points="points",
     ),
     CatalogueFigure("link_phases", "phase", "angular velocity over angle of every body", "mode"),
 )
@@ -124,12 +133,12 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
                         "mode", "link_motions"),
         CatalogueFigure("end_effector_path", "workspace",
                         "desired and actual path, deviation magnified (Fig. 15)", "mode",
-                        "end_effector_path"),
+                        "end_effector_path", points="point"),
         CatalogueFigure("end_effector_motion", "time_series",
                         "the end-effector's motion, desired and actual (Fig. 16)", "mode",
-                        "end_effector_motion"),
+                        "end_effector_motion", points="point"),
         CatalogueFigure("phase_diagrams", "phase", "phase diagrams of the end-effector (Fig. 17)", "mode",
-                        "phase_diagrams"),
+                        "phase_diagrams", points="point"),
         CatalogueFigure("tracking_errors", "modes", "tracking error in x and y in time, a panel a mode (Fig. 18)",
                         written_as="tracking_errors"),
         CatalogueFigure("tracking_distance", "driving", "distance from the desired place in time, all modes"),
@@ -142,7 +151,7 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
     "motion": (
         CatalogueFigure("motion_overview", "free_motion", "angles, speeds and energies", written_as="motion_overview"),
         CatalogueFigure("coordinates", "free_motion", "generalised coordinates, those of the bodies' modes included"),
-        CatalogueFigure("point_paths", "free_motion", "where named points go in the plane"),
+        CatalogueFigure("point_paths", "free_motion", "where named points go in the plane", points="points"),
         *_RUN,
     ),
     "verification": (

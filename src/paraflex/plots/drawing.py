@@ -172,6 +172,7 @@ def mechanism_drawing(
     model: str | None = None,
     width: float = 84.0,
     theme_name: str = "light",
+    point: str | None = None,
 ) -> Figure:
     """The mechanism at a time, with its end-effector's trail until then and its desired path.
 
@@ -188,6 +189,8 @@ def mechanism_drawing(
         [mm]
     theme_name : str
         "light" or "dark".
+    point : str, optional
+        "body.point" whose trail is drawn in place of the end-effector's.
     """
     look, width = theme(theme_name), page_width(width)
     run = select(data, mode, model)
@@ -197,7 +200,7 @@ def mechanism_drawing(
         raise InputError("outside the run", field="time", value=time, remedy=f"choose it from {first:g} to {last:g} s")
     until = run["time"].values
     magnify = default_magnification([run]) if magnify is None else magnify
-    shown = scene(run, np.append(until[until < time], time), magnify)
+    shown = scene(run, np.append(until[until < time], time), magnify, point)
     limits = shown.limits
     aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), 0.4, 1.25))
     height = width * aspect + _HEAD + _FOOT

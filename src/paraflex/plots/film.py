@@ -47,6 +47,8 @@ class FilmOptions:
         Of a single picture [s]; half way by default.
     model : str, optional
         Of a verification; the reference by default.
+    point : str, optional
+        "body.point" whose trail is drawn; the end-effector by default.
     """
 
     magnify: float | None = None
@@ -56,6 +58,7 @@ class FilmOptions:
     theme: str = "light"
     at: float | None = None
     model: str | None = None
+    point: str | None = None
 
 
 def plan_film(
@@ -76,7 +79,7 @@ def plan_film(
     Raises
     ------
     InputError
-        An option that makes no sense, no such mode or model, or results without shapes.
+        An option that makes no sense, no such mode, model or point, or results without shapes.
     """
     options = options or FilmOptions()
     _check(options)
@@ -102,8 +105,9 @@ def plan_film(
             )  # fmt: skip
         times = np.linspace(first, last, max(count, 2))
     magnify = default_magnification(runs) if options.magnify is None else options.magnify
-    scenes = tuple(scene(run, times, magnify) for run in runs)
-    return Film(scenes, _size(scenes, options.size), fps, speed, theme(options.theme), kind != ".png")
+    scenes = tuple(scene(run, times, magnify, options.point) for run in runs)
+    size, look = _size(scenes, options.size), theme(options.theme)
+    return Film(scenes, size, fps, speed, look, kind != ".png", options.point)
 
 
 def animate(

@@ -32,11 +32,13 @@ class Film:
     speed: float
     look: Theme
     plays: bool = True
+    point: str | None = None
 
     @property
     def caption(self) -> str:
-        """Text on the magnification and the speed."""
-        return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "")
+        """Text on the magnification, the speed, and the point whose trail was asked for."""
+        trail = f", trail of {plain(self.point)}" if self.point else ""
+        return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "") + trail
 
     @property
     def time(self) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import ROUNDING, axis_label, peak, plain, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time
-from paraflex.plots.selection import names_of, one_run, place_of
+from paraflex.plots.selection import names_of, one_run, point_number
 from paraflex.plots.style import COLOURS, DASHES, keep_flat, look_of
 from paraflex.plots.workspace import finish_workspace, workspace_panel
 
@@ -75,10 +75,17 @@ def coordinates(data: xr.Dataset) -> Figure:
 
 
 @drawn
-def point_paths(data: xr.Dataset) -> Figure:
-    """Paths of named points in the plane; if there are more than seven, those of the longest."""
+def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Figure:
+    """Paths of named points in the plane; if there are more than seven, those of the longest.
+
+    Parameters
+    ----------
+    points : sequence of str
+        "body.point" each, in place of these.
+    """
     places = 1e3 * data["point_position"].transpose("time", "point", "axis").values
-    names, shown = names_of(data, "point"), moving_points(data)
+    names = names_of(data, "point")
+    shown = [point_number(data, point, "points") for point in points] or moving_points(data)
     figure, panel = workspace_panel()
     for look, k in enumerate(shown):
         panel.plot(*places[:, k].T, label=plain(names[k]), **look_of(look))
@@ -101,7 +108,7 @@ def point_motions(data: xr.Dataset, mode: str | None = None, points: Sequence[st
         "body.point" each; by default those that travel most, up to seven.
     """
     run, names = one_run(data, mode), names_of(data, "point")
-    shown = [place_of(point, names, "point", "points") for point in points] or moving_points(run)
+    shown = [point_number(run, point, "points") for point in points] or moving_points(run)
     place, velocity, acceleration = (
         run[name].transpose("time", "point", "axis").values[:, shown]
         for name in ("point_position", "point_velocity", "point_acceleration")

@@ -36,6 +36,7 @@ _TEXT = 7.5
 _ARROW, _TURN = 0.12, 0.045
 _OPEN = "#c8102e"
 _GAP: dict[str, Any] = {"color": _OPEN, "linewidth": 1.3, "linestyle": (0, (3, 2)), "marker": "x", "markersize": 5.0}
+_PAYLOAD: dict[str, Any] = {"marker": "s", "markersize": 11.0, "markeredgewidth": 1.2, "linestyle": "none"}
 _START: dict[str, Any] = {"marker": "s", "markersize": 7.0, "markerfacecolor": "none", "linestyle": "none"}
 # Kinds of joints in the legend by their symbols: words, marker, its size [pt], and what it is filled with.
 _KINDS: dict[str, tuple[str, Any, float, str]] = {
@@ -71,6 +72,10 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
         drawn += _draw_gravity(axes, mechanism, limits, look)
         axes.plot(*np.array([*mechanism.ground.values()]).reshape(-1, 2).T, "+", color=look.earth, markersize=4.0)
         _draw_gaps(axes, posed)
+        if posed.payload is not None:
+            # Above links, below the marks of joints and the end-effector.
+            axes.plot(*posed.payload, **_PAYLOAD, **_payload_colours(look), zorder=3.05)
+            drawn.append(posed.payload[None])
         named = _body_names(shown, look) + _joint_names(posed, shown, look) + _other_names(posed, shown, limits, look)
         place_names(axes, named, drawn, _TEXT)
         _legend(figure, posed, shown, look)
@@ -290,6 +295,9 @@ def _legend(figure: Figure, posed: Posed, shown: Scene, look: Theme) -> None:
     if posed.mechanism.end_effector is not None:
         tip: dict[str, Any] = {"marker": "o", "color": look.trail, "markeredgecolor": look.trail, "markersize": 4.2}
         entries.append(Line2D([], [], **plain | tip, label="end-effector"))
+    if posed.payload is not None and posed.mechanism.payload is not None:
+        label = f"payload {posed.mechanism.payload.mass:.4g} kg"
+        entries.append(Line2D([], [], **_PAYLOAD | {"markersize": 6.5}, **_payload_colours(look), label=label))
     if posed.path:
         entries.append(Line2D([], [], color=look.desired, linewidth=1.0, linestyle=(0, (3, 2)), label="path"))
         entries.append(Line2D([], [], **_START, markeredgecolor=look.desired, label="its start"))
@@ -300,6 +308,10 @@ def _legend(figure: Figure, posed: Posed, shown: Scene, look: Theme) -> None:
             handles=entries, loc="lower center", ncols=len(entries), fontsize=_TEXT, labelcolor=look.ink,
             handlelength=1.6, bbox_to_anchor=(0.5, 0.0),
         )  # fmt: skip
+
+
+def _payload_colours(look: Theme) -> dict[str, Any]:
+    return {"markerfacecolor": look.faint, "markeredgecolor": look.ink}
 
 
 def _title(figure: Figure, posed: Posed, look: Theme) -> None:

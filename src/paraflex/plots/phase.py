@@ -9,7 +9,7 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, symbol
 from paraflex.plots.layout import is_narrow, lay_out, panels
 from paraflex.plots.runs import END_EFFECTOR, START, draw_actual, draw_desired
-from paraflex.plots.selection import moving_directions, names_of, one_run, select_run
+from paraflex.plots.selection import moving_directions, names_of, of_point, one_run, point_label, select_run
 from paraflex.plots.style import BLUE, keep_flat
 
 # Bodies that have a panel.
@@ -17,22 +17,31 @@ _MOST_PANELS = 8
 
 
 @drawn
-def phase_diagrams(data: xr.Dataset, mode: str) -> Figure:
-    """Velocity over displacement and acceleration over velocity in x and y, desired and actual (Fig. 17)."""
-    run = select_run(data, mode)
+def phase_diagrams(data: xr.Dataset, mode: str, point: str | None = None) -> Figure:
+    """Velocity over displacement and acceleration over velocity in x and y, desired and actual (Fig. 17).
+
+    Parameters
+    ----------
+    point : str, optional
+        "body.point" in place of the end-effector; it has no desired motion.
+    """
+    run = of_point(select_run(data, mode), point)
+    planned = "end_effector_desired" in run
     directions = moving_directions(run)
     figure, axes = panels(2, len(directions))
     for row, (across, up) in zip(axes, (END_EFFECTOR[:2], END_EFFECTOR[1:]), strict=True):
         for panel, axis in zip(row, directions, strict=True):
             x, y = (factor * run[name].sel(axis=axis) for name, _, factor in (across, up))
-            x_desired, y_desired = (factor * run[f"{name}_desired"].sel(axis=axis) for name, _, factor in (across, up))
-            draw_actual(panel, run, x.values, y.values)
-            draw_desired(panel, x_desired.values, y_desired.values)
+            suffix = "_desired" if planned else ""
+            x_desired, y_desired = (factor * run[name + suffix].sel(axis=axis) for name, _, factor in (across, up))
+            draw_actual(panel, run, x.values, y.values, label=point_label(run, point))
+            if planned:
+                draw_desired(panel, x_desired.values, y_desired.values)
             # All there is to see of a direction at rest; small, as it lies on the curves.
             panel.plot(x_desired[0], y_desired[0], **START)[0].set_markersize(2.5)
             panel.margins(0.06)
-            keep_flat(panel, peak(across[2] * run[f"{across[0]}_desired"]), "x")
-            keep_flat(panel, peak(up[2] * run[f"{up[0]}_desired"]))
+            keep_flat(panel, peak(across[2] * run[across[0] + suffix]), "x")
+            keep_flat(panel, peak(up[2] * run[up[0] + suffix]))
             panel.set_xlabel(axis_label(across[1], direction=axis, short=True))
             panel.set_ylabel(axis_label(up[1], direction=axis, short=True))
     for row, title in zip(axes, ("displacement and velocity", "velocity and acceleration"), strict=True):

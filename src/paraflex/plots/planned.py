@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure, homes
-from paraflex.plots.selection import default_mode, names_of, place_of, prototype_pair
+from paraflex.plots.selection import default_mode, names_of, place_of, point_number, prototype_pair
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,9 +71,13 @@ def find_figure(source: Source, name: str) -> CatalogueFigure:
 
 
 def drawings(
-    source: Source, figure: CatalogueFigure, modes: Sequence[str] = (), metrics: Sequence[str] = ()
+    source: Source,
+    figure: CatalogueFigure,
+    modes: Sequence[str] = (),
+    metrics: Sequence[str] = (),
+    points: Sequence[str] = (),
 ) -> list[PlannedFigure]:
-    """A figure of results: one, or one for each mode or run.
+    """A figure of results: one, or one for each mode, run or point.
 
     Parameters
     ----------
@@ -83,7 +87,39 @@ def drawings(
         Actuation modes that are shown; by default all, or of figures that show one, that with most active motors.
     metrics : sequence of str
         Of figures of many designs; by default the first that vary.
+    points : sequence of str
+        Named points that are shown; by default the end-effector, or those that travel most.
+
+    Raises
+    ------
+    InputError
+        No such mode or point, or points for a figure that shows none.
     """
+    figures = _of_modes(source, figure, modes, metrics)
+    if not points:
+        return figures
+    if not figure.points:
+        able = [one.name for one in figures_of(source) if one.points]
+        raise InputError(
+            f"{figure.name} is not of a named point", field="--point", value=points[0],
+            remedy=f"choose from {', '.join(able)}" if able else "leave it out",
+        )  # fmt: skip
+    for point in points:
+        point_number(source.data, point, "--point")
+    if figure.points == "points":
+        return [_of_points(one, ",".join(points), points=list(points)) for one in figures]
+    return [_of_points(one, point, point=point) for one in figures for point in points]
+
+
+def _of_points(planned: PlannedFigure, named: str, **points: Any) -> PlannedFigure:
+    of = f"{planned.of}_{named}" if planned.of else named
+    return PlannedFigure(planned.figure, of, partial(planned.draw, **points))
+
+
+def _of_modes(
+    source: Source, figure: CatalogueFigure, modes: Sequence[str], metrics: Sequence[str]
+) -> list[PlannedFigure]:
+    """A figure of results: one, or one for each mode or run."""
 
     def planned(of: str, *given: Any) -> PlannedFigure:
         return PlannedFigure(figure, of, partial(figure.function, *given))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit
-from paraflex.plots.selection import names_of, select_run
+from paraflex.plots.selection import names_of, point_number, select_run
 
 Array = NDArray[np.float64]
 
@@ -174,7 +174,7 @@ def select(data: xr.Dataset, mode: str | None, model: str | None = None) -> xr.D
     return data
 
 
-def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
+def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None = None) -> Scene:
     """A run at given times, deflections magnified.
 
     Parameters
@@ -185,6 +185,8 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
         [s]; after the end of a run that stopped its last picture is held.
     magnify : float
         1 is the truth, 0 draws links stiff.
+    point : str, optional
+        "body.point" whose trail is drawn; see `followed_station`.
     """
     if not (np.isfinite(magnify) and magnify >= 0.0):
         raise InputError(
@@ -204,7 +206,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0) -> Scene:
     bodies = {str(name): owners == name for name in dict.fromkeys(owners.tolist())}
     places, directions = (_magnified_joints(run, name, magnify) for name in ("joint_position", "joint_direction"))
     joints = _joints(run, drawn, places, directions, at)
-    springs, followed = _springs(run, drawn), followed_station(run)
+    springs, followed = _springs(run, drawn), followed_station(run, point)
     seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
     seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
     return Scene(
@@ -278,10 +280,15 @@ class _Sampler:
         return (1.0 - part) * values[self.first] + part * values[self.last]
 
 
-def followed_station(run: xr.Dataset) -> int | None:
-    """The station whose trail is drawn: the end-effector's, else that of the longest way, free points before joints."""
+def followed_station(run: xr.Dataset, point: str | None = None) -> int | None:
+    """The station whose trail is drawn: that of a point, by default the end-effector.
+
+    Else that of the longest way, free points before joints.
+    """
     points = names_of(run, "point")
     stations = run["point_station"].values
+    if point is not None:
+        return int(stations[point_number(run, point)])
     if run.attrs.get("end_effector_point") in points:
         return int(stations[points.index(run.attrs["end_effector_point"])])
     shape, joints = run["shape"].values.astype(float), run["joint_position"].values.astype(float)

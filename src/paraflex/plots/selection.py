@@ -66,6 +66,40 @@ def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
     return select_run(data, default_mode(data) if mode is None else mode)
 
 
+def point_number(data: xr.Dataset, point: str, field: str = "point") -> int:
+    """The number of a named point of results; of those that a program made none is proposed."""
+    names = names_of(data, "point")
+    if point in names:
+        return names.index(point)
+    return place_of(point, [name for name in names if "._" not in name], "point", field)
+
+
+def of_point(run: xr.Dataset, point: str | None) -> xr.Dataset:
+    """A run with a named point in place of the end-effector, and no desired motion unless it is that.
+
+    Raises
+    ------
+    InputError
+        No such point, or results of an earlier version, without velocities of points.
+    """
+    if point is None or point == run.attrs.get("end_effector_point"):
+        return run
+    k = point_number(run, point)
+    if "point_acceleration" not in run:
+        raise InputError(
+            "these results hold no motion of points: they are of an earlier version", field="results",
+            remedy="run the study again",
+        )  # fmt: skip
+    parts = {"": "position", "_velocity": "velocity", "_acceleration": "acceleration"}
+    moved = {f"end_effector{part}": run[f"point_{name}"].isel(point=k, drop=True) for part, name in parts.items()}
+    return run.drop_vars([f"{name}_desired" for name in moved if f"{name}_desired" in run]).assign(moved)
+
+
+def point_label(run: xr.Dataset, point: str | None) -> str:
+    """Label of the actual motion of the end-effector, or of a point, in legends."""
+    return f"{'actual' if point is None else plain(point)}, {run_label(run)}"
+
+
 def run_label(run: xr.Dataset) -> str:
     """Label of a run's mode in legends."""
     return f"mode {plain(str(run['mode'].item()))}"
@@ -82,6 +116,6 @@ def moving_directions(run: xr.Dataset) -> list[str]:
     """The axes along which the end-effector moves, or should: all where it rests."""
     names = names_of(run, "axis")
     parts = [np.nan_to_num(run[name].transpose("time", "axis").values)
-             for name in ("end_effector_velocity", "end_effector_velocity_desired")]  # fmt: skip
+             for name in ("end_effector_velocity", "end_effector_velocity_desired") if name in run]  # fmt: skip
     speeds = np.max(np.abs(parts), axis=(0, 1))
     return [name for name, speed in zip(names, speeds, strict=True) if speed > _STILL * speeds.max()] or names

@@ -13,7 +13,7 @@ from paraflex.plots.given import drawn
 from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, symbol
 from paraflex.plots.layout import is_narrow, panels
 from paraflex.plots.runs import END_EFFECTOR, draw_actual, draw_desired, finish_over_time, largest_over_time
-from paraflex.plots.selection import moving_directions, one_run, run_label, select_run
+from paraflex.plots.selection import moving_directions, of_point, one_run, point_label, run_label, select_run
 from paraflex.plots.style import keep_flat
 
 # Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
@@ -118,17 +118,25 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
 
 
 @drawn
-def end_effector_motion(data: xr.Dataset, mode: str) -> Figure:
-    """Displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16)."""
-    run, time = select_run(data, mode), data["time"].values
+def end_effector_motion(data: xr.Dataset, mode: str, point: str | None = None) -> Figure:
+    """Displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16).
+
+    Parameters
+    ----------
+    point : str, optional
+        "body.point" in place of the end-effector; it has no desired motion.
+    """
+    run, time = of_point(select_run(data, mode), point), data["time"].values
     directions = moving_directions(run)
     figure, axes = panels(len(END_EFFECTOR), len(directions))
     for row, (variable, quantity, factor) in zip(axes, END_EFFECTOR, strict=True):
-        desired = factor * run[f"{variable}_desired"]
-        scale = float(np.ptp(desired.values, axis=0).max())
+        moved = factor * run[variable].transpose("time", "axis")
+        desired = factor * run[f"{variable}_desired"] if f"{variable}_desired" in run else None
+        scale = peak(np.ptp((moved.dropna("time") if desired is None else desired).values, axis=0))
         for panel, axis in zip(row, directions, strict=True):
-            draw_actual(panel, run, time, factor * run[variable].sel(axis=axis).values)
-            draw_desired(panel, time, desired.sel(axis=axis).values)
+            draw_actual(panel, run, time, moved.sel(axis=axis).values, label=point_label(run, point))
+            if desired is not None:
+                draw_desired(panel, time, desired.sel(axis=axis).values)
             keep_flat(panel, scale)
             panel.set_ylabel(axis_label(quantity, direction=axis, short=True))
     for panel, axis in zip(axes[0], directions, strict=True):

@@ -18,7 +18,7 @@ from paraflex.plots.labels import peak
 from paraflex.plots.layout import ONE_COLUMN, equal_scales_height, is_narrow, lay_out, panels
 from paraflex.plots.mechanism import draw_mechanism
 from paraflex.plots.runs import START, draw_actual, draw_desired
-from paraflex.plots.selection import run_label, select_run
+from paraflex.plots.selection import of_point, point_label, select_run
 from paraflex.plots.style import BLUE
 
 # Room round what is drawn, and the height of a panel beside its width, at least and at most.
@@ -41,16 +41,31 @@ def desired_path(data: xr.Dataset) -> Figure:
 
 
 @drawn
-def end_effector_path(data: xr.Dataset, mode: str, magnification: float | None = None) -> Figure:
+def end_effector_path(
+    data: xr.Dataset, mode: str, magnification: float | None = None, point: str | None = None
+) -> Figure:
     """Desired and actual path; the deviation from one to the other is drawn magnified (Fig. 15).
 
     Parameters
     ----------
     magnification : float, optional
         Of the deviation; by default the largest of 1, 2, 5, 10, ... that keeps it small beside the path.
+    point : str, optional
+        "body.point" in place of the end-effector; it has no desired path, and its own is drawn as it is.
     """
-    run = select_run(data, mode)
-    return deviated_paths({f"actual, {run_label(run)}": run}, magnification)
+    run = of_point(select_run(data, mode), point)
+    if "end_effector_desired" in run:
+        return deviated_paths({point_label(run, None): run}, magnification)
+    if magnification is not None:
+        raise InputError(
+            "a point without a desired path has no deviation", field="magnification", value=magnification,
+            remedy="leave it out",
+        )  # fmt: skip
+    figure, axes = workspace_panel()
+    path = 1e3 * run["end_effector"].transpose("time", "axis").values
+    draw_actual(axes, run, *path.T, label=point_label(run, point))
+    axes.plot(*path[0], **START)
+    return finish_workspace(figure, axes)
 
 
 def deviated_paths(

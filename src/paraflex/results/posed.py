@@ -46,6 +46,8 @@ class Posed:
         Joints, gears and prescribed motions that are open as drawn, and how far, with the unit; the widest first.
     problems : tuple of str
         Why the loops do not close, and why the path cannot be followed.
+    payload : (2,) array or None
+        Centre of mass of what the end-effector carries [m].
     """
 
     mechanism: Mechanism
@@ -55,6 +57,7 @@ class Posed:
     desired: Array | None = None
     gaps: Mapping[str, str] = field(default_factory=dict)
     problems: tuple[str, ...] = ()
+    payload: Array | None = None
 
     @property
     def closes(self) -> bool:
@@ -128,11 +131,22 @@ def _of(
     problems: tuple[str, ...] = (),
 ) -> Posed:
     data = drawing_data(mechanism, system_drawing(system, q), np.arange(len(q), dtype=float))
+    drawn = Posed(mechanism, assembly, data, problems=problems, payload=_payload(mechanism, system, q[0], data))
     if path is None:
-        return Posed(mechanism, assembly, data, problems=problems)
+        return drawn
     name, followed = path
-    desired = followed.evaluate(np.linspace(0.0, followed.duration, _PLACES)).position
-    return Posed(mechanism, assembly, data, name, desired, problems=problems)
+    return replace(drawn, path=name, desired=followed.evaluate(np.linspace(0.0, followed.duration, _PLACES)).position)
+
+
+def _payload(mechanism: Mechanism, system: System, q: Array, data: xr.Dataset) -> Array | None:
+    """Centre of mass of the payload: its offset is turned with the rigid body that carries it."""
+    carried, effector = mechanism.payload, mechanism.end_effector
+    if carried is None or effector is None:
+        return None
+    station = int(data["point_station"].values[list(data["point"].values).index(str(effector.point))])
+    angle = q[system.body(effector.point.body).angle]
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return data["shape"].values[0, station].astype(float) + turn @ np.array(carried.offset)
 
 
 def _open(drawn: Posed, rigid: System, q: Array, problem: str) -> Posed:

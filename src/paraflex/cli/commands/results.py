@@ -54,6 +54,9 @@ class AnimateRequest:
         None
     )
     model: Annotated[str | None, Option(metavar="NAME", help="Of a verification. Default: its reference.")] = None
+    point: Annotated[
+        str | None, Option(metavar="BODY.POINT", help="Whose trail is drawn. Default: the end-effector's.")
+    ] = None
     force: Force = False
 
 
@@ -101,6 +104,14 @@ class PlotRequest:
     metrics: Annotated[
         list[str],
         Option("--metric", metavar="NAME", help="Metric of many designs; repeatable. Default: the first that vary."),
+    ] = field(default_factory=list)
+    points: Annotated[
+        list[str],
+        Option(
+            "--point",
+            metavar="BODY.POINT",
+            help="Named point in place of the end-effector; repeatable. With all: of figures that show points.",
+        ),
     ] = field(default_factory=list)
     style: Annotated[
         str | None,

@@ -73,7 +73,7 @@ class RunRequest:
         Option(
             metavar="EVENT",
             help="Where the run ends: joint:NAME=LOW..HIGH, deflection:BODY=METRES, singular=DISTANCE, "
-            "singular:MOTOR,...=DISTANCE; repeatable.",
+            "singular:MOTOR,...=DISTANCE; units as in files, ..80 deg; repeatable.",
         ),
     ] = field(default_factory=list)
     rigid: Annotated[bool, Option("--rigid", help="Take all bodies as rigid.")] = False

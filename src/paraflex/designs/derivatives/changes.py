@@ -190,9 +190,9 @@ class Change:
         laws = [law for load in self.planned.mechanism.loads for law in load.laws]
         if any(law.knots for law in laws):
             raise InputError(
-                "loads whose law has pieces: no derivative of the torques that a path takes",
+                "loads whose law has pieces or a linear table: no derivative of the torques that a path takes",
                 field="load",
-                remedy="give their laws as one expression or a table",
+                remedy='give their laws as one expression or a table of interpolation = "spline"',
             )
         knots = path_knots(self.there.path, self.there.end)
         if knots.size != self.planned.plan.knots.size:

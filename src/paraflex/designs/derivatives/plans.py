@@ -18,7 +18,7 @@ from paraflex.files.overlay import Place, number_at
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
 from paraflex.integrators.sensitivity import check_differentiable
-from paraflex.tracking import TrackingTask
+from paraflex.tracking import TrackingTask, path_stops
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ def given_torques(planned: TrackingTask, options: IntegrationOptions, torques: F
     """The torques of a mode as in `simulate`."""
     times = planned.motion.t
     signals, knots = pack_signals(planned.mechanism, torques.signals, float(times[-1]))
-    stops = np.sort(np.concatenate([torques.knots, knots]))
+    stops = np.sort(np.concatenate([path_stops(torques.knots, planned.mechanism), knots]))
     problem = make_problem(planned.system, signals, planned.start, times, stops)
     return Given(planned, options, torques, actuation_condition(planned.effort, torques.mode), problem)
 

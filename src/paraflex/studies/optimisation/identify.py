@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
+from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError, suggestion
 from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
@@ -150,6 +151,7 @@ def identify(
 
 def _target(entry: TargetTable, number: int, base: SweepStudy) -> Target:
     field, setting = f"target.{number}", base.setting
+    check_unit_of_metric(entry.value, entry.metric, f"{field}.value")
     path = _one(f"{field}.path", entry.path, setting.paths)
     mode = _one(f"{field}.mode", entry.mode, setting.modes)
     if entry.relative and entry.value == 0.0:
@@ -159,7 +161,7 @@ def _target(entry: TargetTable, number: int, base: SweepStudy) -> Target:
     if not entry.weight > 0.0:
         raise InputError("must be positive", field=f"{field}.weight", value=entry.weight, remedy="leave the target out")
     run = setting.paths.index(path) * len(setting.modes) + setting.modes.index(mode)
-    return Target(entry.metric, run, path, mode, entry.value, entry.weight, entry.relative)
+    return Target(entry.metric, run, path, mode, float(entry.value), entry.weight, entry.relative)
 
 
 def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:

@@ -11,10 +11,8 @@ from typing import Any, ClassVar
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
+from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
-from paraflex.files.fields import check_unit
-from paraflex.files.schema import NumberOfText
-from paraflex.results.metrics import METRICS
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
 from paraflex.studies.optimisation.objective import Objective
@@ -156,12 +154,7 @@ def _objective(table: ObjectiveTable) -> Objective:
                 "must be positive", field=f"objective.minimise.{column}", value=weight, remedy="leave the metric out"
             )
     for k, each in enumerate(table.at_most):
-        if isinstance(each.value, NumberOfText):
-            unit = METRICS[each.metric.partition(".")[0]].unit
-            units = () if unit == "1" else (unit,)
-            check_unit(
-                each.value.text, {}, units, f"objective.at_most.{k}.value", "the limit in the unit of its metric"
-            )
+        check_unit_of_metric(each.value, each.metric, f"objective.at_most.{k}.value")
     limits = tuple((each.metric, float(each.value)) for each in table.at_most)
     return Objective(dict(table.minimise), table.over, table.relative, limits)
 

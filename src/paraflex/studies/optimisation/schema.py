@@ -43,7 +43,7 @@ class TargetTable(Table):
     """A number to be reproduced."""
 
     metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
-    value: Number = Field(description="what it should be, in the metric's unit")
+    value: NumberOfFields = Field(description="what it should be, in the unit of the metric")
     mode: Text | None = Field(default=None, description="the actuation mode, where the study has several")
     path: Text | None = Field(default=None, description="the path, where the study has several")
     weight: Number = Field(default=1.0, description="a factor of its residual")
