@@ -79,6 +79,8 @@ COMMANDS = {
     "sensitivity": ["sensitivity", "{}.toml", "--output", "{}"],
     "modes": ["modes", "raparm_i", "--json"],
 }  # fmt: skip
+# Figures of what the models here do not have.
+NOT_SHOWN = ("sensors",)
 TITLES = {
     "tracking": "Runs along a path",
     "motion": "Runs without a path",
@@ -136,7 +138,7 @@ def main() -> None:
         if source.kind != kind:
             raise SystemExit(f"{source.folder} holds results of kind {source.kind}, not {kind}")
         page.append(f"\n## {TITLES[kind]}\n\n`{told(command, kind)}`\n")
-        for figure in CATALOGUE[kind]:
+        for figure in (each for each in CATALOGUE[kind] if each.name not in NOT_SHOWN):
             again = figure.name in drawn
             page.append(entry(figure, source, again=again))
             drawn.add(figure.name)
