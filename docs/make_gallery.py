@@ -79,6 +79,8 @@ COMMANDS = {
     "sensitivity": ["sensitivity", "{}.toml", "--output", "{}"],
     "modes": ["modes", "raparm_i", "--json"],
 }  # fmt: skip
+# Figures of what the models here do not have.
+NOT_SHOWN = ("sensors",)
 TITLES = {
     "tracking": "Runs along a path",
     "motion": "Runs without a path",
@@ -93,7 +95,7 @@ TITLES = {
 }
 INTRODUCTION = """# Gallery
 
-This page has every figure that paraflex draws, by kind of results. To draw one for print:
+This page has the figures that paraflex draws, by kind of results (not those of `sensors`: these models have none). To draw one for print:
 
 ```sh
 paraflex plot RESULTS FIGURE... --style single --format pdf,svg,png
@@ -137,7 +139,7 @@ def main() -> None:
         if source.kind != kind:
             raise SystemExit(f"{source.folder} holds results of kind {source.kind}, not {kind}")
         page.append(f"\n## {TITLES[kind]}\n\n`{command_line(command, kind)}`\n")
-        for figure in CATALOGUE[kind]:
+        for figure in (each for each in CATALOGUE[kind] if each.name not in NOT_SHOWN):
             again = figure.name in drawn
             page.append(entry(figure, source, again=again))
             drawn.add(figure.name)

@@ -95,7 +95,8 @@ def results(tmp_path_factory) -> Path:
 
 def _runs(folder: Path) -> None:
     model = pf.load("five_bar")
-    task = pf.plan(model.mechanism, model.path("line"), duration=0.05, samples=26)
+    sensors = (pf.Encoder("left", "A1"), pf.Tachometer("turning", "A1"))
+    task = pf.plan(replace(model.mechanism, sensors=sensors), model.path("line"), duration=0.05, samples=26)
     run = tracking_dataset([task.simulate("++")])
     # A second mode by name; the first is all that the motors can do.
     data = xr.concat([run, run.assign_coords(mode=["+-"])], "mode", combine_attrs="override")
@@ -105,7 +106,14 @@ def _runs(folder: Path) -> None:
     save_results(_two_models(data), folder / "verification" / "verify.nc")
     pendulum = pf.load("pendulum").mechanism
     (folder / "motion").mkdir()
-    driven = replace(pendulum, motors=(Motor("drive", pendulum.joints[0].name),))
+    body, joint = pendulum.bodies[0].name, pendulum.joints[0].name
+    end = f"{body}.{list(pendulum.bodies[0].points)[-1]}"
+    # Of more units than there are panels below one another.
+    sensors = (
+        pf.Encoder("angle", joint), pf.Tachometer("rate", joint), pf.VelocitySensor("velocity", end, "x"),
+        pf.AccelerationSensor("felt", end, "y", body), pf.JointForceSensor("pull", joint, 0.3),
+    )  # fmt: skip
+    driven = replace(pendulum, motors=(Motor("drive", joint),), sensors=sensors)
     save_results(
         motion_dataset(simulate_motion(driven, 0.1, samples=21, torques={"drive": 0.1})),
         folder / "motion" / "results.nc",

@@ -19,9 +19,14 @@ from paraflex.dynamics import (
 )
 from paraflex.dynamics.joint_loads import joint_loads
 from paraflex.dynamics.points import point_motion
+from paraflex.dynamics.reduction import missed_turns
+from paraflex.elastodynamics import simulate_ked
 from paraflex.files import model_from
 from paraflex.mechanism import SENSOR_KINDS
 from paraflex.motion import simulate_motion
+from paraflex.report.motion import motion_page
+from paraflex.results import motion_summary
+from paraflex.results.export import result_tables
 
 EVERYTHING = tomllib.loads("""
 name = "everything"
@@ -237,6 +242,9 @@ def test_readings_are_what_the_package_gives_elsewhere(geometry):
     second = system.body("second")
     c, s = math.cos(q[0, second.angle]), math.sin(q[0, second.angle])
     away = E - q[0, second.position]
+    first, T = system.body("first"), point_motion(system, pf.PointRef("bar", "T"), q, v, a).position[0]
+    apart = T - q[0, first.position]
+    assert found["seen"] == pytest.approx(-math.sin(phi) * apart[0] + math.cos(phi) * apart[1], rel=1e-12)
     assert found["short"] == pytest.approx(c * away[0] + s * away[1] - 0.4, abs=1e-15)
     assert abs(found["short"]) > 1e-7
 
@@ -287,10 +295,10 @@ strain = { type = "strain", body = "rod", at = 0.2 }
 """)
 
 
-def readings_of(run):
-    """Readings of a run (time, sensors) by the names of sensors, without motors' torques."""
+def readings_of(run, torque=0.0):
+    """Readings of a run (time, sensors) by the names of sensors."""
     solution, mechanism = run.solution, run.system.mechanism
-    torques = np.zeros((len(solution.q), len(mechanism.motors)))
+    torques = np.full((len(solution.q), len(mechanism.motors)), torque)
     found = sensor_readings(run.system, solution.q, solution.v, solution.a, solution.multipliers, torques)
     return {sensor.name: found[:, k] for k, sensor in enumerate(mechanism.sensors)}
 
@@ -478,3 +486,98 @@ def test_sensors_do_not_act():
     mechanism = everything()
     plain = dataclasses.replace(mechanism, sensors=())
     assert build_system(mechanism).rows == build_system(plain).rows
+    # A sensor turns nothing that a reduced beam could not follow.
+    few = dataclasses.replace(model_from(PENDULUM, "p.toml").mechanism.with_beams(modes=1), motors=())
+    assert not missed_turns(build_system(few))
+
+
+def test_a_motion_holds_its_readings(tmp_path):
+    mechanism = model_from(PENDULUM, "pendulum.toml").mechanism
+    run = simulate_motion(mechanism, 0.05, samples=6, torques={"drive": 0.05})
+    data = pf.motion_dataset(run)
+    readings = data["sensor_reading"]
+    assert list(readings["sensor"].values) == [sensor.name for sensor in mechanism.sensors]
+    assert readings.attrs["units_each"].split(", ") == list(mechanism.sensor_units())
+    for name, values in readings_of(run, 0.05).items():
+        np.testing.assert_array_equal(readings.sel(sensor=name), values)
+    np.testing.assert_allclose(readings.sel(sensor="angle"), data["joint_coordinate"].sel(joint="O"), rtol=1e-12)
+    tip = data["point_acceleration"].sel(point="rod.T")
+    phi = data["angle"].sel(body="rod")
+    across = np.cos(phi) * tip.sel(axis="y") - np.sin(phi) * tip.sel(axis="x")
+    np.testing.assert_allclose(readings.sel(sensor="across"), across, rtol=1e-9)
+    np.testing.assert_allclose(readings.sel(sensor="torque"), 0.05, rtol=1e-9)
+
+    pf.save_results(data, tmp_path / "run.nc")
+    read = pf.load_results(tmp_path / "run.nc")
+    found = motion_summary(read)["sensors"]
+    assert found["strain"] == {"largest": float(np.max(np.abs(readings.sel(sensor="strain")))), "unit": "1"}
+    assert found["rate"]["unit"] == "rad/s"
+    units = result_tables(read)["time_series"].attrs["units"]
+    assert units["sensor_reading_angle"] == "rad"
+    assert units["sensor_reading_tension"] == "N"
+    assert units["sensor_reading_strain"] == ""
+    (panel,) = [panel for panel in motion_page(read).panels if panel.title == "Sensors"]
+    assert len(panel.charts) == len(set(mechanism.sensor_units()))
+    strain = next(chart for chart in panel.charts if chart.title == "Sensors: strain")
+    assert strain.y == "strain [µm/m]"
+    panels = [panel for panel in pf.plots.sensors(read).axes if panel.get_visible()]
+    assert len(panels) == len(set(mechanism.sensor_units()))
+    strain = next(panel for panel in panels if panel.get_ylabel() == "[µm/m]")
+    np.testing.assert_allclose(strain.get_lines()[0].get_ydata(), 1e6 * readings.sel(sensor="strain"))
+
+
+def test_a_mechanism_without_sensors_has_no_readings():
+    data = copy.deepcopy(PENDULUM)
+    del data["sensor"]
+    found = pf.motion_dataset(simulate_motion(model_from(data, "p.toml").mechanism.rigid(), 0.01, samples=3))
+    assert "sensor_reading" not in found
+    assert "sensor" not in found.dims
+    assert "sensors" not in motion_summary(found)
+    assert "Sensors" not in [panel.title for panel in motion_page(found).panels]
+    with pytest.raises(pf.InputError, match="sensor"):
+        pf.plots.sensors(found)
+
+
+@pytest.fixture(scope="module")
+def short_task():
+    """A flexible 5R on a short line, with sensors."""
+    model = pf.load("five_bar")
+    first = model.mechanism.joints[0]
+    link, point = (
+        first.b.body,
+        next(name for name in model.mechanism.body(first.b.body).points if name != first.b.point),
+    )
+    end = f"{link}.{point}"
+    sensors = (
+        pf.Encoder("angle", first.name), pf.PositionSensor("place", end, "x"),
+        pf.JointForceSensor("pull", first.name, "y"), pf.StrainGauge("strain", link, 0.1, 0.001),
+        pf.AccelerationSensor("felt", end, "y", link), pf.DeflectionSensor("bent", end, "x"),
+    )  # fmt: skip
+    mechanism = dataclasses.replace(model.mechanism, sensors=sensors)
+    return pf.plan(mechanism, model.path("line"), duration=0.02, samples=5)
+
+
+def test_finite_segments_measure_what_has_a_meaning_in_them(short_task):
+    data = pf.tracking_dataset([short_task.in_segments(4).simulate("++")]).isel(mode=0)
+    known = np.isfinite(data["sensor_reading"].values).all(axis=0)
+    assert dict(zip(data["sensor"].values, known, strict=True)) == {
+        "angle": True, "place": True, "pull": True, "strain": False, "felt": False, "bent": False,
+    }  # fmt: skip
+    whole = pf.tracking_dataset([short_task.simulate("++")]).isel(mode=0)
+    assert np.isfinite(whole["sensor_reading"].values).all()
+    for name in ("angle", "place"):
+        here, there = (each["sensor_reading"].sel(sensor=name) for each in (data, whole))
+        np.testing.assert_allclose(here, there, rtol=1e-2)
+
+
+def test_kineto_elastodynamics_and_rigid_links_are_measured(short_task):
+    ked = pf.tracking_dataset([simulate_ked(short_task, "++")]).isel(mode=0)
+    assert np.isfinite(ked["sensor_reading"].values).all()
+    assert np.max(np.abs(ked["sensor_reading"].sel(sensor="strain"))) > 0.0
+    # The motors are held to the planned motion.
+    np.testing.assert_allclose(
+        ked["sensor_reading"].sel(sensor="angle"), ked["joint_coordinate"].isel(joint=0), rtol=1e-12
+    )
+    rigid = short_task.remodelled(short_task.mechanism.rigid())
+    found = pf.tracking_dataset([rigid.simulate("++")])["sensor_reading"].isel(mode=0)
+    assert np.all(found.sel(sensor="strain") == 0.0)

@@ -77,7 +77,7 @@ def _table(title: str, headings: Sequence[str], right: Sequence[int] = ()) -> Ta
 
 def _counts(facts: dict[str, Any]) -> Table:
     table = Table(show_header=False, box=None)
-    related = [group.words for group in groups_of(Mechanism).values() if group.relates]
+    related = [group.words for group in groups_of(Mechanism).values() if group.relates or group.measures]
     for label, key in (
         ("bodies", "bodies"),
         ("joints", "joints"),

@@ -19,6 +19,7 @@ from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import Assembly
 from paraflex.mechanism.poses import approximate_poses
+from paraflex.mechanism.sensors import DeflectionSensor, Sensor
 
 # Points at which segments are joined.
 FIRST_END = "_first"
@@ -58,7 +59,8 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
 
     A joint of two half segments bends as they do together: k = E I / (L / n), of spans of several stiffnesses the
     reciprocal of int dx / E I over the two halves. Lumped masses move with the segment they lie on. The model is
-    another discretisation of the same beam, without elongation and without shape functions.
+    another discretisation of the same beam, without elongation and without shape functions. Sensors of strain and
+    deflection, and those along axes that a beam carries, are left out.
 
     Parameters
     ----------
@@ -117,7 +119,9 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
 
     effector = mechanism.end_effector
     kept = {
-        name: tuple(map(moved, getattr(mechanism, name))) for name, one in groups_of(Mechanism).items() if one.kinds
+        name: tuple(moved(one) for one in getattr(mechanism, name) if _remains(one, counts))
+        for name, group in groups_of(Mechanism).items()
+        if group.kinds
     }
     segmented = replace(
         mechanism,
@@ -129,6 +133,12 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         assemblies=tuple(_assembly(mechanism, assembly, carriers) for assembly in mechanism.assemblies),
     )
     return Segmented(segmented, carriers)
+
+
+def _remains(member: Any, cut: Mapping[str, int]) -> bool:
+    """Whether a member has a meaning in segments: of sensors those that need no frame and no inside of a cut beam."""
+    frame = member.point.body if isinstance(member, DeflectionSensor) else getattr(member, "body", "")
+    return not isinstance(member, Sensor) or frame not in cut
 
 
 def is_hinge(joint: Joint) -> bool:

@@ -20,6 +20,7 @@ from .free_motion import (
     point_motions as point_motions,
     point_paths as point_paths,
 )
+from .measured import sensors as sensors
 from .methods import work_precision as work_precision
 from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached

@@ -100,6 +100,9 @@ _RUN = (
         "mode",
         variables=("frame_force",),
     ),
+    CatalogueFigure(
+        "sensors", "measured", "reading of every sensor, a panel for each unit", "mode", variables=("sensor_reading",)
+    ),
     CatalogueFigure("link_deflections", "time_series", "transverse displacement of the ends of all links", "mode"),
     CatalogueFigure(
         "point_motions",

@@ -14,6 +14,7 @@ from paraflex.report.curves import followed
 from paraflex.report.page import Chart, Panel
 from paraflex.report.text import NO_VALUE, number, table
 from paraflex.results.loads import load_figures
+from paraflex.results.sensors import sensor_groups
 
 _MEGA = 1e-6
 # Tables with more rows than that show the beam with the largest stress of each mode.
@@ -126,7 +127,7 @@ def _joints(figures: Mapping[str, Any]) -> str:
 
 
 def load_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
-    """Charts over time of runs (run, time, ...): stresses, joints, drives, ground; none of earlier results."""
+    """Charts over time of runs (run, time, ...): stresses, joints, drives, ground, sensors; none of earlier results."""
     charts = []
     if "stress" in data and np.isfinite(data["stress"].values).any():
         bent = data.isel(body=np.flatnonzero(np.isfinite(data["stress"].values).any(axis=(0, 1))))
@@ -153,4 +154,15 @@ def load_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
         note = "Of all joints and springs that are on the ground: the shaking force."
         chart = Chart("frame", "Force on the ground", "force", choosing="direction", note=note)
         charts.append(followed(chart, data["frame_force"], runs))
-    return [Panel("Loads", charts)] if charts else []
+    loads = [Panel("Loads", charts)] if charts else []
+    return [*loads, *_sensor_panel(data, runs)]
+
+
+def _sensor_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
+    """Charts of readings by their units; none of results without sensors."""
+    charts = [
+        followed(Chart(f"sensors-{k}", f"Sensors: {group.quantity}", group.quantity, choosing="sensor"),
+                 group.readings, runs)
+        for k, group in enumerate(sensor_groups(data))
+    ]  # fmt: skip
+    return [Panel("Sensors", charts)] if charts else []

@@ -59,7 +59,7 @@ def tracking_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end, section, drive;
+        Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end, section, drive, sensor;
         units and signs in the attributes of every variable. `shape` and what else drawings are made from is float32.
     """
     if not runs:

@@ -89,15 +89,16 @@ def _table(data: xr.Dataset, names: Sequence[Any], rows: Sequence[str]) -> pd.Da
         for index in product(*(range(len(one)) for one in labels)):
             column = "_".join([str(name), *(str(one[i]) for one, i in zip(labels, index, strict=True))])
             columns[column] = values[(..., *index)].ravel()
-            units[column], meanings[column] = _unit_and_meaning(data[name])
+            units[column], meanings[column] = _unit_and_meaning(data[name], index)
     table = pd.DataFrame(columns)
     table.attrs = {"units": units, "meanings": meanings}
     return table
 
 
-def _unit_and_meaning(array: xr.DataArray) -> tuple[str, str]:
-    """Unit and meaning of a variable."""
-    unit = str(array.attrs.get("units", ""))
+def _unit_and_meaning(array: xr.DataArray, index: tuple[int, ...] = ()) -> tuple[str, str]:
+    """Unit and meaning of a variable, or of the label of it at an index, where each has a unit of its own."""
+    each = str(array.attrs.get("units_each", "")).split(", ")
+    unit = each[index[0]] if each != [""] and len(index) == 1 else str(array.attrs.get("units", ""))
     return ("" if unit == "1" else unit), str(array.attrs.get("long_name", ""))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -18,6 +18,7 @@ from paraflex.results.drawing import drawing_coordinates, drawing_variables
 from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import chord_deflections
+from paraflex.results.sensors import READING, SENSOR
 from paraflex.results.storage import SCHEMA
 from paraflex.results.stress import (
     COMMENTS as STRESS_COMMENTS,
@@ -101,6 +102,7 @@ UNITS = (
         "coordinate_rate": ("rate of a generalised coordinate", "1/s of it"),
         "point_velocity": ("velocity of a named point", "m/s"),
         "point_acceleration": ("acceleration of a named point", "m/s^2"),
+        READING: ("reading of a sensor", "1"),
         "applied_torque": ("given motor torque, over time where it changes", "N m"),
     }
     | VALIDITY_UNITS
@@ -132,6 +134,7 @@ _COMMENTS = {
     "joint_coordinate": "of the joint's second body against its first: anticlockwise, or along the joint's axis",
     "drive_torque": "as `torque`: on the joint's second body",
     "drive_power": "torque or force times the rate of the joint: positive drives the mechanism, negative brakes it",
+    READING: "each in the unit that units_each has in its place; NaN of what has no meaning in the model",
     "frame_force": "of all joints and springs between points that are on the ground",
 } | STRESS_COMMENTS
 
@@ -177,6 +180,8 @@ def _load_variables(links: Links, mechanism: Mechanism) -> Variables:
             out[name] = ((dim,), values)
     if links.frame_load is not None:
         out |= {"frame_force": (("axis",), links.frame_load.force), "frame_moment": ((), links.frame_load.moment)}
+    if links.sensors is not None and links.sensors.shape[1]:
+        out[READING] = ((SENSOR,), links.sensors)
     if links.sections is not None:
         out |= section_variables(links.sections, [body.name for body in mechanism.bodies])
     return out
@@ -203,8 +208,8 @@ def padded(values: NDArray[Any], total: int) -> NDArray[Any]:
 
 def link_coordinates(system: System, links: Links) -> dict[str, Any]:
     """Labels of the dimensions that the variables of links have."""
-    drives = [one.name for one in system.mechanism.prescribed]
     mechanism = system.mechanism
+    drives, sensors = ([one.name for one in members] for members in (mechanism.prescribed, mechanism.sensors))
     return {
         "axis": ["x", "y"],
         "body": [body.name for body in mechanism.bodies],
@@ -213,6 +218,7 @@ def link_coordinates(system: System, links: Links) -> dict[str, Any]:
         "row": list(system.rows),
         "point": [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points],
         **drawing_coordinates(mechanism),
+        **({SENSOR: sensors} if sensors and links.sensors is not None else {}),
         **({"drive": drives} if drives and links.drive_torque is not None else {}),
         **({} if links.sections is None else section_coordinates(links.sections.sections)),
     }
@@ -229,6 +235,9 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
             data[name].attrs["comment"] = _COMMENTS[plain]
     drives = ["N" if mechanism.slides(one.joint) else "N m" for one in mechanism.prescribed]
     _name_efforts(data, mechanism.motor_units(), "motor_speed", _TORQUES)
+    if READING in data:
+        readings = list(mechanism.sensor_units())
+        _name_units(data[READING], list(dict.fromkeys(readings)), readings)
     _name_efforts(data, drives, "drive_speed", ("drive_torque",))
     for name, of_angle, of_travel in (("joint_coordinate", "rad", "m"), ("joint_speed", "rad/s", "m/s")):
         if name in data:
@@ -244,11 +253,16 @@ def _name_efforts(data: xr.Dataset, units: Iterable[str], speed: str, names: Ite
     if speed in data:
         data[speed].attrs["units"] = ", ".join(speeds[unit] for unit in units)
     for name in (each for each in names if each in data):
-        data[name].attrs["units"] = ", ".join(units)
-        if len(units) > 1:
-            data[name].attrs["units_each"] = ", ".join(each)
+        _name_units(data[name], units, each)
         if units == ["N"]:
             data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")
+
+
+def _name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -> None:
+    """All units of a variable; where these are several `units_each`, those of its labels in their order."""
+    array.attrs["units"] = ", ".join(units)
+    if len(units) > 1:
+        array.attrs["units_each"] = ", ".join(each)
 
 
 def provenance(

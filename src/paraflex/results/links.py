@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle
+from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import FrameLoad, drive_torques, frame_load, joint_loads
 from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.integrators import Solution
@@ -61,6 +61,8 @@ class Links:
         What the mechanism does to the ground.
     sections : SectionResult, optional
         Section forces of beams; None of models without shape functions, and where no beam is flexible.
+    sensors : (k, sensors) array, optional
+        Readings of the mechanism's sensors, each in its unit; NaN of those that have no meaning in the model.
     """
 
     angle: Array
@@ -86,6 +88,7 @@ class Links:
     drive_speed: Array | None = None
     frame_load: FrameLoad | None = None
     sections: SectionResult | None = None
+    sensors: Array | None = None
 
 
 def system_links(
@@ -146,6 +149,7 @@ def system_links(
         drive_speed=_stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
         frame_load=frame_load(system, drawn.joints, loads, q, v),
         sections=section_result(system, q, v, a),
+        sensors=_sensors(cut, sensor_readings(system, q, v, a, multipliers, torques[:samples])),
     )
 
 
@@ -190,6 +194,16 @@ def _multipliers(system: System, whole: System, multipliers: Array) -> Array:
     for i, row in enumerate(whole.rows):
         if row in system.rows:
             out[:, i] = multipliers[:, system.rows.index(row)]
+    return out
+
+
+def _sensors(cut: _Cut, readings: Array) -> Array:
+    """Readings by the sensors of the original mechanism; NaN of those that the cut one does not have."""
+    place = {sensor.name: k for k, sensor in enumerate(cut.system.mechanism.sensors)}
+    out = np.full((len(readings), len(cut.whole.mechanism.sensors)), np.nan)
+    for k, sensor in enumerate(cut.whole.mechanism.sensors):
+        if sensor.name in place:
+            out[:, k] = readings[:, place[sensor.name]]
     return out
 
 

@@ -30,6 +30,7 @@ from paraflex.results.links import system_links
 from paraflex.results.loads import load_figures
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.record import RUN_FIGURES
+from paraflex.results.sensors import sensor_figures
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 
@@ -59,7 +60,7 @@ def motion_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end, section, drive;
+        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end, section, drive, sensor;
         units and signs in the attributes of every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
@@ -106,6 +107,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         "loads": load_figures(data),
+        **sensor_figures(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]) if reached.size else None,
