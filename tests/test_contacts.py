@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -118,3 +120,54 @@ def test_a_run_has_the_moment_under_the_force_with_the_sign_and_size_of_its_mult
     assert place == pytest.approx(0.0 if by_hand is cantilever else x, rel=1e-6)
     moment = max(abs(by_hand(np.array([0.0, x]), (x,))))
     assert data["stress_max"].sel(body="beam").item() == pytest.approx(moment / (0.02 * 0.005**2 / 6), rel=1e-4)
+
+
+def test_a_beam_that_something_slides_along_has_elements_of_at_most_a_third_of_it():
+    def meshed(points, **changes):
+        return pressed((0.3 * L,), CLAMP, points=points, **changes).body("beam")
+
+    assert meshed({"A": 0.0, "M": 0.5 * L, "B": L}).elements == (2, 2)
+    assert meshed({"A": 0.0, "M": 0.1 * L}).elements == (1, 3)
+    # 1/3 of the beam may be rounded.
+    assert meshed({"A": 0.0, "M": L / 3.0}).elements == (1, 2)
+    assert meshed({"A": 0.0, "M": L}, elements=1).elements == 1
+    alone = pressed((), CLAMP, points={"A": 0.0, "B": L})
+    assert alone.body("beam").elements is None
+    assert alone.body("beam").mesh.n_elements == 1
+    assert alone.refined(3).body("beam").elements == 3
+
+
+def test_elements_that_are_too_long_for_what_slides_along_are_a_finding():
+    def few(elements, **changes):
+        mechanism = pressed((0.3 * L,), CLAMP, points={"A": 0.0, "M": L}, elements=elements, **changes)
+        return [one.place for one in pf.check(mechanism).findings if one.code == "elements-few"]
+
+    assert few(None) == few(3) == few(2, flexible=False) == []
+    assert few(2) == ["body.beam.elements"]
+
+
+@pytest.mark.parametrize(("kind", "told"), [("slot", True), ("prismatic", True), ("sliding", False)])
+def test_an_axis_along_a_beam_that_bends_is_a_finding(kind, told):
+    made = {
+        "slot": lambda *ends: SlotJoint("on block0", *ends),
+        "prismatic": lambda *ends: PrismaticJoint("on block0", *ends),
+        "sliding": lambda *ends: SlidingJoint("on block0", *ends),
+    }[kind]
+    mechanism = pressed((0.3 * L,), CLAMP)
+
+    def codes(point, **changes):
+        joint = made(ref(f"beam.{point}"), ref("block0.P"))
+        joints = tuple(joint if one.name == joint.name else one for one in mechanism.joints)
+        bodies = tuple(replace(one, **changes) if one.name == "beam" else one for one in mechanism.bodies)
+        return {one.code for one in pf.check(replace(mechanism, joints=joints, bodies=bodies)).findings}
+
+    assert ("axis-along-beam" in codes("A")) == ("axis-along-beam" in codes("M")) == told
+    # A rigid beam does not bend.
+    assert "axis-along-beam" not in codes("A", flexible=False)
+
+
+def test_a_slider_beyond_the_end_of_a_beam_is_a_telescope():
+    telescope = PrismaticJoint("on block0", ref("beam.B"), ref("block0.P"))
+    mechanism = pressed((1.2 * L,), CLAMP)
+    joints = tuple(telescope if one.name == telescope.name else one for one in mechanism.joints)
+    assert "axis-along-beam" not in {one.code for one in pf.check(replace(mechanism, joints=joints)).findings}
