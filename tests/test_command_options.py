@@ -1,10 +1,14 @@
 """Options that commands share: one value each, and one way to name a model."""
 
+import json
+
 import pytest
 from typer.main import get_command
 
+import paraflex as pf
 from paraflex.cli import app as program
 from paraflex.errors import InputError
+from paraflex.report.provenance import run_command_line
 
 COMMANDS = get_command(program.app).commands
 NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}
@@ -86,3 +90,47 @@ def test_every_command_with_a_mechanism_takes_both():
     assert sorted(with_option) == sorted(MODEL_COMMANDS)
     for name in MODEL_COMMANDS:
         assert any(one.opts == ["source"] for one in COMMANDS[name].params), name
+
+
+# Options that say where results go and how they are shown.
+SHOWN = {"out", "force", "report", "json"}
+
+
+def asked_for(tmp_path, *line):
+    """The command in the results of a run that is as quick as it can be."""
+    out = tmp_path / "out"
+    COMMANDS["run"].main([*line, "--no-report", "--out", str(out)], standalone_mode=False)
+    return run_command_line(json.loads((out / "summary.json").read_text())["parameters"]["run"])
+
+
+def test_the_command_that_repeats_a_run_has_every_option_that_decides_it(tmp_path):
+    options = (
+        "--duration 1e-4 --samples 2 --balanced --geometry linear "
+        "--max-steps 500000 --tol 1e-4 --method trapezoidal --assembly stretched --stop-at deflection:rod=0.5"
+    )
+    pf.load("slider_crank_flexible").mechanism.save(tmp_path / "crank.toml")
+    motion = [str(tmp_path / "crank.toml"), *options.split()]
+    line = asked_for(tmp_path, *motion)
+    for word in motion[1:]:
+        if word.startswith("--"):
+            assert word in line.split(), line
+
+
+def test_every_option_of_a_run_is_in_the_command_that_repeats_it_or_shows_results():
+    """A new option that is forgotten there is found here."""
+    run = {
+        "set": {"a.b": 1.0}, "mechanism": "five_bar",
+        "path": "line", "modes": ["++++"], "duration": 1.0, "samples": 3, "tolerance": 1e-6,
+        "method": "bdf2", "step": 0.1, "constraints": "baumgarte", "alpha": 1.0, "beta": 2.0, "segments": 3,
+        "reference": "free", "curvature": "shared", "after": "hold", "assembly": "start", "max_steps": 7,
+        "method_parameters": {"a": 1.0}, "rigid": True, "ked": True, "balanced": True, "stop_at": ["singular=0.1"],
+    }  # fmt: skip
+    lines = " ".join(
+        run_command_line(each)
+        for each in (run, run | {"automatic_gains": True},
+                     run | {"geometry": "linear", "rigid": False, "ked": False, "segments": None})
+    )  # fmt: skip
+    words = {word.partition("=")[0] for word in lines.split()}
+    for parameter in COMMANDS["run"].params:
+        if parameter.name not in SHOWN and parameter.opts[0].startswith("-"):
+            assert words & set(parameter.opts), parameter.name

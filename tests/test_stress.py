@@ -76,7 +76,7 @@ def at_rest(mechanism):
 
 def in_state(system, q, v=None):
     still, sections = np.zeros((1, system.n)), sections_of(system)
-    loads = sections.loads(system, q[None], still if v is None else v[None], still)
+    loads = sections.loads(system, q[None], still if v is None else v[None], still, np.zeros((1, system.m)))
     return sections, loads.moment[0], loads.force[0]
 
 
@@ -100,7 +100,7 @@ def test_stress_is_moment_over_modulus_and_force_over_area():
     by_hand = 30.0 * SMALL / (WIDTH * THICK) + SMALL * (L - sections.x) * (THICK / 2) / (WIDTH * THICK**3 / 12)
     system = build_system(mechanism)
     q = static_equilibrium(system, consistent_state(system, None)).q[None]
-    stress = sections.stress(sections.loads(system, q, 0 * q, 0 * q))[0]
+    stress = sections.loads(system, q, 0 * q, 0 * q, np.zeros((1, system.m))).stress[0]
     np.testing.assert_allclose(stress, by_hand, rtol=1e-6)
 
 

@@ -96,6 +96,8 @@ _DOUBTFUL = {
     "path-ill-conditioned": "A mode passes near a singular position of its motors.",
     "modes-too-stiff": "The modes kept of a beam cannot carry a moment that comes in.",
     "motions-grow": "Some motions about the pose grow instead of vibrating.",
+    "axis-along-beam": "A slot or prismatic joint has its straight axis along a flexible beam.",
+    "elements-few": "A joint slides along a beam whose elements are too long for it.",
     "slider-off-beam": "A sliding joint leaves its beam.",
     "frequency-low": "A link vibrates on its own far slower than links do.",
     "torque-large": "Torques or forces are far beyond what mass, size and speed make plausible.",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paraflex.checks.along import axes_along_beams
 from paraflex.checks.loose import loose_points
 from paraflex.dynamics import (
     Closure,
@@ -110,6 +111,8 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
         if seen.reach.all_motors < seen.mobility.freedoms and seen.chosen is not None and seen.chosen.state is not None:
             yield from loose_points(seen.rigid, seen.chosen.state.q)
     yield from _reduced(seen.system)
+    if seen.chosen is not None and seen.chosen.state is not None:
+        yield from axes_along_beams(seen.system.mechanism, seen.rigid, seen.chosen.state.q)
     yield from _vibration(seen, at_rest)
 
 

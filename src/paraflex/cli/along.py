@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from rich.console import Console
@@ -17,7 +17,7 @@ from paraflex.cli.bars import bars
 from paraflex.cli.collected import apart, collected
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
-from paraflex.cli.integration import check_stops
+from paraflex.cli.integration import check_stops, model_parameters
 from paraflex.cli.request import at_fault, plan_study
 from paraflex.cli.tables import failures, loads, plain_console, print_studies, validity, warn_of
 from paraflex.cli.writing import write_drawn_run, write_numbers
@@ -180,15 +180,10 @@ def _parameters(
             "modes": [mode.name for mode in modes],
             "duration": float(task.motion.t[-1]),
             "samples": int(task.motion.t.size),
-            "rigid": request.rigid,
-            "segments": request.segments,
-            "ked": request.ked,
-            "balanced": request.balanced,
             "after": task.after.value,
             "error": model.study.error,
-            "geometry": task.mechanism.geometry.value,
         }
-        | asdict(request.frames)
+        | model_parameters(request, task.mechanism)
         | how,
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from paraflex.cli.commands.requests import flags
@@ -143,6 +144,19 @@ def check_stops(mechanism: Mechanism, options: IntegrationOptions, stop_at: Sequ
         except InputError as error:
             problem = f"{error.problem} {error.value}" if error.problem.startswith("unknown") else error.problem
             raise InputError(problem, field="--stop-at", value=text, remedy=error.remedy) from None
+
+
+def model_parameters(request: RunRequest, mechanism: Mechanism) -> dict[str, Any]:
+    """What a run was asked for besides its integration, for provenance; `mechanism` as it ran."""
+    return {
+        "rigid": request.rigid,
+        "segments": request.segments,
+        "ked": request.ked,
+        "balanced": request.balanced,
+        "assembly": request.plan.assembly,
+        "max_steps": request.max_steps,
+        "geometry": mechanism.geometry.value,
+    } | asdict(request.frames)
 
 
 def integration_parameters(options: IntegrationOptions, stop_at: Sequence[str]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.integration import model_parameters
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     UNBALANCED,
@@ -88,6 +89,7 @@ def _run_held(
             "duration": study.duration,
             "samples": study.samples,
         }
+        | model_parameters(request, mechanism)
         | how,
     }
     seen = check(model, assembly=request.plan.assembly)

@@ -9,19 +9,23 @@ element follows from what its mass resists, N'(x) = rho A (a - g) . e_x, the mea
 with the acceleration a of the centre line, s'' + phi'' E s - phi'^2 s + 2 phi' E s' + r''. Of second-order geometry u
 is the stretch of the centre line, so that N is that of the element; the shortening by bending is left out of a.
 
+Where a joint slides along a beam, its force adds to the moment what shape functions leave out (`dynamics.contacts`),
+and the section under it is one more place, which moves.
+
 Cook, Malkus, Plesha, Witt (2002), Concepts and Applications of Finite Element Analysis, 4th ed., 2.9 and 3.12 (loads
 between nodes added to what nodal displacements give).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.arrays import Array
+from paraflex.dynamics.contacts import Contacts, contacts_of
 from paraflex.dynamics.coordinates import BodyCoordinates
 from paraflex.dynamics.system import System
 from paraflex.fem.element import axial_shape, transverse_shape
@@ -40,14 +44,36 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
 class SectionLoads(NamedTuple):
-    """Bending moment [N m] and axial force [N] (k, stations), real or with a complex step.
+    """Loads of sections (k, stations and contacts), real or with a complex step, and what these sections are.
 
-    The moment is positive where it bends the beam anticlockwise going from its first end to its last; the force is
-    positive in tension, and NaN of beams whose coordinates do not stretch.
+    First those of all stations, then those under each joint that slides along a beam.
+
+    Attributes
+    ----------
+    moment : array
+        Bending moment, positive where it bends the beam anticlockwise going from its first end to its last [N m].
+    force : array
+        Axial force, positive in tension; NaN of beams whose coordinates do not stretch [N].
+    x : array
+        Distance from the beam's first end [m].
+    area, modulus, strength : arrays
+        See `Sections`.
     """
 
     moment: Array
     force: Array
+    x: Array
+    area: Array
+    modulus: Array
+    strength: Array
+
+    @property
+    def stress(self) -> Array:
+        """Largest magnitude of the stress in each section, |N| / A + |M| c / I [Pa].
+
+        Of bending alone where there is no axial force; NaN where the outermost fibre is not known.
+        """
+        return np.abs(np.nan_to_num(self.force)) / np.real(self.area) + np.abs(self.moment) / np.real(self.modulus)
 
 
 @dataclass(frozen=True)
@@ -58,6 +84,8 @@ class Sections:
     ----------
     bodies : tuple of str
         Body of each station.
+    contacts : mapping of str to str
+        Body of each joint that slides along a beam, in the order of their sections.
     x : (s,) array
         Distance from the beam's first end [m].
     area, modulus : (s,) arrays
@@ -69,24 +97,28 @@ class Sections:
     """
 
     bodies: tuple[str, ...]
+    contacts: Mapping[str, str]
     x: Array
     area: Array
     modulus: Array
     strength: Array
     parts: tuple[_Beam, ...]
 
-    def loads(self, system: System, q: Array, v: Array, a: Array) -> SectionLoads:
-        """Section forces for coordinates (k, n) and their derivatives."""
-        found = [_loads(system, part, q, v, a) for part in self.parts]
-        none = np.zeros((len(q), 0))
-        return SectionLoads(*(np.concatenate([none, *each], axis=1) for each in zip(*found, strict=True)))
+    def loads(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionLoads:
+        """Loads of sections for coordinates (k, n), their derivatives, and the multipliers (k, m)."""
+        still, moving, first = [], [], 0
+        for part in self.parts:
+            own = slice(first, first := first + len(part.moment))
+            sections = tuple(each[own] for each in (self.x, self.area, self.modulus, self.strength))
+            found = _loads(system, part, sections, q, v, a, multipliers)
+            still.append(SectionLoads(*(each[:, : len(part.moment)] for each in found)))
+            moving.append(SectionLoads(*(each[:, len(part.moment) :] for each in found)))
+        return SectionLoads(*(np.concatenate(each, axis=1) for each in zip(*still, *moving, strict=True)))
 
-    def stress(self, loads: SectionLoads) -> Array:
-        """Largest magnitude of the stress in each section, |N| / A + |M| c / I (k, s) [Pa].
-
-        Of bending alone where there is no axial force; NaN where the outermost fibre is not known.
-        """
-        return np.abs(np.nan_to_num(loads.force)) / np.real(self.area) + np.abs(loads.moment) / np.real(self.modulus)
+    @property
+    def owners(self) -> tuple[str, ...]:
+        """Body of each section of `loads`."""
+        return (*self.bodies, *self.contacts.values())
 
 
 class _Beam(NamedTuple):
@@ -96,6 +128,7 @@ class _Beam(NamedTuple):
     moment: Array
     force: Array | None
     change: _Change | None = None
+    contacts: Contacts | None = None
 
 
 class _Change(NamedTuple):
@@ -117,7 +150,7 @@ def sections_of(system: System) -> Sections | None:
     Rigid and modal bodies have no section forces: nothing is known of the inside of these.
     """
     found = [
-        _stations(described, system.body(described.name))
+        _stations(described, system)
         for described in system.mechanism.bodies
         if isinstance(described, FlexibleBeam | AssumedModesBeam) and system.body(described.name).nf
     ]
@@ -133,6 +166,7 @@ def sections_of(system: System) -> Sections | None:
         modulus=np.array([np.nan if one.outer_fibre is None else one.second_moment / one.outer_fibre
                           for one, _ in fibres]),
         strength=np.array([np.nan if made.strength is None else made.strength for _, made in fibres]),
+        contacts={joint: part.body for part in parts if part.contacts is not None for joint in part.contacts.joints},
         parts=parts,
     )  # fmt: skip
 
@@ -144,9 +178,13 @@ class SectionAt(NamedTuple):
     material: Material
     part: _Beam
 
-    def loads(self, system: System, q: Array, v: Array, a: Array) -> SectionLoads:
-        """Section forces (k, 1) for coordinates (k, n) and their derivatives."""
-        return _loads(system, self.part, q, v, a)
+    def loads(self, system: System, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
+        """Bending moment and axial force (k,) for coordinates (k, n) and their derivatives, by the shape functions.
+
+        Without what a force that slides along the beam adds within its element.
+        """
+        moment = q[:, system.body(self.part.body).flexible] @ self.part.moment[0]
+        return moment, _axial(system, self.part, q, v, a)[:, 0]
 
 
 def section_at(system: System, name: str, x: float) -> SectionAt | None:
@@ -166,13 +204,16 @@ def section_at(system: System, name: str, x: float) -> SectionAt | None:
 
 
 def _stations(
-    described: FlexibleBeam | AssumedModesBeam, body: BodyCoordinates
+    described: FlexibleBeam | AssumedModesBeam, system: System
 ) -> tuple[_Beam, Array, Sequence[Section], Sequence[Material]]:
     """Rows, places, sections and materials of a beam's stations."""
+    body = system.body(described.name)
     if isinstance(described, FlexibleBeam):
         mesh = described.mesh
         pieces = max(_ELEMENT_PIECES, -(-_BEAM_PIECES // mesh.n_elements))
-        return _meshed(described, body, [(e, np.linspace(0.0, 1.0, pieces + 1)) for e in range(mesh.n_elements)])
+        at = [(e, np.linspace(0.0, 1.0, pieces + 1)) for e in range(mesh.n_elements)]
+        part, x, sections, materials = _meshed(described, body, at)
+        return part._replace(contacts=contacts_of(system, described)), x, sections, materials
     pieces = max(_BEAM_PIECES, _ELEMENT_PIECES * described.shapes.count)
     x = np.linspace(0.0, 1.0, pieces + 1) * described.length
     return _assumed(described, body, x), x, [described.section] * x.size, [described.material] * x.size
@@ -246,16 +287,37 @@ def _change(beam: FlexibleBeam, D: Array, at: Sequence[_Places], mass: Array) ->
     return _Change(mass, *(np.concatenate(each) for each in (along, across, place, one)))
 
 
-def _loads(system: System, part: _Beam, q: Array, v: Array, a: Array) -> SectionLoads:
-    """Moment and force at a beam's stations."""
+def _loads(
+    system: System, part: _Beam, sections: Sequence[Array], q: Array, v: Array, a: Array, multipliers: Array
+) -> SectionLoads:
+    """Loads of a beam's stations, then of its sections under what slides along it."""
+    x, *kinds = (np.broadcast_to(each, (len(q), each.size)) for each in sections)
+    u, contacts = q[:, system.body(part.body).flexible], part.contacts
+    force = _axial(system, part, q, v, a)
+    if contacts is None:
+        return SectionLoads(u @ part.moment.T, force, x, *kinds)
+    place, pushed = contacts.at(system, q, multipliers)
+    # Without what the forces deflect quasi-statically, then with the moments of these as they are.
+    u = u - contacts.deflected(place, pushed)
+    moment = np.hstack([u @ part.moment.T, np.einsum("kcj,kj->kc", contacts.bending(place), u)])
+    everywhere = np.hstack([np.broadcast_to(contacts.inside(sections[0]), x.shape), place])
+    moment += np.einsum("ksc,kc->ks", contacts.exact(everywhere[:, :, None], place[:, None, :]), pushed)
+    left, weight = contacts.between(sections[0], place)
+    before, after = (np.take_along_axis(force, at, 1) for at in (left, left + 1))
+    kinds = [np.hstack([each, np.take_along_axis(each, left, 1)]) for each in kinds]
+    force = np.hstack([force, (1.0 - weight) * before + weight * after])
+    return SectionLoads(moment, force, np.hstack([x, place]), *kinds)
+
+
+def _axial(system: System, part: _Beam, q: Array, v: Array, a: Array) -> Array:
+    """Axial force at a beam's stations."""
     body = system.body(part.body)
     u = q[:, body.flexible]
-    moment = u @ part.moment.T
     if part.force is None:
-        return SectionLoads(moment, np.full(moment.shape, np.nan))
+        return np.full((len(q), len(part.moment)), np.nan)
     force = u @ part.force.T
     if part.change is None:
-        return SectionLoads(moment, force)
+        return force
     change = part.change
     phi, w, dw = q[:, body.angle], v[:, body.angle, None], a[:, body.angle, None]
     du, ddu = v[:, body.flexible], a[:, body.flexible]
@@ -268,4 +330,4 @@ def _loads(system: System, part: _Beam, q: Array, v: Array, a: Array) -> Section
         - 2.0 * w * (du @ change.across.T)
         + ddu @ change.along.T
     )
-    return SectionLoads(moment, force + change.mass * resisted)
+    return force + change.mass * resisted

@@ -241,9 +241,8 @@ def _of_strain(system: System, sensor: StrainGauge) -> Callable[[Measured], Numb
     bending, axial = distance / (stiffness * section.second_moment), 1.0 / (stiffness * section.area)
 
     def read(at: Measured) -> Numbers:
-        loads = at_place.loads(system, at.q, at.v, at.a)
-        stretched = at_place.part.force is not None
-        return (axial * loads.force[:, 0] if stretched else 0.0) - bending * loads.moment[:, 0]
+        moment, force = at_place.loads(system, at.q, at.v, at.a)
+        return (axial * force if at_place.part.force is not None else 0.0) - bending * moment
 
     return read
 

@@ -308,7 +308,11 @@ class BeamTable(_Table):
     section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one a span")
     material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one a span")
     points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
-    elements: Count | list[Count] = Field(default=1, description="elements per span, one number or one a span")
+    elements: Count | list[Count] | None = Field(
+        default=None,
+        description="elements per span, one number or one a span; by default 1, and where a joint slides along "
+        "the beam so many that none is longer than a third of it",
+    )
     lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
     reference: ReferenceName | None = Field(
         default=None,

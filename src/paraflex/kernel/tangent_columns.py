@@ -44,9 +44,7 @@ def tangent_columns(system, weights, part, colours, q, v, a, lam, torques, compl
                         one[system.bodies[i].offset + local] = 1.0
                         moved = True
             if moved:
-                residual_tangent(
-                    system, weights, q, v, a, lam, torques, compliance, 0, system.bodies.size, direction
-                )
+                residual_tangent(system, weights, q, v, a, lam, torques, compliance, 0, system.bodies.size, direction)
                 copy(direction.f, forces[column])
                 copy(direction.rows, rows[column])
                 column += 1

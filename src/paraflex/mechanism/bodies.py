@@ -116,8 +116,9 @@ class FlexibleBeam(CheckedFields):
         Likewise.
     points : mapping
         Distance of each named point from the first end [m]; every one becomes a node.
-    elements : int or tuple of int
-        Elements per span between neighbouring points and ends.
+    elements : int or tuple of int, optional
+        Elements per span between neighbouring points and ends. By default 1, and where a joint of a mechanism slides
+        along the beam so many that none is longer than a third of the beam (`mechanism.tracks`).
     lumps : tuple of LumpedMass
     reference : ReferenceCondition or str
         How the floating frame is fixed to the beam. Pinned by default: deflections count from the chord, and stay small
@@ -140,7 +141,7 @@ class FlexibleBeam(CheckedFields):
     section: Section | tuple[Section, ...]
     material: Material | tuple[Material, ...]
     points: Mapping[str, float] = field(default_factory=dict)
-    elements: int | tuple[int, ...] = 1
+    elements: int | tuple[int, ...] | None = None
     lumps: tuple[LumpedMass, ...] = ()
     reference: ReferenceCondition = ReferenceCondition.PINNED
     curvature: Curvature = Curvature.SEPARATE
@@ -162,7 +163,7 @@ class FlexibleBeam(CheckedFields):
         InputError
             See `fem.mesh_beam` and `spans`.
         """
-        mesh = mesh_beam(self.length, self.points, self.elements)
+        mesh = mesh_beam(self.length, self.points, self.counts)
         spans = self._spans_of(mesh)
         stiffness = [spans[span].bending_stiffness for span in mesh.spans]
         # At a step of E I the moment is continuous: a shared curvature would be wrong on one side at least.
@@ -180,7 +181,12 @@ class FlexibleBeam(CheckedFields):
         InputError
             A number of sections or materials that is not that of the spans.
         """
-        return self._spans_of(mesh_beam(self.length, self.points, self.elements))
+        return self._spans_of(mesh_beam(self.length, self.points, self.counts))
+
+    @property
+    def counts(self) -> int | tuple[int, ...]:
+        """Elements per span, 1 where they are not given."""
+        return 1 if self.elements is None else self.elements
 
     def _spans_of(self, mesh: BeamMesh) -> tuple[SpanProperties, ...]:
         sections = _per_span(self.section, mesh.n_spans, "section")

@@ -87,7 +87,7 @@ def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
             positive(material.strength, f"{where}.strength", "Pa")
     finite(body.points.values(), f"{field}.points")
     with _within(field):
-        mesh_beam(body.length, body.points, body.elements if isinstance(body, FlexibleBeam) else 1)
+        mesh_beam(body.length, body.points, body.counts if isinstance(body, FlexibleBeam) else 1)
     for lump in body.lumps:
         if lump.point not in body.points:
             raise InputError(

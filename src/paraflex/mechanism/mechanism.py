@@ -17,6 +17,7 @@ from paraflex.mechanism.members import Geometry, Members
 from paraflex.mechanism.payload import Payload, loaded, together
 from paraflex.mechanism.phases import with_phases
 from paraflex.mechanism.quantities import known
+from paraflex.mechanism.tracks import with_meshes
 
 
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
@@ -69,6 +70,9 @@ class Mechanism(Members, Shown):
         super().__post_init__()
         object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
+        object.__setattr__(self, "bodies", with_meshes(self))
+        # The checks have looked bodies up by name.
+        self.__dict__.pop("_bodies_by_name", None)
         for field, relations in with_phases(self).items():
             object.__setattr__(self, field, relations)
 
@@ -183,7 +187,7 @@ class Mechanism(Members, Shown):
             return elements * factor if isinstance(elements, int) else tuple(count * factor for count in elements)
 
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam) and body.flexible]
-        return self.with_bodies(replace(beam, elements=times(beam.elements)) for beam in beams)
+        return self.with_bodies(replace(beam, elements=times(beam.counts)) for beam in beams)
 
     def _refuse_given_shapes(self, what: str) -> None:
         for name in given_shapes(self.bodies):

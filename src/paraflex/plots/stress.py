@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -15,7 +17,7 @@ from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time, largest_over_time
 from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import ZERO, look_of
-from paraflex.results.stress import stresses_of
+from paraflex.results.stress import CONTACT, stresses_of
 
 _MEGA = 1e-6
 
@@ -33,13 +35,13 @@ def beam_stresses(data: xr.Dataset, mode: str | None = None) -> Figure:
 def stress_envelope(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Largest magnitude of the stress over the run along every beam, dashed its axial part; at most the seven largest.
 
-    Two values at one place are those on both sides of a node.
+    Two values at one place are those on both sides of a node; crosses are largest values under what slides along.
     """
     run = one_run(data, mode)
     found = stresses_of(run)
     _check_stresses(found.whole, "stress_envelope")
     whole, axial = (_MEGA * np.fmax.reduce(each, axis=0) for each in (found.whole, np.abs(found.axial)))
-    place, owners = run["section_place"].values, run["section_body"].values
+    place, owners = run["section_place"].values, found.owners
     peaks = {body: peak(whole[owners == body]) for body in names_of(run, "body")}
     shown = [body for body in sorted(peaks, key=lambda name: -peaks[name])[:MOST_LINES] if peaks[body] > 0.0]
     figure, axes = panels(1, 1)
@@ -47,10 +49,22 @@ def stress_envelope(data: xr.Dataset, mode: str | None = None) -> Figure:
         own, look = owners == body, look_of(k)
         axes[0, 0].plot(place[own], whole[own], label=symbol(body), **look)
         axes[0, 0].plot(place[own], axial[own], color=look["color"], linestyle=":", linewidth=0.8)
+        for x, stress in _peaks_under_contacts(run, body):
+            axes[0, 0].plot(x, _MEGA * stress, color=look["color"], linestyle="", marker="x", markersize=4.0)
     axes[0, 0].set_xlabel(axis_label("place"))
     axes[0, 0].set_ylabel(axis_label("stress"))
     axes[0, 0].set_ylim(bottom=0.0)
     return lay_out(figure, axes, panel_height=56.0)
+
+
+def _peaks_under_contacts(run: xr.Dataset, body: str) -> Iterator[tuple[float, float]]:
+    """Place [m] and largest magnitude [Pa] of the stress under each joint that slides along a body."""
+    if "contact_moment" not in run:
+        return
+    found = stresses_of(run, CONTACT)
+    for c in np.flatnonzero((found.owners == body) & np.isfinite(found.whole).any(axis=0)):
+        k = int(np.nanargmax(found.whole[:, c]))
+        yield float(found.place[k, c]), float(found.whole[k, c])
 
 
 def _check_stresses(stresses: NDArray[np.float64], figure: str) -> None:

@@ -25,8 +25,10 @@ _REQUEST_FIELDS = (
     "reference",
     "curvature",
     "after",
+    "assembly",
+    "max_steps",
 )
-_GIVEN = {name: f"--{name}" for name in _REQUEST_FIELDS} | {"tolerance": "--tol"}
+_GIVEN = {name: f"--{name.replace('_', '-')}" for name in _REQUEST_FIELDS} | {"tolerance": "--tol"}
 
 
 def asked(data: xr.Dataset) -> dict[str, Any]:

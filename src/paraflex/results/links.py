@@ -148,7 +148,7 @@ def system_links(
         drive_torque=drive_torques(system, multipliers),
         drive_speed=_stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
         frame_load=frame_load(system, drawn.joints, loads, q, v),
-        sections=section_result(system, q, v, a),
+        sections=section_result(system, q, v, a, multipliers),
         sensors=_sensors(cut, sensor_readings(system, q, v, a, multipliers, torques[:samples])),
     )
 

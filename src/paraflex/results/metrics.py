@@ -111,17 +111,15 @@ def _stress_where(used_up: Callable[[Any], Trace]) -> Formula:
     def value(run: Any, nominal: Any) -> Any:
         if run.sections is None or nominal.sections is None:
             return np.nan
-        (here, loads), (there, nominal_loads) = (
-            (each.sections.sections, each.sections.loads) for each in (run, nominal)
-        )
-        most = there.stress(nominal_loads) / np.real(used_up(there))
+        loads, nominal_loads = run.sections.loads, nominal.sections.loads
+        most = nominal_loads.stress / np.real(used_up(nominal_loads))
         if not np.isfinite(most).any():
             return np.nan
         k, s = np.unravel_index(np.nanargmax(most), most.shape)
-        bending = np.sign(nominal_loads.moment[k, s]) * loads.moment[k, s] / here.modulus[s]
+        bending = np.sign(nominal_loads.moment[k, s]) * loads.moment[k, s] / loads.modulus[k, s]
         force = nominal_loads.force[k, s]
-        axial = 0.0 if np.isnan(force) else np.sign(force) * loads.force[k, s] / here.area[s]
-        return (bending + axial) / used_up(here)[s]
+        axial = 0.0 if np.isnan(force) else np.sign(force) * loads.force[k, s] / loads.area[k, s]
+        return (bending + axial) / used_up(loads)[k, s]
 
     return value
 
@@ -132,8 +130,8 @@ def _section_moment(run: Any, nominal: Any) -> Any:
     return _largest_magnitude(lambda x: x.sections.loads.moment)(run, nominal)
 
 
-_stress = _stress_where(lambda sections: np.ones(len(sections.bodies)))
-_use = _stress_where(lambda sections: sections.strength)
+_stress = _stress_where(lambda loads: np.ones_like(loads.area))
+_use = _stress_where(lambda loads: loads.strength)
 
 
 def _safety_factor(run: Any, nominal: Any) -> Any:

@@ -37,7 +37,7 @@ class RunTraces(Traces):
     def sections(self) -> SectionResult | None:
         """Section forces of the beams; None where none is flexible."""
         solution = self.run.solution
-        return section_result(self.run.task.system, solution.q, solution.v, solution.a)
+        return section_result(self.run.task.system, solution.q, solution.v, solution.a, solution.multipliers)
 
     @property
     def condition(self) -> Trace:

@@ -15,8 +15,9 @@ from paraflex.results.numbers import largest
 
 Array = NDArray[np.float64]
 Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
-# The dimension of stations along beams, and the variable that every run with section forces has.
-SECTION, MOMENT = "section", "section_moment"
+# The dimensions of stations along beams and of joints that slide along them, and the variable that every run with
+# section forces has.
+SECTION, CONTACT, MOMENT = "section", "contact", "section_moment"
 _BODIES = ("stress_max", "stress_place", "stress_time", "bending_stress_max", "axial_stress_max", "safety_factor")
 UNITS = {
     "section_moment": ("bending moment of a beam's section", "N m"),
@@ -26,6 +27,13 @@ UNITS = {
     "section_area": ("area of a section", "m^2"),
     "section_modulus": ("second moment of area over the distance of the outermost fibre", "m^3"),
     "section_strength": ("strength of the material at a section", "Pa"),
+    "contact_body": ("body that a joint slides along", "1"),
+    "contact_place": ("distance of a sliding joint from the beam's first end", "m"),
+    "contact_moment": ("bending moment of the section under a sliding joint", "N m"),
+    "contact_force": ("axial force of the section under a sliding joint", "N"),
+    "contact_area": ("area of the section under a sliding joint", "m^2"),
+    "contact_modulus": ("section_modulus of the section under a sliding joint", "m^3"),
+    "contact_strength": ("strength of the material under a sliding joint", "Pa"),
     "stress": ("largest magnitude of the stress along a beam, bending and axial", "Pa"),
     "stress_max": ("largest magnitude of the stress of a beam, bending and axial", "Pa"),
     "stress_place": ("distance from the beam's first end at which its stress is largest", "m"),
@@ -34,8 +42,11 @@ UNITS = {
     "axial_stress_max": ("largest magnitude of a beam's axial stress", "Pa"),
     "safety_factor": ("least strength over stress of a beam", "1"),
 }
+# Variables of contacts and the fields of `SectionLoads` that they are.
+_OF_CONTACTS = {name: name for name in ("moment", "force", "area", "modulus", "strength")} | {"place": "x"}
 COMMENTS = {
-    "section_moment": "E I w'' of the shape functions: positive bends the beam anticlockwise from its first end on",
+    "section_moment": "E I w'' of the shape functions, with what the force of a joint that slides along adds; "
+    "positive bends the beam anticlockwise from its first end on",
     "section_force": "positive in tension; NaN of beams whose coordinates do not stretch, as those of few modes",
     "stress": "|N| / A + |M| c / I in the outermost fibre; NaN where the section has no outer_fibre",
 }
@@ -49,25 +60,31 @@ class SectionResult:
     loads: SectionLoads
 
 
-def section_result(system: System, q: Array, v: Array, a: Array) -> SectionResult | None:
-    """Section forces for coordinates (k, n) and their derivatives; None where no beam is flexible."""
+def section_result(system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionResult | None:
+    """Section forces for coordinates (k, n), their derivatives and multipliers; None where no beam is flexible."""
     sections = sections_of(system)
-    return None if sections is None else SectionResult(sections, sections.loads(system, q, v, a))
+    return None if sections is None else SectionResult(sections, sections.loads(system, q, v, a, multipliers))
 
 
 def section_variables(found: SectionResult, bodies: list[str]) -> Variables:
     """Variables over time, those of many stations in single precision."""
-    stress = found.sections.stress(found.loads)
+    stress, number = found.loads.stress, len(found.sections.bodies)
     along = np.full((len(stress), len(bodies)), np.nan)
     for b, body in enumerate(bodies):
-        own = np.array(found.sections.bodies) == body
-        if own.any() and np.isfinite(found.sections.modulus[own]).any():
+        own = np.array(found.sections.owners) == body
+        if own.any() and np.isfinite(found.loads.modulus[:, own]).any():
             along[:, b] = np.fmax.reduce(stress[:, own], axis=1)
-    return {
-        "section_moment": ((SECTION,), found.loads.moment.astype(np.float32)),
-        "section_force": ((SECTION,), found.loads.force.astype(np.float32)),
+    out: Variables = {
+        "section_moment": ((SECTION,), found.loads.moment[:, :number].astype(np.float32)),
+        "section_force": ((SECTION,), found.loads.force[:, :number].astype(np.float32)),
         "stress": (("body",), along),
     }
+    if found.sections.contacts:
+        out |= {
+            f"contact_{name}": ((CONTACT,), getattr(found.loads, field)[:, number:])
+            for name, field in _OF_CONTACTS.items()
+        }
+    return out
 
 
 def section_coordinates(sections: Sections) -> dict[str, Any]:
@@ -78,7 +95,11 @@ def section_coordinates(sections: Sections) -> dict[str, Any]:
         "section_area": (SECTION, sections.area),
         "section_modulus": (SECTION, sections.modulus),
         "section_strength": (SECTION, sections.strength),
-    }
+    } | (
+        {CONTACT: list(sections.contacts), "contact_body": (CONTACT, list(sections.contacts.values()))}
+        if sections.contacts
+        else {}
+    )
 
 
 class Stresses(NamedTuple):
@@ -88,10 +109,17 @@ class Stresses(NamedTuple):
     ----------
     bending, axial : (..., time, section) arrays
         In the outermost fibre, and in the mean of the section [Pa]; with signs.
+    place, strength : (..., time, section) arrays
+        Distance of each section from the beam's first end [m], and strength of its material [Pa].
+    owners : (section,) array of str
+        Body of each section.
     """
 
     bending: Array
     axial: Array
+    place: Array
+    strength: Array
+    owners: NDArray[np.str_]
 
     @property
     def whole(self) -> Array:
@@ -99,26 +127,41 @@ class Stresses(NamedTuple):
         return np.abs(np.nan_to_num(self.axial)) + np.abs(self.bending)
 
 
-def stresses_of(data: xr.Dataset) -> Stresses:
-    """Stresses of a dataset (..., time, section)."""
-    moment, force = (data[name].transpose(..., "time", SECTION).values.astype(float)
-                     for name in ("section_moment", "section_force"))  # fmt: skip
-    return Stresses(moment / data["section_modulus"].values, force / data["section_area"].values)
+def stresses_of(data: xr.Dataset, dim: str = SECTION) -> Stresses:
+    """Stresses of a dataset (..., time, section) in the sections of one kind, at stations or under contacts."""
+    moment = data[f"{dim}_moment"].transpose(..., "time", dim)
+
+    def values(name: str) -> Array:
+        return data[f"{dim}_{name}"].broadcast_like(moment).transpose(*moment.dims).values.astype(float)
+
+    bending, axial = values("moment") / values("modulus"), values("force") / values("area")
+    return Stresses(bending, axial, values("place"), values("strength"), data[f"{dim}_body"].values)
+
+
+def _everywhere(data: xr.Dataset) -> Stresses:
+    """Stresses at all stations and under all contacts."""
+    found = stresses_of(data)
+    if "contact_moment" not in data:
+        return found
+    pairs: Any = zip(found, stresses_of(data, CONTACT), strict=True)
+    return Stresses(*(np.concatenate(pair, axis=-1) for pair in pairs))
 
 
 def largest_stresses(data: xr.Dataset) -> xr.Dataset:
     """The largest stresses of every beam of every run, with place and time, and safety factors; NaN where unknown."""
-    found = stresses_of(data)
+    found = _everywhere(data)
     all_stresses = found.whole
     outer = [dim for dim in data["section_moment"].dims if dim not in ("time", SECTION)]
     shape = [data.sizes[dim] for dim in outer]
     out = {name: np.full([*shape, data.sizes["body"]], np.nan) for name in _BODIES}
-    time, place, strength = (data[name].values for name in ("time", "section_place", "section_strength"))
+    time = data["time"].values
     for b, body in enumerate(data["body"].values):
-        own = np.flatnonzero(data["section_body"].values == body)
+        own = np.flatnonzero(found.owners == body)
         for run in np.ndindex(*shape):
-            bending, axial, where = found.bending[run][:, own], found.axial[run][:, own], (*run, b)
-            whole = all_stresses[run][:, own]
+            bending, axial, place, strength = (
+                each[run][:, own] for each in (found.bending, found.axial, found.place, found.strength)
+            )
+            whole, where = all_stresses[run][:, own], (*run, b)
             # None, where nothing is known, becomes NaN.
             out["bending_stress_max"][where] = largest(bending)
             out["axial_stress_max"][where] = largest(axial)
@@ -126,7 +169,7 @@ def largest_stresses(data: xr.Dataset) -> xr.Dataset:
                 continue
             k, station = np.unravel_index(np.nanargmax(whole), whole.shape)
             out["stress_max"][where] = whole[k, station]
-            out["stress_time"][where], out["stress_place"][where] = time[k], place[own[station]]
-            used = largest(whole / strength[own])
+            out["stress_time"][where], out["stress_place"][where] = time[k], place[k, station]
+            used = largest(whole / strength)
             out["safety_factor"][where] = 1.0 / used if used else np.nan
     return xr.Dataset({name: ((*outer, "body"), values) for name, values in out.items()})

@@ -17,6 +17,7 @@ from paraflex.findings import Finding
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalBody, Rectangle, RigidBody, Section
 from paraflex.mechanism.bodies import Body, Material
 from paraflex.mechanism.poses import local_points
+from paraflex.mechanism.tracks import longest_element, too_long, tracks
 from paraflex.validity.actions import doubtful_actions
 
 Place = tuple[float, float]
@@ -83,8 +84,21 @@ def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> lis
             found += _beam(body, size)
         elif isinstance(body, RigidBody):
             found += _rigid(body, size)
-    found += [*_masses(mechanism, size), *_hinges(mechanism), *_one_place(mechanism, size)]
+    found += [*_masses(mechanism, size), *_hinges(mechanism), *_one_place(mechanism, size), *_meshes(mechanism)]
     return _shared([*found, *doubtful_actions(mechanism, size, mechanism_mass(mechanism), times)])
+
+
+def _meshes(mechanism: Mechanism) -> Iterator[Finding]:
+    """Beams whose elements are too long for what slides along them."""
+    for beam in tracks(mechanism):
+        if too_long(beam):
+            part = longest_element(beam)
+            yield Finding(
+                "elements-few", f"body.{beam.name}.elements",
+                f"a joint slides along {beam.name}, and its longest element is {part:.2g} of it: under the joint it "
+                "bends too little, which makes torques, forces and stresses wrong, with one element by up to a fifth",
+                "leave elements out, or give so many that none is longer than a third of the beam",
+            )  # fmt: skip
 
 
 def _shared(found: Iterable[Finding]) -> list[Finding]:

@@ -146,15 +146,15 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
     sections = sections_of(system)
     if sections is None or not np.isfinite(sections.strength).any():
         return
-    stress = sections.stress(sections.loads(system, solution.q, solution.v, solution.a))
-    used = np.nan_to_num(stress / sections.strength)
+    loads = sections.loads(system, solution.q, solution.v, solution.a, solution.multipliers)
+    used = np.nan_to_num(loads.stress / loads.strength)
     k, station = np.unravel_index(np.argmax(used), used.shape)
     if used[k, station] > 1.0:
-        name = sections.bodies[station]
+        name = sections.owners[station]
         yield Finding(
             "stress-over-strength", where.place,
-            f"a stress of {1e-6 * stress[k, station]:.3g} MPa in {name} at {sections.x[station]:.3g} m, "
-            f"t = {solution.t[k]:.4g} s: its material bears {1e-6 * sections.strength[station]:.3g} MPa, the safety "
+            f"a stress of {1e-6 * loads.stress[k, station]:.3g} MPa in {name} at {loads.x[k, station]:.3g} m, "
+            f"t = {solution.t[k]:.4g} s: its material bears {1e-6 * loads.strength[k, station]:.3g} MPa, the safety "
             f"factor is {1.0 / used[k, station]:.2g}",
             where.blame(name) or f"give {name} a stronger section or material, or move and load it less",
         )  # fmt: skip

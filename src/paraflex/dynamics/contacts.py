@@ -1,0 +1,151 @@
+"""What a force that slides along a beam does to its section moments beyond its shape functions.
+
+The transverse force P of a sliding joint is the multiplier of its normal row. Within an element the moment has a kink
+at the place x_c of the force, which shape functions do not have, and a beam reduced to few modes has even less of it.
+What they leave out is quasi-static: the exact moment of the load under the statically determinate supports of the
+body's frame, less that of the flexible coordinates which it deflects, u = W(x_c) P / omega^2,
+
+    dM(x) = P G(x, x_c) - E I(x) W''(x) u,    G = (x_c - x)_+ - S(x, x_c)
+
+with S of the supports: 0 of a clamped first end (cantilever), x_c (L - x) / L of two pins, and of a free frame the
+moment of the inertia of the beam that P accelerates. dM vanishes at a node of a full mesh.
+
+Bisplinghoff, Ashley (1962), Principles of Aeroelasticity, 9.2 (mode acceleration: the static response of all modes).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.arrays import Array
+from paraflex.dynamics.coordinates import BodyCoordinates, transverse_pieces
+from paraflex.dynamics.joint_coordinates import place_along_beam
+from paraflex.dynamics.system import System
+from paraflex.fem import ReferenceCondition
+from paraflex.mechanism import FlexibleBeam
+
+# Integrates the cubic of an arm times an acceleration exactly.
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(2)
+# Part of the way to the middle of its element by which a station at a node with a lump is on one side of it.
+_INSIDE = 1e-12
+
+
+class Contacts(NamedTuple):
+    """Joints that slide along a beam, and what their forces need of it.
+
+    Attributes
+    ----------
+    beam : FlexibleBeam
+    body : BodyCoordinates
+    joints : tuple of str
+    rows : tuple of int
+        Multiplier of each.
+    pieces : (elements, 6, nf) array
+        Transverse displacement W: see `transverse_pieces`.
+    stiffness : (elements,) array
+        E I [N m^2].
+    """
+
+    beam: FlexibleBeam
+    body: BodyCoordinates
+    joints: tuple[str, ...]
+    rows: tuple[int, ...]
+    pieces: Array
+    stiffness: Array
+
+    def at(self, system: System, q: Array, multipliers: Array) -> tuple[Array, Array]:
+        """Places along the beam [m] and transverse forces on it [N] (k, contacts).
+
+        The force is zero beyond the ends of the beam, and where its multiplier is not known; the place is then that of
+        the nearer end.
+        """
+        place = np.stack([place_along_beam(system, name, q) for name in self.joints], axis=1)
+        force = multipliers[:, self.rows]
+        off = (np.real(place) < 0.0) | (np.real(place) > self.length)
+        nearest = np.where(np.real(place) < 0.0, 0.0, self.beam.length)
+        return np.where(off, nearest, place), np.where(off | np.isnan(force), 0.0, force)
+
+    @property
+    def length(self) -> float:
+        """Length of the beam [m]."""
+        return float(np.real(self.beam.length))
+
+    def element(self, place: Array) -> NDArray[np.int64]:
+        """Index of the element at places of any shape."""
+        inner = np.real(self.beam.mesh.nodes[1:-1])
+        return np.searchsorted(inner, np.real(place), side="right")
+
+    def inside(self, x: Array) -> Array:
+        """Stations (s,), as many in each element, a little within their elements, on their side of its nodes."""
+        each = x.reshape(len(self.stiffness), -1)
+        return (each + _INSIDE * (each.mean(axis=1, keepdims=True) - each)).ravel()
+
+    def between(self, x: Array, place: Array) -> tuple[NDArray[np.int64], Array]:
+        """Of stations (s,) the index of that before each place, in its element, and how far it is to the next one."""
+        count, element, nodes = len(x) // len(self.stiffness), self.element(place), self.beam.mesh.nodes
+        z = (place - nodes[element]) / (nodes[element + 1] - nodes[element])
+        left = element * count + np.clip((np.real(z) * (count - 1)).astype(int), 0, count - 2)
+        return left, (place - x[left]) / (x[left + 1] - x[left])
+
+    def deflected(self, place: Array, force: Array) -> Array:
+        """Flexible coordinates (k, nf) that forces (k, contacts) at their places deflect quasi-statically."""
+        return np.einsum("kcj,kc->kj", self._rows(place, 0), force) / self.body.modes.omega**2
+
+    def bending(self, place: Array) -> Array:
+        """Bending moment per flexible coordinate at places (k, contacts): (k, contacts, nf)."""
+        return self.stiffness[self.element(place)][..., None] * self._rows(place, 2)
+
+    def _rows(self, place: Array, derivative: int) -> Array:
+        """W or a derivative at places (k, contacts): (k, contacts, nf)."""
+        element = self.element(place)
+        z = place - self.beam.mesh.nodes[element]
+        return np.einsum("kcp,kcpj->kcj", _powers(z, derivative), self.pieces[element])
+
+    def exact(self, x: Array, place: Array) -> Array:
+        """Moment G at x of a unit force at each place, in the supports of the frame; of arrays that go together."""
+        arm = place - x
+        moment = np.where(np.real(arm) > 0.0, arm, 0.0)
+        if self.beam.reference is ReferenceCondition.PINNED:
+            return moment - place * (1.0 - x / self.beam.length)
+        if self.beam.reference is ReferenceCondition.FREE:
+            return moment - self._inertia(x, place)
+        return moment
+
+    def _inertia(self, x: Array, place: Array) -> Array:
+        """Moment at x of what resists the rigid motion that a unit force at each place gives the free beam."""
+        beam, whole = self.beam, self.body.integrals
+        centre = whole.S1[0] / whole.m
+        turn = (place - centre) / (whole.I0 + whole.J - whole.m * centre**2)
+        moment = np.zeros(np.broadcast_shapes(x.shape, place.shape), np.result_type(x, place, centre))
+        knots = beam.mesh.knots
+        for start, end, span in zip(knots, knots[1:], beam.spans, strict=False):
+            begin = np.where(np.real(x) > np.real(start), np.where(np.real(x) < np.real(end), x, end), start)
+            for point, weight in zip(0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS, strict=True):
+                there = begin + point * (end - begin)
+                accelerated = 1.0 / whole.m + turn * (there - centre)
+                moment = moment + weight * (end - begin) * span.mass_per_length * (there - x) * accelerated
+        for lump in beam.lumps:
+            there = beam.mesh.nodes[beam.mesh.points[lump.point]]
+            resists = lump.mass * (there - x) * (1.0 / whole.m + turn * (there - centre)) + lump.inertia * turn
+            moment = moment + np.where(np.real(there) > np.real(x), resists, 0.0)
+        return moment
+
+
+def _powers(z: Array, derivative: int) -> Array:
+    """z^0..z^5 or a derivative of each, along a last axis."""
+    coefficients = np.polynomial.polynomial.polyder(np.eye(6), derivative)
+    return np.stack([sum(c * z**p for p, c in enumerate(column) if c) + 0.0 * z for column in coefficients.T], axis=-1)
+
+
+def contacts_of(system: System, beam: FlexibleBeam) -> Contacts | None:
+    """What slides along a beam of a system; None for nothing."""
+    joints = tuple(one.name for one in system.mechanism.joints if one.follows_beam and one.a.body == beam.name)
+    if not joints:
+        return None
+    body, spans = system.body(beam.name), beam.spans
+    rows = tuple(system.rows.index(f"{name} normal") for name in joints)
+    stiffness = np.array([spans[span].bending_stiffness for span in beam.mesh.spans])
+    return Contacts(beam, body, joints, rows, transverse_pieces(body), stiffness)
