@@ -171,3 +171,23 @@ def test_a_slider_beyond_the_end_of_a_beam_is_a_telescope():
     mechanism = pressed((1.2 * L,), CLAMP)
     joints = tuple(telescope if one.name == telescope.name else one for one in mechanism.joints)
     assert "axis-along-beam" not in {one.code for one in pf.check(replace(mechanism, joints=joints)).findings}
+
+
+def test_a_balanced_start_bends_the_beam_as_statics_do_and_an_undeformed_one_does_not(tmp_path):
+    x = 0.37 * L
+    mechanism = pressed((x,), CLAMP)
+    moments = {
+        balanced: pf.motion_dataset(pf.simulate_motion(mechanism, 1e-4, samples=2, balanced=balanced))["contact_moment"]
+        for balanced in (True, False)
+    }
+    root = pf.motion_dataset(pf.simulate_motion(mechanism, 1e-4, samples=2, balanced=True))["section_moment"][0, 0]
+    assert root.item() == pytest.approx(-SMALL * x, rel=1e-5)
+    assert abs(moments[True][0, 0].item()) < 1e-5 * SMALL * L < abs(moments[False][0, 0].item())
+    mechanism.save(tmp_path / "beam.toml")
+    (tmp_path / "beam.toml").write_text((tmp_path / "beam.toml").read_text() + "\n[study]\nduration = 2e-4\n")
+    assert pf.simulate_motion(pf.load(tmp_path / "beam.toml"), samples=2).times[-1] == 2e-4
+    with pytest.raises(pf.InputError, match=r"duration: is missing"):
+        pf.simulate_motion(mechanism)
+    start = consistent_state(build_system(mechanism), None)
+    with pytest.raises(pf.InputError, match=r"balanced: a state is as it is"):
+        pf.simulate_motion(mechanism, 1e-4, start=start, balanced=True)

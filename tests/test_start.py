@@ -424,7 +424,7 @@ def test_a_deflection_from_a_file(tmp_path):
         (
             "[start.coordinates]\nrod = { x = 0.5, y = 0.0, phi = 0.0 }",
             ["--balanced"],
-            "--balanced: the file's [start] gives",
+            "--balanced: the [start] gives",
         ),
         ("[start.velocity]\nangular = { rod = 1.0 }", ["--segments", "4"], "--segments: the file's [start] speaks of"),
         (

@@ -13,8 +13,10 @@ from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import (
     InputSignals,
+    JointMotion,
     State,
     System,
+    balanced_state,
     build_system,
     consistent_state,
     constant_signals,
@@ -22,7 +24,7 @@ from paraflex.dynamics import (
     pack_signals,
     start_state,
 )
-from paraflex.errors import InputError, IntegrationError, ResultWarning
+from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from paraflex.kinematics import ModelWithPaths
@@ -30,6 +32,9 @@ from paraflex.mechanism import AngleLaw, Mechanism, Start
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
 from paraflex.validity import Validity, assess, doubtful_results, warn, with_blame
+
+# Remedy of a balanced start that is not found.
+UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
 
 
 @given_as("a run without a path", "the run that simulate_motion returns")
@@ -75,11 +80,12 @@ class MotionRun(Shown):
 @checked_arguments()
 def simulate_motion(
     mechanism: Mechanism | ModelWithPaths,
-    duration: float,
+    duration: float | None = None,
     *,
     samples: int = 701,
     torques: Mapping[str, InTime] | None = None,
     start: State | Start | str | None = None,
+    balanced: bool = False,
     method: Method | str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
@@ -89,9 +95,9 @@ def simulate_motion(
     Parameters
     ----------
     mechanism : Mechanism or Model
-        A model stands for its mechanism and its [start]; nothing is taken from its [study].
-    duration : float
-        [s]
+        A model stands for its mechanism, its [start] and the duration of its [study]; nothing else is taken from that.
+    duration : float, optional
+        [s]; by default that of the model's study.
     samples : int
         Times at which results are kept, evenly spaced, both ends among them.
     torques : mapping of str to float or AngleLaw, optional
@@ -99,6 +105,9 @@ def simulate_motion(
     start : State, Start or str, optional
         Where it starts: the name of an assembly, at rest and undeformed; a `mechanism.Start` near the first assembly
         (near another, see `dynamics.start_state`); or a `dynamics.consistent_state`. The first assembly by default.
+    balanced : bool
+        Whether the pose is that of equilibrium, motors held, or of steady running as prescribed motions start; see
+        `dynamics.balanced_state`.
     method : Method or str, optional
         Of integration: that of the options by default; an object of `paraflex.methods` or a name in `paraflex.METHODS`.
     options : IntegrationOptions, optional
@@ -114,7 +123,7 @@ def simulate_motion(
     ------
     InputError
         A duration or number of samples that makes no sense, an unknown motor, a law that does not cover the run, or
-        neither an assembly nor a start.
+        neither an assembly nor a start; a balanced start of given coordinates, or one that is not found.
     AssemblyError
         The loops do not close.
     IntegrationError
@@ -123,6 +132,10 @@ def simulate_motion(
     given, mechanism = mechanism, Mechanism.made_of(mechanism)
     if start is None and not isinstance(given, Mechanism):
         start = given.start
+    if duration is None:
+        duration = getattr(getattr(given, "study", None), "duration", None)
+    if duration is None:
+        raise InputError("is missing", field="duration", remedy="give it in seconds, or in the model's [study]")
     options = choose(method, options)
     check_times(duration, samples)
     names = [motor.name for motor in mechanism.motors]
@@ -132,7 +145,9 @@ def simulate_motion(
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: (torques or {}).get(name, 0.0) for name in names}
     system = build_system(mechanism)
-    state = start if isinstance(start, State) else _state(system, start)
+    if isinstance(start, State) and balanced:
+        raise InputError("a state is as it is", field="balanced", value=balanced, remedy="leave one of the two out")
+    state = start if isinstance(start, State) else _state(system, start, balanced)
     times = np.linspace(state.time, state.time + duration, samples)
     end = float(times[-1])
     motors, own = _motor_signals(values, end)
@@ -167,9 +182,39 @@ def _motor_signals(torques: Mapping[str, InTime], end: float) -> tuple[list[Inpu
     return signals, knots
 
 
-def _state(system: System, start: Start | str | None) -> State:
+def _state(system: System, start: Start | str | None, balanced: bool) -> State:
     """The state at the given start, or an assembly at rest."""
-    mechanism = system.mechanism
     if isinstance(start, Start):
-        return start_state(system, start, mechanism.assemblies[0] if mechanism.assemblies else None)
-    return consistent_state(system, mechanism.assembly(start))
+        return state_at(system, start, None, balanced=balanced)
+    return state_at(system, None, start, balanced=balanced)
+
+
+def state_at(system: System, start: Start | None, assembly: str | None, *, balanced: bool) -> State:
+    """The state at a start near an assembly, the first by default; without a start at rest, or moving with its drives.
+
+    Raises
+    ------
+    InputError
+        A balanced start of given coordinates, or one that is not found.
+    AssemblyError
+        The loops do not close.
+    """
+    mechanism = system.mechanism
+    if not balanced and start is not None:
+        named = assembly is not None or mechanism.assemblies
+        return start_state(system, start, mechanism.assembly(assembly) if named else None)
+    undeformed = mechanism.assembly(assembly)
+    if not balanced:
+        return consistent_state(system, undeformed)
+    if start is not None and start.places:
+        raise InputError(
+            "the [start] gives coordinates, which a balanced start would change", field="balanced",
+            remedy="leave it out, or give [start.velocity] only",
+        )  # fmt: skip
+    held = {motor.joint: JointMotion() for motor in mechanism.motors}
+    begun = consistent_state(system, undeformed)
+    try:
+        found = balanced_state(system, begun, held)
+    except AssemblyError as error:
+        raise InputError(error.cause, field="balanced", remedy=UNBALANCED) from error
+    return found if start is None else start_state(system, start, q=found.q)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import InfoRequest
-from paraflex.cli.request import UNBALANCED
 from paraflex.dynamics import (
     State,
     System,
@@ -25,6 +24,7 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.errors import AssemblyError, InputError
 from paraflex.files import Model
 from paraflex.kinematics import follow_path
+from paraflex.motion import UNBALANCED
 
 # Poses between the start and the time asked for, where prescribed angles lead there.
 _POSES_BETWEEN = 200

@@ -20,20 +20,19 @@ from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import model_parameters
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
-    UNBALANCED,
     at_fault,
     of_assembly,
 )
 from paraflex.cli.tables import DONE_STATUSES, loads, plain_console, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
-from paraflex.dynamics import JointMotion, State, balanced_state, build_system, consistent_state, start_state
+from paraflex.dynamics import State, build_system
 from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning, ValidityWarning
 from paraflex.files import Model, StudyDefaults
 from paraflex.folders import RUN, ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
-from paraflex.motion import MotionRun, simulate_motion
+from paraflex.motion import MotionRun, simulate_motion, state_at
 from paraflex.results import motion_dataset, motion_summary
 
 # Singular positions listed one by one.
@@ -154,24 +153,12 @@ def own_motion(model: Model, chosen: PlanChoice) -> StudyDefaults:
 
 def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanced: bool) -> State | None:
     """The state the file describes, balanced if asked for; None for an assembly undeformed, moving with its drives."""
-    if balanced and model.start is not None and model.start.places:
-        raise InputError(
-            "the file's [start] gives coordinates, which a balanced start would change", field="--balanced",
-            remedy="leave it out, or give [start.velocity] only",
-        )  # fmt: skip
     if not balanced and model.start is None:
         return None
-    system = build_system(mechanism)
-    if not balanced:
-        given = mechanism.assembly(assembly) if assembly is not None or mechanism.assemblies else None
-        assert model.start is not None
-        return start_state(system, model.start, given)
-    undeformed = consistent_state(system, mechanism.assembly(assembly))
     try:
-        found = balanced_state(system, undeformed, {motor.joint: JointMotion() for motor in mechanism.motors})
-    except AssemblyError as error:
-        raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
-    return found if model.start is None else start_state(system, model.start, q=found.q)
+        return state_at(build_system(mechanism), model.start, assembly, balanced=balanced)
+    except InputError as error:
+        raise (error.at("--balanced") if error.field == "balanced" else error) from error
 
 
 def _ended(summary: dict) -> str:

@@ -102,10 +102,6 @@ def plan_study(
         raise at_fault(error, model) from None
 
 
-# What to do about a start for which no equilibrium is found.
-UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
-
-
 def of_assembly(error: AssemblyError, model: Model) -> InputError:
     """The error of a mechanism that cannot be put together, naming the model's file."""
     # Links that are far too soft bend where the loops are to close, instead of moving.

@@ -89,7 +89,11 @@ class Model(CheckedFields):
         wanted = name or self.study.first_path or next(iter(self.paths), None)
         if wanted is None:
             raise InputError(
-                "the model has no path", field="path", remedy="add a [path.NAME] table", source=self.source
+                "the model has no path, which plans and studies need",
+                field="path",
+                remedy="add a [path.NAME] table; a mechanism that prescribed motions or loads drive is varied by "
+                "--set FIELD=VALUE of paraflex run, or pf.load(model, set={...}) and pf.simulate_motion in a loop",
+                source=self.source,
             )
         if wanted not in self.paths:
             remedy = suggestion(wanted, list(self.paths))
