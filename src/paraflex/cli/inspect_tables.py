@@ -82,6 +82,8 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("joints", "joints"),
         ("independent loops", "loop_count"),
         ("motors", "motors"),
+        ("prescribed motions", "prescribed"),
+        ("loads", "loads"),
         ("coordinates", "coordinates"),
         ("  rigid", "rigid_coordinates"),
         ("  flexible", "flexible_coordinates"),
@@ -97,7 +99,7 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("paths", "paths"),
     ):
         # Most mechanisms have no gears and the like.
-        if key in facts and (facts[key] or key not in related):
+        if key in facts and (facts[key] or key not in (*related, "prescribed", "loads")):
             value = facts[key]
             table.add_row(label, (_some(value) or "none") if isinstance(value, list) else f"{value:g}")
     return table

@@ -102,7 +102,9 @@ def _run_held(
         write_drawn_run(data, folder, request, began)
     finally:
         if not finished:
-            console.print(f"error: {run.solution.message}", soft_wrap=True)
+            message = run.solution.message
+            kept = run.solution.status == "interrupted"
+            console.print(f"{message}; results until then are kept" if kept else f"error: {message}", soft_wrap=True)
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 

@@ -102,12 +102,13 @@ class DisplayUnit(NamedTuple):
 
 _PREFIXES = {
     "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
+    "Pa": (DisplayUnit("MPa", 1e-6), DisplayUnit("kPa", 1e-3), DisplayUnit("Pa", 1.0)),
     "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
 }
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """The unit in which the largest of lengths ("m") or angles ("rad") has few digits; any other unit as it is."""
+    """The unit in which the largest of lengths, angles or stresses (m, rad, Pa) has few digits; any other as it is."""
     largest, choices = peak(values), _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
     if largest == 0.0:
         return choices[0]
