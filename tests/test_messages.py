@@ -350,3 +350,52 @@ def test_a_search_needs_a_start(tmp_path):
     assert "the study's [integration] has no such number; give a start" in message(lambda: load_optimisation(file))
     file.write_text(tolerances + "[integration]\ntolerance = 1e-4\n")
     assert load_optimisation(file).start == (1e-4,)
+
+
+def test_messages_on_expressions_name_the_culprit_and_the_cure():
+    """A stranger's mistakes: a caret, a mistyped millimetre."""
+    with pytest.raises(ExpressionError, match=r'"\^" is no power here') as caught:
+        evaluate("(1 + 2)^2", {})
+    assert caught.value.remedy == 'write ** for powers: "x**2"'
+    with pytest.raises(ExpressionError, match="unknown unit") as caught:
+        evaluate("600 mn", {})
+    assert caught.value.remedy.startswith('did you mean "mm" or ')
+
+
+def model_text(period):
+    return f"""
+name = "turning"
+parameters = {{ n = "60 rpm", T = "{period}" }}
+ground = {{ O = [0.0, 0.0] }}
+joint = {{ O = ["ground.O", "crank.O"] }}
+body.crank = {{ type = "rigid", mass = 1.0, inertia = 0.1, points = {{ O = [0.0, 0.0] }} }}
+study.duration = "2 * T"
+"""
+
+
+def test_a_period_from_a_speed_names_its_parameter_and_the_turn(tmp_path):
+    file = tmp_path / "model.toml"
+    file.write_text(model_text("1 rev / n"))
+    assert load(file).study.duration == pytest.approx(2.0)
+    file.write_text(model_text("2 * pi / n"))
+    said = message(lambda: load(file))
+    assert "study.duration: a quantity in s rad^-1 where one in s" in said
+    assert "it comes of parameters.T" in said
+    assert '"1 rev / n"' in said
+
+
+def test_files_of_another_kind_are_said_to_be(tmp_path):
+    model, study = tmp_path / "model.toml", tmp_path / "study.toml"
+    model.write_text(model_text("1 rev / n"))
+    study.write_text('mechanism = "five_bar"\n[vary.a]\nfields = ["body.left.length"]\nvalues = [1.0]\n')
+    for read in (load_sweep, load_optimisation, load_sensitivities):
+        assert "this is a model file, not a study file" in message(lambda read=read: read(model))
+    assert "this is a study file, not a model file; name its mechanism, five_bar" in message(lambda: load(study))
+
+
+def test_an_open_quote_is_not_a_name_that_stands_twice(tmp_path):
+    file = tmp_path / "model.toml"
+    file.write_text('name = "open\n')
+    assert message(lambda: load(file)).endswith("mend that line")
+    file.write_text('name = "one"\nname = "two"\n')
+    assert message(lambda: load(file)).endswith("mend that line; a name may stand only once")

@@ -30,7 +30,7 @@ from paraflex.motion import simulate_motion
 from paraflex.report import motion_page, tracking_page
 from paraflex.results import load_results, motion_dataset, motion_summary, save_results, summary, tracking_dataset
 from paraflex.results.export import result_tables
-from paraflex.results.loads import effort_lines, load_figures, stress_line
+from paraflex.results.loads import effort_lines, joint_line, load_figures, stress_line
 from paraflex.tracking import plan_tracking
 
 OPTIONS = pf.IntegrationOptions(tolerance=1e-7)
@@ -96,9 +96,9 @@ def test_every_effort_has_its_unit():
     assert units == {"lift": slides, "turn": turns, "push": slides, "spin": turns}
     push, spin = effort_lines(loads)
     assert push.startswith("drive push: force up to ")
-    assert " N, speed up to 2 m/s, power up to " in push
+    assert "; speed up to 2 m/s; power up to " in push
     assert spin.startswith("drive spin: torque up to ")
-    assert " N m, speed up to 3 rad/s, power up to " in spin
+    assert "; speed up to 3 rad/s; power up to " in spin
     efforts = dict(motion_page(data).more)["Motors and prescribed motions"]
     assert efforts.count("m/s") == efforts.count("rad/s") == 2
     # Of results that do not tell which of the two it is, no unit is claimed.
@@ -185,6 +185,16 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
     assert set(loads) == {"beams", "joints", "motors", "drives", "frame"}
     assert list(loads["beams"]) == ["rod"]
     assert "MPa in rod at" in stress_line({"": loads})
+    # Times are those of the largest values, of joints and drives too.
+    drive = loads["drives"]["drive"]
+    for key in ("torque", "power"):
+        then = data[f"drive_{key}"].sel(drive="drive", time=drive[f"{key}_time"]).item()
+        assert abs(then) == drive[f"{key}_max"] == abs(data[f"drive_{key}"]).max().item()
+    name, one = max(loads["joints"].items(), key=lambda each: each[1]["force_max"])
+    assert np.linalg.norm(data["joint_force"].sel(joint=name, time=one["force_time"])) == one["force_max"]
+    assert joint_line({"": loads}).endswith(f"N in {name} at t = {one['force_time']:.4g} s")
+    assert {one["unit"] for name, one in loads["joints"].items() if name != slider_joint(data)} == {"rad"}
+    assert loads["joints"][slider_joint(data)]["unit"] == "m"
     # Below one, which is said three times.
     assert loads["beams"]["rod"]["safety_factor"] < 1.0
     assert "stress-over-strength" in {one.code for one in crank.doubts}
@@ -193,6 +203,13 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
     assert list(tables)[:3] == ["Stresses of beams", "Motors and prescribed motions", "Joints and ground"]
     assert "over strength" in tables["Stresses of beams"]
     assert any("stress-over-strength" in note for note in page.notes)
+    # Angles and travels stand apart, and what a designer asks first stands first.
+    assert tables["Joints and ground"].count("<table") == 3
+    assert "rad, m" not in tables["Joints and ground"]
+    tiles = [name for name, _, _ in page.figures]
+    assert tiles[:3] == ["largest stress", "largest drive torque", "largest joint force"]
+    identities = {chart.identity: chart.y for panel in page.panels for chart in panel.charts}
+    assert (identities["joint-rate"], identities["joint-speed"]) == ("angular velocity [rad/s]", "speed [m/s]")
     tables = result_tables(data, shapes=True)
     assert "joint_speed_" + slider_joint(data) in tables["time_series"]
     assert len(tables["sections"]) == data.sizes["time"] * data.sizes["section"]

@@ -35,6 +35,8 @@ class Unit(NamedTuple):
             return math.inf
 
 
+# What most machines are described in; one wrong letter is sooner meant as one of these.
+_COMMON = ("mm", "cm", "kg", "ms", "kN", "deg", "rad", "rpm", "MPa", "GPa")
 _ONE = Unit(Fraction(1), 0, PLAIN)
 
 
@@ -140,9 +142,16 @@ def unknown_unit(text: str) -> tuple[str, str] | None:
     """The first word behind a number in a text that is no unit, and a remedy."""
     for found in _BEHIND_NUMBER.finditer(text):
         if found[1] not in UNITS:
-            near = get_close_matches(found[1], UNITS, n=1)
-            return found[1], f'did you mean "{near[0]}"?' if near else 'write units like "mm^2", "N m/rad" or "rpm"'
+            near = list(dict.fromkeys([*_mistyped(found[1]), *get_close_matches(found[1], UNITS, n=1)]))
+            meant = " or ".join(f'"{each}"' for each in near)
+            return found[1], f"did you mean {meant}?" if near else 'write units like "mm^2", "N m/rad" or "rpm"'
     return None
+
+
+def _mistyped(word: str) -> list[str]:
+    """Units of machines that differ from a word in one of its letters."""
+    alike = (each for each in _COMMON if len(each) == len(word) > 1)
+    return [each for each in alike if sum(one != other for one, other in zip(each, word, strict=True)) == 1]
 
 
 # Units of fields of files, as their descriptions name them.

@@ -60,7 +60,7 @@ def _write(found: RunComparison, folder: ResultsFolder) -> None:
 
 def print_compared(console: Console, found: RunComparison) -> None:
     """What differs: settings, then of each mode the numbers and the motions."""
-    console.print(f"A: {found.names[0]}\nB: {found.names[1]}", soft_wrap=True)
+    console.print(f"first: {found.names[0]}\nsecond: {found.names[1]}", soft_wrap=True)
     for note in found.notes:
         console.print(note, soft_wrap=True)
     _print_settings(console, found)
@@ -83,18 +83,17 @@ def _print_settings(console: Console, found: RunComparison) -> None:
         return
     shown = list(found.settings.items())[:_MOST_SETTINGS]
     rows = ([name, *(_short(value) for value in pair)] for name, pair in shown)
-    print_titled(console, "Settings that differ", plain_table("setting", "A", "B", rows=rows))
+    print_titled(console, "Settings that differ", plain_table("setting", "first", "second", rows=rows))
     if len(found.settings) > len(shown):
         console.print(f"and {len(found.settings) - len(shown)} more (--out writes all)")
 
 
 def _numbers(pairs: Iterable[NumberPair]) -> Table:
     rows = (
-        [metric_label(pair.name), "" if pair.unit == "1" else pair.unit,
-         *(_number(value) for value in (pair.first, pair.second, pair.difference)), _percent(pair.relative)]
+        [metric_label(pair.name), *_shown(pair), _percent(pair.relative)]
         for pair in pairs
     )  # fmt: skip
-    return plain_table("number", "unit", numbers=("A", "B", "B - A", "relative"), rows=rows)
+    return plain_table("number", "unit", numbers=("first", "second", "difference", "relative"), rows=rows)
 
 
 def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
@@ -104,11 +103,18 @@ def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
         if pair.mode == mode and (pair.name not in most or pair.difference > most[pair.name].difference):
             most[pair.name] = pair
     rows = (
-        [pair.name.replace("_", " "), pair.part, pair.unit,
-         *(_number(value) for value in (pair.first, pair.second, pair.difference, pair.time))]
+        [pair.name.replace("_", " "), pair.part, *_shown(pair), _number(pair.time)]
         for pair in most.values()
     )  # fmt: skip
-    return plain_table("quantity", "of", "unit", numbers=("peak A", "peak B", "difference", "at [s]"), rows=rows)
+    return plain_table(
+        "quantity", "of", "unit", numbers=("peak of first", "of second", "difference", "at [s]"), rows=rows
+    )
+
+
+def _shown(pair: NumberPair | MotionPair) -> list[str]:
+    """Unit, both values and their difference; stresses in MPa."""
+    unit, factor = ("MPa", 1e-6) if pair.unit == "Pa" else ("" if pair.unit == "1" else pair.unit, 1.0)
+    return [unit, *(_number(factor * value) for value in (pair.first, pair.second, pair.difference))]
 
 
 def _number(value: float) -> str:

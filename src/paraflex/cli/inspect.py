@@ -17,7 +17,17 @@ from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, cl
 from paraflex.errors import ProportionError
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
-from paraflex.mechanism import Mechanism, Relation, grouped, loops
+from paraflex.mechanism import (
+    AngleLaw,
+    AppliedTorque,
+    ConstantSpeed,
+    Mechanism,
+    PointForce,
+    PrescribedAngle,
+    Relation,
+    grouped,
+    loops,
+)
 
 # Loops and sets of motors listed at most.
 _LISTED = 1000
@@ -102,6 +112,8 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "bodies": len(mechanism.bodies),
         "joints": len(mechanism.joints),
         "motors": [motor.name for motor in mechanism.motors],
+        "prescribed": [_drive(one, "m/s" if mechanism.slides(one.joint) else "rad/s") for one in mechanism.prescribed],
+        "loads": [_load(one) for one in mechanism.loads],
         "coordinates": system.n,
         "rigid_coordinates": rigid.n,
         "flexible_coordinates": system.n_flexible,
@@ -122,6 +134,21 @@ def _payload_facts(mechanism: Mechanism) -> dict[str, Any] | None:
         return None
     numbers = {"mass": carried.mass, "inertia": carried.inertia, "offset": list(carried.offset)}
     return {"point": str(effector.point), **numbers}
+
+
+def _load(load: PointForce | AppliedTorque) -> str:
+    """Name, place and components of a load; of one in time that it is so."""
+    parts = ["in time" if isinstance(one, AngleLaw) else f"{one:.4g}" for one in load.components]
+    size = f"({', '.join(parts)})" if len(parts) > 1 else parts[0]
+    return f"{load.name}: {load.kind} {size} {load.unit} at {load.point}"
+
+
+def _drive(drive: PrescribedAngle, unit: str) -> str:
+    """Name, joint and, where it is constant, the speed of a prescribed motion."""
+    law = drive.law
+    return f"{drive.name}: joint {drive.joint}, " + (
+        f"{law.speed:.4g} {unit}" if isinstance(law, ConstantSpeed) else "in time"
+    )
 
 
 def _equation(one: Relation) -> str:

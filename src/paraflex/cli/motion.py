@@ -39,6 +39,8 @@ from paraflex.results import motion_dataset, motion_summary
 _MOST_TIMES = 4
 # Points listed where a run ends.
 _MOST_POINTS = 20
+# Coordinates below this share of the largest are rounding.
+_ROUNDING = 1e-12
 
 
 def run_motion(
@@ -101,7 +103,9 @@ def _run_held(
         write_drawn_run(data, folder, request, began)
     finally:
         if not finished:
-            console.print(f"error: {run.solution.message}", soft_wrap=True)
+            message = run.solution.message
+            kept = run.solution.status == "interrupted"
+            console.print(f"{message}; results until then are kept" if kept else f"error: {message}", soft_wrap=True)
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 
@@ -174,10 +178,14 @@ def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
     out.print(f"{summary['mechanism']}: {_ended(summary)}")
     if summary["event"]:
         out.print(summary["message"], soft_wrap=True)
+    loads(out, {"": summary["loads"]})
+    out.print("at the end:")
     # Points that segments made by the program hang together at are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
+    wide = max((abs(x) for at in places.values() for x in at), default=0.0)
     for point, position in list(places.items())[:_MOST_POINTS]:
-        out.print(f"  {point}: ({position[0]:.6g}, {position[1]:.6g}) m")
+        x, y = (0.0 if abs(each) < _ROUNDING * wide else each for each in position)
+        out.print(f"  {point}: ({x:.6g}, {y:.6g}) m")
     if len(places) > _MOST_POINTS:
         out.print(f"  and {len(places) - _MOST_POINTS} more points in results.nc")
     passed = [f"{t:.6g}" for t in summary["singular_positions"]]
@@ -191,4 +199,3 @@ def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
         f"imbalance of energy {summary['energy_balance_max']:.1e} J"
     )
     validity(out, {"": summary["validity"]})
-    loads(out, {"": summary["loads"]})

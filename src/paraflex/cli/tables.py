@@ -153,11 +153,11 @@ def validity(console: Console, verdicts: Mapping[str, Any]) -> None:
 
 
 def loads(console: Console, figures: Mapping[str, Any]) -> None:
-    """The largest stress of all runs, and what prescribed motions need."""
-    from paraflex.results.loads import effort_lines, stress_line
+    """What a designer asks first: the largest stress of all runs, what prescribed motions need, the joint force."""
+    from paraflex.results.loads import effort_lines, joint_line, stress_line
 
     lines = [line for name, one in figures.items() for line in effort_lines(one, name)]
-    for line in filter(None, [stress_line(figures), *lines]):
+    for line in filter(None, [stress_line(figures), *lines, joint_line(figures)]):
         console.print(line, soft_wrap=True)
 
 

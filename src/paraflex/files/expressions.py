@@ -249,6 +249,8 @@ def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
             return _UNARY[type(op)](_value(operand, value_of))
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
             return _call(name, [_value(argument, value_of) for argument in arguments])
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
+        raise ExpressionError('"^" is no power here, but behind units only', 'write ** for powers: "x**2"')
     raise ExpressionError(
         "only numbers, parameters, + - * / ** and brackets may stand in an expression, and functions like sin(...)",
         "compute the value elsewhere and write the number",

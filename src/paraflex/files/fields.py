@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from paraflex.errors import InputError
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
-from paraflex.files.expressions import ExpressionError, evaluate
+from paraflex.files.expressions import ExpressionError, evaluate, names_in
 from paraflex.mechanism import JOINT_KINDS
 from paraflex.units import FIELD_UNITS, PLAIN, Dimension, quantities_in, spelt, unit_named
 
@@ -130,10 +130,13 @@ def check_unit(
     if units is None or given in (None, PLAIN) or given in [unit_named(unit).dimension for unit in units]:
         return
     asked = f"one in {' or '.join(units)}" if units else "a number without a unit"
-    raise InputError(
-        f"a quantity in {spelt(given)} where {asked} is asked for", field=field, value=text,
-        remedy=f"give {description}",
-    )  # fmt: skip
+    remedy = f"give {description}"
+    if named := sorted(names_in(text) & parameters.keys()):
+        remedy += f"; it comes of {', '.join(f'parameters.{name}' for name in named)}"
+    # A period from a speed, 2 * pi / n: an angle counts.
+    if any(given[:3] == unit_named(unit).dimension[:3] for unit in units or ()):
+        remedy += '; an angle is a quantity of its own: of a speed n in rpm the period is "1 rev / n"'
+    raise InputError(f"a quantity in {spelt(given)} where {asked} is asked for", field=field, value=text, remedy=remedy)
 
 
 def number_in(text: str, unit: str) -> float:

@@ -140,7 +140,9 @@ def _not_toml(reason: str, source: str) -> InputError:
     twice = re.match(r"Cannot declare \((.*?),?\) twice \((.*)\)", reason)
     if twice is None:
         problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "mend that line"
-        return InputError(problem, field="file", remedy=f"{remedy}; a name may stand only once", source=source)
+        if re.search("overwrite|mutate|uplicate", reason):
+            remedy += "; a name may stand only once"
+        return InputError(problem, field="file", remedy=remedy, source=source)
     table = ".".join(part.strip(" '") for part in twice[1].split(","))
     return InputError(
         f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out", source=source
@@ -176,6 +178,8 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
 
 
 def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
+    if (problem := _other_kind(schema, data, source)) is not None:
+        return problem
     problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
     location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)
@@ -205,6 +209,19 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
     message = problem["msg"].removeprefix("Input ").replace(" after validation", "")
     text = message[0].lower() + message[1:]
     return InputError(text, field=field, value=value, remedy=f"give {description}", source=source)
+
+
+def _other_kind(schema: type[BaseModel], data: dict[str, Any], source: str) -> InputError | None:
+    """A model file where a study file is asked for, or the other way round."""
+    fields = schema.model_fields
+    if "mechanism" in fields and "body" in data and "mechanism" not in data:
+        name = f'mechanism = "{source}"'
+        remedy = f"write a study file with {name} and what it is to vary, and name that"
+        return InputError("this is a model file, not a study file", field="file", remedy=remedy, source=source)
+    if "body" in fields and "body" not in data and isinstance(data.get("mechanism"), str):
+        remedy = f"name its mechanism, {data['mechanism']}, or give it to the command of its study"
+        return InputError("this is a study file, not a model file", field="file", remedy=remedy, source=source)
+    return None
 
 
 def _tag_problem(tags: list[str], table: str, value: Any, source: str) -> InputError:

@@ -1,6 +1,6 @@
 """The model file as pydantic sees it: which fields there are, of what type and unit.
 
-SI units and radians throughout; a number with another unit is a text, "80 mm". What a field must satisfy beyond its
+Numbers are in SI units and radians; one with another unit is a text, "80 mm". What a field must satisfy beyond its
 type (positive lengths, points that exist) is checked once, in `mechanism.checks` and by the paths themselves.
 """
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.plots.catalogue import CatalogueFigure
-from paraflex.plots.labels import display_unit, peak, plain, symbol
+from paraflex.plots.labels import ROUNDING, display_unit, peak, plain, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.planned import PlannedFigure
 from paraflex.plots.save import write_figures
@@ -78,6 +78,8 @@ def save_overlays(comparison: RunComparison, folder: Path) -> list[Path]:
 
 def _most_different(pairs: list[MotionPair]) -> list[MotionPair]:
     """So many that there is a panel for each, in the order of the mechanism."""
+    # What stands still in both runs has nothing to show.
+    pairs = [pair for pair in pairs if max(pair.first, pair.second) > ROUNDING] or pairs
     chosen = sorted(pairs, key=lambda pair: -np.nan_to_num(pair.difference))[:_MOST]
     return [pair for pair in pairs if pair in chosen]
 

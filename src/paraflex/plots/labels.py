@@ -103,7 +103,7 @@ class DisplayUnit(NamedTuple):
 _PREFIXES = {
     "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
     "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
-    "Pa": (DisplayUnit("GPa", 1e-9), DisplayUnit("MPa", 1e-6), DisplayUnit("Pa", 1.0)),
+    "Pa": (DisplayUnit("GPa", 1e-9), DisplayUnit("MPa", 1e-6), DisplayUnit("kPa", 1e-3), DisplayUnit("Pa", 1.0)),
 }
 # The largest value of a unit is at least so many: stresses are in MPa, moduli in GPa.
 _LEAST, _LEAST_OF = 0.1, {"GPa": 2.0}

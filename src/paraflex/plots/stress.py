@@ -17,6 +17,7 @@ from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time, largest_over_time
 from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import ZERO, look_of
+from paraflex.results.loads import sliding_joints
 from paraflex.results.stress import CONTACT, stresses_of
 
 _MEGA = 1e-6
@@ -79,7 +80,7 @@ def _check_stresses(stresses: NDArray[np.float64], figure: str) -> None:
 def joint_motions(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Angle and rate of every joint that turns, travel and speed of every one that slides; at most seven of each."""
     run = one_run(data, mode)
-    slides = np.isfinite(run["joint_direction"].transpose("time", "joint").values).any(axis=0)
+    slides = sliding_joints(run)
     moves = run["joint_kind"].values != "weld"
     kinds = ((~slides & moves, ("angle", "angular_velocity")), (slides, ("travel", "speed")))
     shown = [(own, labels) for own, labels in kinds if own.any()]

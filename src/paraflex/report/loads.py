@@ -13,10 +13,12 @@ from paraflex.plots.selection import names_of
 from paraflex.report.curves import followed
 from paraflex.report.page import Chart, Panel
 from paraflex.report.text import NO_VALUE, number, table
-from paraflex.results.loads import load_figures
+from paraflex.results.loads import load_figures, ranked, sliding_joints
 from paraflex.results.sensors import sensor_groups
 
 _MEGA = 1e-6
+# Prescribed motions with a tile of their own.
+_MOST_TILES = 2
 # Tables with more rows than that show the beam with the largest stress of each mode.
 _MOST_ROWS = 40
 
@@ -44,16 +46,31 @@ def load_tables(data: xr.Dataset, selected: str = "") -> list[tuple[str, str]]:
     return out
 
 
-def stress_tile(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    """The main number of the beams' stresses: the largest, and where; none of earlier results."""
-    stress = data.get("stress", xr.DataArray(np.nan))
-    most = stress.max()
-    if not most > 0.0:
-        return []
-    where = stress.where(stress == most, drop=True)
-    body = text_symbol(str(where["body"].values[0]))
-    mode = f", mode {where['mode'].values[0]}" if data.sizes.get("mode", 1) > 1 else ""
-    return [("largest stress", f"{number(float(most), _MEGA)} MPa", body + mode)]
+def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """The numbers a designer asks first: largest stress, efforts of prescribed motions, largest joint force."""
+    tiles = []
+    if stresses := ranked(figures, "beams", "stress_max"):
+        most, run, body, one = stresses[0]
+        factor = "" if one["safety_factor"] is None else f", safety factor {number(one['safety_factor'])}"
+        where = f"{_whose(run)}{text_symbol(body)} at {number(one['place'])} m, t = {one['time']:.4g} s{factor}"
+        tiles.append(("largest stress", f"{number(most, _MEGA)} MPa", where))
+    for most, run, name, one in ranked(figures, "drives", "torque_max")[:_MOST_TILES]:
+        unit = one["torque_unit"] or ""
+        kind = {"N m": "torque", "N": "force"}.get(unit, "effort")
+        of = f"{_whose(run)}{text_symbol(name)}, t = {one['torque_time']:.4g} s"
+        if one["power_max"] is not None and one["speed_max"] is not None:
+            of += f"; up to {number(one['speed_max'])} {one['speed_unit'] or ''}, {number(one['power_max'])} W"
+        tiles.append((f"largest drive {kind}", f"{number(most)} {unit}".rstrip(), of))
+    forces = ranked(figures, "joints", "force_max")
+    if forces and forces[0][0]:
+        most, run, joint, one = forces[0]
+        where = f"{_whose(run)}{text_symbol(joint)}, t = {one['force_time']:.4g} s"
+        tiles.append(("largest joint force", f"{number(most)} N", where))
+    return tiles
+
+
+def _whose(run: str) -> str:
+    return f"mode {run}: " if run else ""
 
 
 def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
@@ -98,32 +115,52 @@ def _efforts(efforts: Mapping[str, Mapping[str, Any]]) -> str:
     kinds = {(one["torque_unit"], one["speed_unit"]) for one in efforts.values()}
     same = len(kinds) == 1 and None not in min(kinds)
     units = [f"[{unit}]" for unit in kinds.pop()] if same else ["", ""]
-    heads = [("motor", ""), ("torque" if units[0] == "[N m]" else "force" if same else "torque, force", units[0]),
-             ("speed", units[1]), ("power", "[W]"), ("energy", "[J]")]  # fmt: skip
+    heads = [("motor or drive", ""),
+             ("torque" if units[0] == "[N m]" else "force" if same else "torque, force", units[0]), ("at", "[s]"),
+             ("speed", units[1]), ("at", "[s]"), ("power", "[W]"), ("at", "[s]"), ("energy", "[J]")]  # fmt: skip
     rows = [
         (text_symbol(name), [
-            *(number(one[f"{key}_max"]) + ("" if same else f"\n{one[f'{key}_unit'] or more}")
-              for key, more in (("torque", "N m or N"), ("speed", "rad/s or m/s"))),
-            number(one["power_max"]), number(one["energy"]),
+            *(cell for key, more in (("torque", "N m or N"), ("speed", "rad/s or m/s"))
+              for cell in (number(one[f"{key}_max"]) + ("" if same else f"\n{one[f'{key}_unit'] or more}"),
+                           number(one[f"{key}_time"]))),
+            number(one["power_max"]), number(one["power_time"]), number(one["energy"]),
         ])
         for name, one in efforts.items()
     ]  # fmt: skip
-    note = "Largest magnitudes; energy: integral of the power's magnitude."
+    note = "Largest magnitudes and their times; energy: integral of the power's magnitude."
     return table(heads, rows, caption="Largest efforts of motors and prescribed motions", note=note)
 
 
 def _joints(figures: Mapping[str, Any]) -> str:
-    heads = [("joint", ""), ("from", "[rad, m]"), ("to", "[rad, m]"), ("speed", "[rad/s, m/s]"), ("force", "[N]"),
-             ("moment", "[N m]")]  # fmt: skip
-    rows = [
-        (text_symbol(name), [number(one[key]) for key in ("least", "most", "speed_max", "force_max", "moment_max")])
-        for name, one in figures["joints"].items()
-    ]
+    """A table of the joints that turn and one of those that slide: angles and travels are not in one column."""
+    joints = figures["joints"]
+    wide = {key: max((one[key] or 0.0 for one in joints.values()), default=0.0) for key in ("force_max", "moment_max")}
+    out = ""
+    for unit, what in (("rad", "Joints that turn"), ("m", "Joints that slide")):
+        own = {name: one for name, one in joints.items() if one["unit"] == unit}
+        if own:
+            out += _joints_of(own, unit, what, wide)
     if frame := figures.get("frame"):
-        blank = [NO_VALUE] * 3
-        rows.append(("on the ground", [*blank, number(frame["force_max"]), number(frame["moment_max"])]))
-    note = "Angle or travel; largest magnitudes. On the ground: the sum of all joints, about the origin."
-    return table(heads, rows, caption="Motion and loads of joints", note=note)
+        heads = [("", ""), ("force", "[N]"), ("at", "[s]"), ("moment", "[N m]"), ("at", "[s]")]
+        cells = [number(frame[key]) for key in ("force_max", "force_time", "moment_max", "moment_time")]
+        note = "The sum of all joints, about the origin."
+        out += table(heads, [("on the ground", cells)], caption="Loads on the ground", note=note)
+    return out
+
+
+def _joints_of(joints: Mapping[str, Mapping[str, Any]], unit: str, what: str, wide: Mapping[str, float]) -> str:
+    coordinate = "angle" if unit == "rad" else "travel"
+    heads = [("joint", ""), ("from", f"[{unit}]"), ("to", f"[{unit}]"), ("speed", f"[{unit}/s]"), ("at", "[s]"),
+             ("force", "[N]"), ("at", "[s]"), ("moment", "[N m]"), ("at", "[s]")]  # fmt: skip
+    rows = []
+    for name, one in joints.items():
+        cells = [number(one[key]) for key in ("least", "most", "speed_max", "speed_time")]
+        for key in ("force", "moment"):
+            value = number(one[f"{key}_max"], beside=wide[f"{key}_max"])
+            cells += [value, NO_VALUE if value in ("0", NO_VALUE) else number(one[f"{key}_time"])]
+        rows.append((text_symbol(name), cells))
+    note = f"From and to: {coordinate}; largest magnitudes and their times."
+    return table(heads, rows, caption=what, note=f"{what}. {note}")
 
 
 def load_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
@@ -136,12 +173,8 @@ def load_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
         charts.append(
             followed(Chart("stresses", "Stresses of beams", "stress", choosing="beam", note=note), stress, runs)
         )
-    for name, title, label in (
-        ("joint_coordinate", "Joint angles and travels", "angle, travel"),
-        ("joint_speed", "Joint speeds", "speed"),
-    ):
-        if name in data and data.sizes["joint"]:
-            charts.append(followed(Chart(name.replace("_", "-"), title, label, choosing="joint"), data[name], runs))
+    if "joint_coordinate" in data:
+        charts += _joint_charts(data, runs)
     for name, title, label in (
         ("drive_torque", "Efforts of prescribed motions", "effort"),
         ("drive_power", "Powers of prescribed motions", "power"),
@@ -166,3 +199,19 @@ def _sensor_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
         for k, group in enumerate(sensor_groups(data))
     ]  # fmt: skip
     return [Panel("Sensors", charts)] if charts else []
+
+
+def _joint_charts(data: xr.Dataset, runs: Sequence[str]) -> list[Chart]:
+    """Angles and rates of joints that turn, travels and speeds of those that slide."""
+    charts, slides = [], sliding_joints(data)
+    for own, kind, variable, title, unit in (
+        (~slides, "angle", "joint_coordinate", "Joint angles", "rad"),
+        (slides, "travel", "joint_coordinate", "Joint travels", "m"),
+        (~slides, "rate", "joint_speed", "Angular velocities of joints", "rad/s"),
+        (slides, "speed", "joint_speed", "Sliding speeds of joints", "m/s"),
+    ):
+        if own.any():
+            values = data[variable].isel(joint=np.flatnonzero(own)).assign_attrs(units=unit)
+            label = "angular velocity" if kind == "rate" else kind
+            charts.append(followed(Chart(f"joint-{kind}", title, label, choosing="joint"), values, runs))
+    return charts

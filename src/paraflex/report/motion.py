@@ -12,12 +12,13 @@ from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.curves import TIPS, bending, energies, energy_scale, followed, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.loads import load_panel, load_tables, stress_tile
+from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import count, number, pairs, quantity
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import check_kind
+from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
 
 _ALONE = ("",)
@@ -36,7 +37,7 @@ def motion_page(data: xr.Dataset) -> Page:
     return Page(
         title=data.attrs["mechanism"],
         kind="run",
-        subtitle="left to its loads, prescribed motion and given torques",
+        subtitle=_subtitle(data),
         verdict=verdict_word(data),
         facts=common_facts(data),
         command=run_command_line(asked(data)),
@@ -53,6 +54,16 @@ def motion_page(data: xr.Dataset) -> Page:
         ],
         remarks=list(filter(None, [validity_line({"": validity_summary(data)})])),
     )
+
+
+def _subtitle(data: xr.Dataset) -> str:
+    """What moves the mechanism."""
+    drives = names_of(data, "drive") if "drive" in data.dims else []
+    torques = {str(name): data["applied_torque"].sel(motor=name).values for name in data["motor"].values}
+    given = [text_symbol(name) for name, values in torques.items() if np.any(np.nan_to_num(values))]
+    parts = [*([f"driven by {', '.join(map(text_symbol, drives))}"] if drives else []),
+             *([f"given torques of {', '.join(given)}"] if given else [])]  # fmt: skip
+    return "; ".join(parts) or "left to its loads"
 
 
 def _table(data: xr.Dataset) -> str:
@@ -168,14 +179,12 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
                 choices.append(choice)
     return Chart(
         "coordinates", "Generalised coordinates", "coordinate", curves, choices=choices, choosing="body",
-        note="Flexible ones are mass-normalised modes.",
+        note="Flexible ones are mass-normalised modes." if len(choices) > len(bodies[:_MOST_CHOICES]) else "",
     )  # fmt: skip
 
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    status = str(data["status"].item())
-    last = "" if status in ("complete", "stopped") else "last sample "
-    tiles = [("status", status, f"{last}t = {_last_time(data):.4g} s")]
+    tiles = load_tiles({"": load_figures(data)})
     # Of earlier results those of their ends.
     name = "deflection" if "deflection" in data else "tip_transverse"
     deflections = np.abs(data[name].transpose("time", "body").values)
@@ -183,13 +192,11 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         body = int(np.argmax([largest(one) for one in deflections.T]))
         name = text_symbol(str(data["body"].values[body]))
         tiles.append(("largest deflection", quantity(largest(deflections), "m"), name))
-    force = np.linalg.norm(data["joint_force"].transpose("joint", "time", "axis").values, axis=-1)
-    if largest(force) > 0.0:
-        joint = int(np.argmax([np.nan_to_num(largest(one)) for one in force]))
-        tiles.append(
-            ("largest joint force", f"{number(largest(force))} N", text_symbol(str(data["joint"].values[joint])))
-        )
-    return [*tiles, *stress_tile(data)]
+    status = str(data["status"].item())
+    last = "" if status in ("complete", "stopped") else "last sample "
+    ended = ("status", status, f"{last}t = {_last_time(data):.4g} s, computed in {number(data['wall_time'].item())} s")
+    # That a run failed is more than its numbers.
+    return [ended, *tiles] if last else [*tiles, ended]
 
 
 def _last_time(data: xr.Dataset) -> float:

@@ -31,7 +31,7 @@ from paraflex.report.curves import (
     torque_unit,
 )
 from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.loads import load_panel, load_tables, stress_tile
+from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
@@ -39,6 +39,7 @@ from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
 from paraflex.results.formulas import during_motion
 from paraflex.results.kinds import check_kind
+from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
 
 
@@ -253,7 +254,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
         most = int(np.nanargmax(deflections))
         tiles.append(("largest deflection", quantity(deflections[most], "m"), _name(data, most)))
-    return [*tiles, *stress_tile(data)]
+    return [*tiles, *load_tiles({name: load_figures(data.sel(mode=name)) for name in names_of(data, "mode")})]
 
 
 def _name(data: xr.Dataset, run: int) -> str:

@@ -18,6 +18,7 @@ from paraflex.errors import InputError
 from paraflex.folders import RUN, kind_of_folder
 from paraflex.mechanism.quantities import known
 from paraflex.results.kinds import kind_of, wrong_kind
+from paraflex.results.loads import load_figures, ranked
 from paraflex.results.metrics import METRICS
 from paraflex.results.storage import open_results
 
@@ -118,7 +119,8 @@ class RunComparison:
     names : (str, str)
         What the runs are called: their folders or files, else "A" and "B".
     numbers : tuple of NumberPair
-        By mode, those that differ most (relative to the first) before others, those of the integration last.
+        By mode: the largest loads ("stress_max.rod") first, then those that differ most (relative to the first),
+        those of the integration last.
     motions : tuple of MotionPair
     settings : mapping of str to (value, value)
         Parameters of the model and of the run that differ, and versions; None where one run has none.
@@ -305,7 +307,7 @@ def _differing_ends(data: tuple[xr.Dataset, xr.Dataset], names: tuple[str, str])
 
 def _numbers(mode: str, first: xr.Dataset, second: xr.Dataset) -> list[NumberPair]:
     """Numbers of a mode that both runs have."""
-    pairs = []
+    pairs, loads = [], _load_numbers(mode, first, second)
     for name in map(str, first.data_vars):
         values = first[name]
         if name not in second or values.dtype.kind not in "fiu" or not set(values.dims) <= {"motor"}:
@@ -319,7 +321,35 @@ def _numbers(mode: str, first: xr.Dataset, second: xr.Dataset) -> list[NumberPai
             one, other = (float((run[name].sel(motor=part) if part else run[name]).item()) for run in (first, second))
             if np.isfinite([one, other]).any():
                 pairs.append(NumberPair(mode, f"{name}.{part}" if part else name, unit, one, other, of_solver=solver))
-    return sorted(pairs, key=lambda pair: (pair.of_solver, -_weight(pair)))
+    return loads + sorted(pairs, key=lambda pair: (pair.of_solver, -_weight(pair)))
+
+
+def _load_numbers(mode: str, first: xr.Dataset, second: xr.Dataset) -> list[NumberPair]:
+    """Largest loads of a mode that both runs have: of beams and prescribed motions, and of all joints the largest."""
+    pairs, nothing = [], float("nan")
+    both = [load_figures(run) for run in (first, second)]
+    for group, numbers in _LOADS.items():
+        one, other = (figures.get(group, {}) for figures in both)
+        for member in (name for name in one if name in other):
+            for key, (name, unit) in numbers.items():
+                values = [each[member][key] for each in (one, other)]
+                if values != [None, None]:
+                    unit = one[member][unit] if unit.endswith("_unit") else unit
+                    known = [nothing if value is None else value for value in values]
+                    pairs.append(NumberPair(mode, f"{name}.{member}", unit or "1", known[0], known[1]))
+    forces = [ranked({"": figures}, "joints", "force_max") for figures in both]
+    if all(forces):
+        pairs.append(NumberPair(mode, "joint_force_max", "N", forces[0][0][0], forces[1][0][0]))
+    return pairs
+
+
+# Numbers of `load_figures` by group: name in a comparison and unit, or the figure that has the unit.
+_LOADS = {
+    "beams": {"stress_max": ("stress_max", "Pa"), "place": ("stress_place", "m"),
+              "safety_factor": ("safety_factor", "1")},
+    "drives": {"torque_max": ("drive_torque_max", "torque_unit"), "speed_max": ("drive_speed_max", "speed_unit"),
+               "power_max": ("drive_power_max", "W")},
+}  # fmt: skip
 
 
 def _weight(pair: NumberPair) -> float:

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from paraflex.results.numbers import finite_or_none, largest
 
-Figures = dict[str, float | None]
+Figures = dict[str, float | str | None]
 # Of the rate of a joint that a torque or a force drives.
 _RATES = {"N m": "rad/s", "N": "m/s"}
 
@@ -22,10 +23,10 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
     -------
     dict
         `beams.<body>` with stress_max, place, time, bending_stress_max, axial_stress_max [Pa, m, s] and safety_factor;
-        `joints.<joint>` with least, most [rad, m], speed_max, force_max [N] and moment_max [N m]; `motors.<motor>` and
-        `drives.<prescribed motion>` with torque_max, its unit and that of speed_max (None of both kinds in results of
-        earlier versions), speed_max, power_max [W] and energy [J]; `frame` with force_max and moment_max of the
-        mechanism on the ground.
+        `joints.<joint>` with least, most, their unit (rad or m), speed_max, force_max [N] and moment_max [N m];
+        `motors.<motor>` and `drives.<prescribed motion>` with torque_max, its unit and that of speed_max (None of both
+        kinds in results of earlier versions), speed_max, power_max [W] and energy [J]; `frame` with force_max and
+        moment_max of the mechanism on the ground. Times of the largest values are torque_time, force_time, ... [s].
     """
     out: dict[str, Any] = {}
     if "stress_max" in run:
@@ -36,7 +37,10 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
             if body in bent or np.isfinite(run["stress_max"].values[b])
         }
     if "joint_coordinate" in run:
-        out["joints"] = {str(joint): _joint(run.sel(joint=joint)) for joint in run["joint"].values}
+        out["joints"] = {
+            str(joint): _joint(run.sel(joint=joint), slides=slides)
+            for joint, slides in zip(run["joint"].values, sliding_joints(run), strict=True)
+        }
     for group, dim, torque in (
         ("motors", "motor", "torque" if "torque" in run else "applied_torque"), ("drives", "drive", "drive_torque"),
     ):  # fmt: skip
@@ -45,17 +49,32 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
                 str(name): {
                     "torque_unit": unit,
                     "speed_unit": None if unit is None else _RATES[unit],
-                    "torque_max": largest(run[torque].sel({dim: name}).values),
-                    "speed_max": largest(run[f"{dim}_speed"].sel({dim: name}).values),
-                    "power_max": largest(run[f"{dim}_power"].sel({dim: name}).values),
+                    **_most("torque", run[torque].sel({dim: name})),
+                    **_most("speed", run[f"{dim}_speed"].sel({dim: name})),
+                    **_most("power", run[f"{dim}_power"].sel({dim: name})),
                     "energy": finite_or_none(run[f"{dim}_energy"].sel({dim: name}).item()),
                 }
                 for name, unit in zip(run[dim].values, _units(run[torque], run.sizes[dim]), strict=True)
             }
     if "frame_force" in run:
-        size = np.linalg.norm(run["frame_force"].transpose(..., "axis").values, axis=-1)
-        out["frame"] = {"force_max": largest(size), "moment_max": largest(run["frame_moment"].values)}
+        out["frame"] = _most("force", run["frame_force"]) | _most("moment", run["frame_moment"])
     return out
+
+
+def sliding_joints(data: xr.Dataset) -> NDArray[np.bool_]:
+    """Which joints (joints,) have a travel [m] and no angle [rad]."""
+    known = np.isfinite(data["joint_direction"].transpose(..., "joint").values)
+    return np.asarray(known.reshape(-1, known.shape[-1]).any(axis=0))
+
+
+def _most(name: str, values: xr.DataArray) -> Figures:
+    """Largest magnitude of numbers or of vectors, and its time; of a constant there is none."""
+    sizes = values.reduce(np.linalg.norm, "axis") if "axis" in values.dims else abs(values)
+    most = largest(sizes.values)
+    when = None
+    if most is not None and "time" in sizes.dims:
+        when = float(sizes["time"].values[np.nanargmax(np.where(np.isfinite(sizes.values), sizes.values, np.nan))])
+    return {f"{name}_max": most, f"{name}_time": when}
 
 
 def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
@@ -77,16 +96,49 @@ _OF_BEAMS = {
 }
 
 
-def _joint(one: xr.Dataset) -> Figures:
+def _joint(one: xr.Dataset, *, slides: bool) -> Figures:
     values = one["joint_coordinate"].values
     known = values[np.isfinite(values)]
     return {
         "least": float(known.min()) if known.size else None,
         "most": float(known.max()) if known.size else None,
-        "speed_max": largest(one["joint_speed"].values),
-        "force_max": largest(np.linalg.norm(one["joint_force"].transpose(..., "axis").values, axis=-1)),
-        "moment_max": largest(one["joint_moment"].values),
+        "unit": "m" if slides else "rad",
+        **_most("speed", one["joint_speed"]),
+        **_most("force", one["joint_force"]),
+        **_most("moment", one["joint_moment"]),
     }
+
+
+Ranked = list[tuple[float, str, str, Mapping[str, Any]]]
+
+
+def ranked(loads: Mapping[str, Mapping[str, Any]], group: str, key: str) -> Ranked:
+    """Value, run, member and its figures of all runs, the largest value first; None is left out.
+
+    Parameters
+    ----------
+    loads : mapping of str to mapping
+        `load_figures` by name of the run, which may be empty.
+    group, key : str
+        "beams" and "stress_max", "joints" and "force_max".
+    """
+    known = [
+        (one[key], run, member, one)
+        for run, figures in loads.items()
+        for member, one in figures.get(group, {}).items()
+        if one[key] is not None
+    ]
+    return sorted(known, key=lambda each: -each[0])
+
+
+def joint_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
+    """A sentence on the largest joint force of all runs; empty where there is none."""
+    known = ranked(loads, "joints", "force_max")
+    if not known or not known[0][0]:
+        return ""
+    most, name, joint, one = known[0]
+    whose = f"mode {name}: " if name else ""
+    return f"{whose}largest joint force {most:.4g} N in {joint}{_at(one['force_time'])}"
 
 
 def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
@@ -97,15 +149,10 @@ def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
     loads : mapping of str to mapping
         `load_figures` by name of the run, which may be empty.
     """
-    known = [
-        (one["stress_max"], name, body, one)
-        for name, figures in loads.items()
-        for body, one in figures.get("beams", {}).items()
-        if one["stress_max"] is not None
-    ]
+    known = ranked(loads, "beams", "stress_max")
     if not known:
         return ""
-    most, name, body, one = max(known, key=lambda each: each[0])
+    most, name, body, one = known[0]
     whose = f"mode {name}: " if name else ""
     text = f"{whose}largest stress {1e-6 * most:.4g} MPa in {body} at {one['place']:.3g} m, t = {one['time']:.4g} s"
     factors = [(beam["safety_factor"], where) for _, _, where, beam in known if beam["safety_factor"] is not None]
@@ -120,14 +167,19 @@ def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
     whose = f"mode {mode}: " if mode else ""
     return [
         f"{whose}drive {name}: {_EFFORTS[one['torque_unit']]} up to "
-        f"{_with_unit(one['torque_max'], one['torque_unit'])}, "
-        f"speed up to {_with_unit(one['speed_max'], one['speed_unit'])}, power up to {one['power_max']:.4g} W"
+        f"{_with_unit(one['torque_max'], one['torque_unit'])}{_at(one['torque_time'])}; "
+        f"speed up to {_with_unit(one['speed_max'], one['speed_unit'])}; "
+        f"power up to {one['power_max']:.4g} W{_at(one['power_time'])}"
         for name, one in figures.get("drives", {}).items()
         if None not in (one["torque_max"], one["speed_max"], one["power_max"])
     ]
 
 
 _EFFORTS = {"N m": "torque", "N": "force", None: "torque or force"}
+
+
+def _at(time: float | None) -> str:
+    return "" if time is None else f" at t = {time:.4g} s"
 
 
 def _with_unit(value: float, unit: str | None) -> str:

@@ -103,10 +103,12 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     numbers = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in numbers.items()}
     return {
         "mechanism": data.attrs["mechanism"],
+        "status": numbers.pop("status"),
+        "message": numbers.pop("message"),
+        "loads": load_figures(data),
         **numbers,
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
-        "loads": load_figures(data),
         **sensor_figures(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
