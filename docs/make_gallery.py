@@ -95,7 +95,8 @@ TITLES = {
 }
 INTRODUCTION = """# Gallery
 
-This page has the figures that paraflex draws, by kind of results (not those of `sensors`: these models have none). To draw one for print:
+This page has the figures that paraflex draws, by kind of results, but that of `sensors`, which these models
+have none of. To draw one for print:
 
 ```sh
 paraflex plot RESULTS FIGURE... --style single --format pdf,svg,png
