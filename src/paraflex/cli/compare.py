@@ -94,7 +94,7 @@ def _numbers(pairs: Iterable[NumberPair]) -> Table:
          *(_number(value) for value in (pair.first, pair.second, pair.difference)), _percent(pair.relative)]
         for pair in pairs
     )  # fmt: skip
-    return plain_table("number", "unit", numbers=("A", "B", "B - A", "relative"), rows=rows)
+    return plain_table("number", "unit", numbers=("A", "B", "B - A", "relative"), rows=rows, wrapped=("number",))
 
 
 def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
@@ -108,7 +108,8 @@ def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
          *(_number(value) for value in (pair.first, pair.second, pair.difference, pair.time))]
         for pair in most.values()
     )  # fmt: skip
-    return plain_table("quantity", "of", "unit", numbers=("peak A", "peak B", "difference", "at [s]"), rows=rows)
+    heads = ("peak A", "peak B", "difference", "at [s]")
+    return plain_table("quantity", "of", "unit", numbers=heads, rows=rows, wrapped=("quantity", "of"))
 
 
 def _number(value: float) -> str:

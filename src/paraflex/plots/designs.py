@@ -121,9 +121,7 @@ class DesignTable:
 
     def labelled(self, metric: str) -> tuple[str, float]:
         """Label of a metric's axis, and the factor of its values."""
-        unit, factor = self.units.get(metric, ""), 1.0
-        if unit == "m":
-            unit, factor = display_unit("m", self.metrics[metric])
+        unit, factor = display_unit(self.units.get(metric, ""), self.metrics[metric])
         printed = metric_name(metric)
         return (f"{printed} [{unit}]" if unit not in ("", "1") else printed), factor
 

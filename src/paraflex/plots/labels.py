@@ -102,12 +102,13 @@ class DisplayUnit(NamedTuple):
 
 _PREFIXES = {
     "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
+    "Pa": (DisplayUnit("MPa", 1e-6),),
     "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
 }
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """The unit in which the largest of lengths ("m") or angles ("rad") has few digits; any other unit as it is."""
+    """The unit in which the largest of lengths ("m") or angles ("rad") has few digits; of stresses MPa; others unchanged."""
     largest, choices = peak(values), _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
     if largest == 0.0:
         return choices[0]
@@ -148,7 +149,7 @@ def logarithmic_number(value: float) -> str:
 
 
 def symbol(name: str) -> str:
-    """A name in figures: "A1" and "tau1" as symbols with a subscript, "link1" as "link 1", others unchanged."""
+    """A name in figures: "A1" and "tau1" as symbols with a subscript, others unchanged."""
     letters, number = _parted(name)
     if len(letters) != 1 and letters not in _GREEK:
         return plain(text_symbol(name))
@@ -157,11 +158,11 @@ def symbol(name: str) -> str:
 
 
 def text_symbol(name: str) -> str:
-    """A name on pages: "τ₁" for "tau1", "A₁" for "A1", "link 1" for "link1", others unchanged."""
+    """A name on pages: "τ₁" for "tau1", "A₁" for "A1", others unchanged."""
     letters, number = _parted(name)
     if len(letters) == 1 or letters in _GREEK:
         return _GREEK.get(letters, letters) + number.translate(_LOWERED)
-    return f"{letters} {number}".rstrip() if letters else name
+    return name
 
 
 def _parted(name: str) -> tuple[str, str]:

@@ -39,13 +39,16 @@ def load_tables(data: xr.Dataset, selected: str = "") -> list[tuple[str, str]]:
     if efforts := {**own.get("motors", {}), **own.get("drives", {})}:
         out.append((f"Motors and prescribed motions{of_mode}", _efforts(efforts)))
     if own.get("joints"):
-        out.append((f"Joints and ground{of_mode}", _joints(own)))
+        out.append((f"Joints and ground{of_mode}", _joints(own, _travels(data))))
     return out
 
 
 def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
     rows = [(mode, body, one) for mode, each in figures.items() for body, one in each.get("beams", {}).items()]
-    note = "Bending in the outermost fibre; stress: bending and axial together, with place and time of the largest."
+    note = (
+        "Stress: bending and axial together, with place and time of the largest. Bending, in the outermost fibre, and "
+        "axial are each largest at places and times of their own, and do not add up to it."
+    )
     if len(rows) > _MOST_ROWS:
         worst: dict[str, tuple[str, str, Any]] = {}
         for row in rows:
@@ -60,13 +63,13 @@ def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
         note += " Coordinates of a beam without axial stress do not stretch: its stress is of bending alone."
     several = len(figures) > 1
     heads = [("mode" if several else "beam", ""), *([("beam", "")] if several else []),
-             ("stress", "[MPa]"), ("at", "[m]"), ("time", "[s]"), ("bending", "[MPa]"), ("axial", "[MPa]"),
-             ("safety", "factor")]  # fmt: skip
+             ("stress", "[MPa]"), ("safety", "factor"), ("at", "[m]"), ("time", "[s]"), ("bending", "[MPa]"),
+             ("axial", "[MPa]")]  # fmt: skip
     cells = [
         (mode if several else text_symbol(body), [
             *([text_symbol(body)] if several else []),
-            number(one["stress_max"], _MEGA), number(one["place"]), number(one["time"]),
-            number(one["bending_stress_max"], _MEGA), number(one["axial_stress_max"], _MEGA), _factor(one),
+            number(one["stress_max"], _MEGA), _factor(one), number(one["place"]), number(one["time"]),
+            number(one["bending_stress_max"], _MEGA), number(one["axial_stress_max"], _MEGA),
         ])
         for mode, body, one in rows
     ]  # fmt: skip
@@ -97,8 +100,19 @@ def _efforts(efforts: Mapping[str, Mapping[str, Any]]) -> str:
     return table(heads, rows, caption="Largest efforts of motors and prescribed motions", note=note)
 
 
-def _joints(figures: Mapping[str, Any]) -> str:
-    heads = [("joint", ""), ("from", "[rad, m]"), ("to", "[rad, m]"), ("speed", "[rad/s, m/s]"), ("force", "[N]"),
+def _travels(data: xr.Dataset) -> bool | None:
+    """Whether joints slide: all or none of them; None if some do, and where results do not say."""
+    if "joint_direction" not in data:
+        return None
+    known = np.isfinite(data["joint_direction"].transpose("joint", ...).values)
+    slides = known.reshape(len(known), -1).any(axis=1)
+    return bool(slides.all()) if slides.all() == slides.any() else None
+
+
+def _joints(figures: Mapping[str, Any], travels: bool | None) -> str:
+    unit = {True: "m", False: "rad", None: "rad, m"}[travels]
+    speed = ", ".join(f"{one}/s" for one in unit.split(", "))
+    heads = [("joint", ""), ("from", f"[{unit}]"), ("to", f"[{unit}]"), ("speed", f"[{speed}]"), ("force", "[N]"),
              ("moment", "[N m]")]  # fmt: skip
     rows = [
         (text_symbol(name), [number(one[key]) for key in ("least", "most", "speed_max", "force_max", "moment_max")])
@@ -133,6 +147,8 @@ def load_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
     ):
         if name in data:
             charts.append(followed(Chart(name.replace("_", "-"), title, label, choosing="motion"), data[name], runs))
+    if "motor_speed" in data and data.sizes["motor"]:
+        charts.append(followed(Chart("speeds", "Motor speeds", "speed", choosing="motor"), data["motor_speed"], runs))
     if "motor_power" in data and data.sizes["motor"]:
         charts.append(followed(Chart("powers", "Motor powers", "power", choosing="motor"), data["motor_power"], runs))
     if "frame_force" in data:

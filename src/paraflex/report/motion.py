@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.findings import DONE_STATUSES
 from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.curves import TIPS, bending, energies, energy_scale, followed, largest, look, thinned
@@ -16,7 +17,7 @@ from paraflex.report.loads import load_panel, load_tables
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import count, number, pairs, quantity
-from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.validity import validity_line, validity_summary
 
@@ -48,10 +49,10 @@ def motion_page(data: xr.Dataset) -> Page:
         film=moving,
         no_film="" if moving else NO_SHAPES,
         notes=[
-            *doubt_lines(verdict_of(data)),
             *([] if status == "complete" else [f"{status}: {data['message'].item()}"]),
+            *doubt_lines(verdict_of(data)),
         ],
-        remarks=list(filter(None, [validity_line({"": validity_summary(data)})])),
+        remarks=list(filter(None, [validity_line({"": validity_summary(data)})])) if finished(data).all() else [],
     )
 
 
@@ -168,7 +169,7 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     status = str(data["status"].item())
-    last = "" if status in ("complete", "stopped") else "last sample "
+    last = "" if status in DONE_STATUSES else "last sample "
     tiles = [("status", status, f"{last}t = {_last_time(data):.4g} s")]
     # Of earlier results those of their ends.
     name = "deflection" if "deflection" in data else "tip_transverse"

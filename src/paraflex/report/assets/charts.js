@@ -45,6 +45,9 @@ const charts = (() => {
 
   // What is far below the largest value is no more than rounding, or the start at rest.
   const MOST_DECADES = 5;
+  // Within one decade there may be no power of ten: Plotly then places numbers between them.
+  const steps = (range) => !range || range[1] - range[0] > 1.5 ? { dtick: 1 } : { nticks: 6 };
+
   function decades(chart) {
     let low = Infinity, high = 0;
     for (const curve of chart.told.curves) {
@@ -80,7 +83,7 @@ const charts = (() => {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
       xaxis: axis(chart.told.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : {}),
-      yaxis: axis(chart.told.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), dtick: 1, tickformat: "~g" } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
+      yaxis: axis(chart.told.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
     };
   }
 
