@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 
 from paraflex import plots
 from paraflex.errors import InputError, OutputError
-from paraflex.plots.labels import display_unit, plain, symbol, three_digits
+from paraflex.plots.labels import DisplayUnit, display_unit, plain, symbol, three_digits
 from paraflex.plots.selection import default_mode
 
 FULL, PARTIAL = "++", "+-"

@@ -108,7 +108,7 @@ _PREFIXES = {
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """The unit in which the largest of lengths ("m") or angles ("rad") has few digits; of stresses MPa; others unchanged."""
+    """The unit of few digits of the largest of lengths ("m") or angles ("rad"); MPa of stresses, others unchanged."""
     largest, choices = peak(values), _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
     if largest == 0.0:
         return choices[0]
