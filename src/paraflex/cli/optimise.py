@@ -27,8 +27,8 @@ def _report(console: Console, result: OptimisationResult) -> None:
     for name, limit in [] if result.holds_limits else result.sought["limits"]:
         unit, value = _shown_unit(name), result.metrics[name]
         if value > limit:
-            over = f"{unit.factor * value:.6g} {unit.name}, limit {unit.factor * limit:.6g} {unit.name}"
-            console.print(f"limit exceeded: {name} is {over} ({value / limit - 1.0:+.3g} of it)", soft_wrap=True)
+            of, over = (f"{unit.factor * one:.6g} {unit.name}".rstrip() for one in (limit, value - limit))
+            console.print(f"limit exceeded: {name} is above {of} by {over}", soft_wrap=True)
     if not result.holds_limits:
         console.print("no design keeps all limits: this one, and best.toml, exceed them least and do not satisfy them")
 
